@@ -1,1 +1,7 @@
-//! (in the making)
+//! Drawings of the layout and their writers.
+
+pub mod drawing;
+mod svg;
+
+pub use drawing::Drawing;
+pub use svg::to_svg;

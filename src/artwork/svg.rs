@@ -25,7 +25,13 @@ pub fn to_svg(drawing: &Drawing) -> Vec<u8> {
         .set("height", format!("{}mm", number(size.y)))
         .set(
             "viewBox",
-            format!("{} {} {} {}", number(low.x), number(-drawing.page_mm.1.y), number(size.x), number(size.y)),
+            format!(
+                "{} {} {} {}",
+                number(low.x),
+                number(-drawing.page_mm.1.y),
+                number(size.x),
+                number(size.y)
+            ),
         );
     for (name, value) in &drawing.facts {
         document.assign(format!("data-{name}"), value.as_str());

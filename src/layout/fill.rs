@@ -31,6 +31,19 @@ const GIVE_WAY: f64 = 0.5;
 /// The places of a relaxed filling of the edge, px from the centre.
 pub(super) fn relaxed(pattern: &Pattern, edge: &Boundary) -> Vec<DVec2> {
     let pitch = pattern.pitch_px;
+    let mut places = seeds(pattern, edge);
+    // The dot at the centre stays there.
+    let held = match pattern.centred_on {
+        CentredOn::Dot => places.iter().position(|place| place.length() < 1e-9 * pitch),
+        CentredOn::Gap => None,
+    };
+    relax(&mut places, held, edge, pitch);
+    places
+}
+
+/// Where the relaxation starts.
+pub(super) fn seeds(pattern: &Pattern, edge: &Boundary) -> Vec<DVec2> {
+    let pitch = pattern.pitch_px;
     let inner = edge.inset(GIVE_WAY * pitch);
     let mut places: Vec<DVec2> = pattern
         .unit_lattice(edge.largest_px() / pitch)
@@ -39,12 +52,6 @@ pub(super) fn relaxed(pattern: &Pattern, edge: &Boundary) -> Vec<DVec2> {
         .filter(|place| inner.contains(*place) && inner.largest_px() > 0.0)
         .collect();
     places.extend(row_on(edge, pitch, pattern.rotation_rad));
-    // The dot at the centre stays there.
-    let held = match pattern.centred_on {
-        CentredOn::Dot => places.iter().position(|place| place.length() < 1e-9 * pitch),
-        CentredOn::Gap => None,
-    };
-    relax(&mut places, held, edge, pitch);
     places
 }
 
@@ -89,10 +96,8 @@ fn relax(places: &mut [DVec2], held: Option<usize>, edge: &Boundary, pitch: f64)
         if bars.is_empty() {
             return;
         }
-        let squares: f64 = bars
-            .iter()
-            .map(|[a, b]| places[*a as usize].distance_squared(places[*b as usize]))
-            .sum();
+        let squares: f64 =
+            bars.iter().map(|[a, b]| places[*a as usize].distance_squared(places[*b as usize])).sum();
         let wanted = PRESSURE * (squares / bars.len() as f64).sqrt();
         force.fill(DVec2::ZERO);
         for [a, b] in &bars {

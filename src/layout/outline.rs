@@ -151,9 +151,7 @@ impl Outline {
             // |chord - curve| <= |second derivative| / (8 n^2), and |second derivative| <= 6 max |..|.
             let bend = (start - 2.0 * a + b).length().max((a - 2.0 * b + end).length());
             let count = (0.75 * bend / tolerance).sqrt().ceil().clamp(1.0, 1e4) as u32;
-            points.extend(
-                (0..count).map(|k| point_on(start, &[a, b, end], f64::from(k) / f64::from(count))),
-            );
+            points.extend((0..count).map(|k| point_on(start, &[a, b, end], f64::from(k) / f64::from(count))));
         }
         points
     }
@@ -170,7 +168,8 @@ impl Outline {
         let width = |k: u32| {
             let across = DVec2::from_angle(TAU / 2.0 * f64::from(k) / 32.0);
             let reach = points.iter().map(|p| p.dot(across));
-            let (low, high) = reach.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+            let (low, high) =
+                reach.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
             high - low
         };
         (0..32).map(width).fold((f64::INFINITY, 0.0), |(l, h), w| (l.min(w), h.max(w)))
@@ -192,7 +191,11 @@ fn point_on(start: DVec2, [a, b, end]: &[DVec2; 3], t: f64) -> DVec2 {
 /// Half the integral of p x dp over a cubic.
 fn half_cross_integral([p0, p1, p2, p3]: [DVec2; 4]) -> f64 {
     let cross = |a: DVec2, b: DVec2| a.perp_dot(b);
-    (6.0 * cross(p0, p1) + 3.0 * cross(p0, p2) + cross(p0, p3) + 3.0 * cross(p1, p2) + 3.0 * cross(p1, p3)
+    (6.0 * cross(p0, p1)
+        + 3.0 * cross(p0, p2)
+        + cross(p0, p3)
+        + 3.0 * cross(p1, p2)
+        + 3.0 * cross(p1, p3)
         + 6.0 * cross(p2, p3))
         / 20.0
 }

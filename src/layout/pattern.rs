@@ -62,6 +62,19 @@ impl Pattern {
         Ok(places)
     }
 
+    /// How many places [`Self::places`] gives, without finding them exactly: relaxing moves places, but
+    /// neither adds nor takes any.
+    pub(super) fn count(&self, edge: &Boundary) -> usize {
+        if edge.area_px2() / (self.pitch_px * self.pitch_px) > MOST_DOTS as f64 {
+            return usize::MAX;
+        }
+        match self.kind {
+            PatternKind::Square | PatternKind::Hexagonal => self.lattice(edge).len(),
+            PatternKind::Rings => self.rings(edge).len(),
+            PatternKind::Fill => fill::seeds(self, edge).len(),
+        }
+    }
+
     /// The two steps of the lattice (unit pitch) and the lattice coordinates of the centre.
     pub(super) fn cell(&self) -> (DVec2, DVec2, DVec2) {
         let along = DVec2::from_angle(self.rotation_rad);
@@ -127,18 +140,13 @@ impl Pattern {
         }
     }
 
-    /// The pitch at which the pattern has as close to `wanted` places inside the edge as it can.
-    ///
-    /// The dots' radius is `dot_share` of the pitch plus `dot_radius_px` and stays inside the edge.
+    /// The pitch at which the pattern has as close to `wanted` places inside the edge as it can; the pattern's
+    /// own pitch is not read.
     ///
     /// # Errors
     /// No dot fits.
-    pub fn pitch_for_count(
-        &self,
-        wanted: usize,
-        count_at: impl Fn(f64) -> usize,
-        edge: &Boundary,
-    ) -> Result<f64, PatternError> {
+    pub fn pitch_for_count(&self, wanted: usize, edge: &Boundary) -> Result<f64, PatternError> {
+        let count_at = |pitch_px: f64| Self { pitch_px, ..*self }.count(edge);
         let area = edge.area_px2();
         if area <= 0.0 {
             return Err(PatternError::Empty);

@@ -10,4 +10,5 @@ pub mod mesh;
 pub mod numeric;
 pub mod optics;
 pub mod parts;
+pub mod pose;
 pub mod transfer;

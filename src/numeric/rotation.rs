@@ -56,3 +56,42 @@ pub fn vector_from_rotation(rotation: &DMat3) -> DVec3 {
     let axis = axis.normalize_or_zero();
     if axis.dot(twice_sine) < 0.0 { -axis * angle } else { axis * angle }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vector_and_matrix_invert_each_other_at_every_angle() {
+        for angle in
+            [0.0, 1e-12, 1e-9, 9e-5, 1.1e-4, 0.3, 1.5, 2.0, 2.2, 3.0, 3.1415, std::f64::consts::PI - 1e-9]
+        {
+            for axis in [
+                DVec3::X,
+                -DVec3::Y,
+                DVec3::new(1.0, -2.0, 0.5).normalize(),
+                DVec3::new(-0.1, 0.2, -3.0).normalize(),
+            ] {
+                let vector = axis * angle;
+                let matrix = rotation_from_vector(vector);
+                assert!(
+                    (matrix.transpose() * matrix - DMat3::IDENTITY)
+                        .to_cols_array()
+                        .iter()
+                        .all(|e| e.abs() < 4e-15)
+                );
+                let back = vector_from_rotation(&matrix);
+                assert!((back - vector).length() < 1e-14 * (1.0 + angle), "{vector} {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn half_a_turn_has_its_axis() {
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(2.0, -1.0, 0.3).normalize()] {
+            let back = vector_from_rotation(&rotation_from_vector(axis * std::f64::consts::PI));
+            assert!(back.length() - std::f64::consts::PI < 1e-15);
+            assert!(back.cross(axis).length() < 1e-14);
+        }
+    }
+}

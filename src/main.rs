@@ -1,1 +1,5 @@
-fn main() {}
+//! The command line of domecast.
+
+fn main() -> std::process::ExitCode {
+    domecast::cli::run()
+}

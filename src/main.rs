@@ -1,5 +1,3 @@
 //! The command line of domecast.
 
-fn main() -> std::process::ExitCode {
-    domecast::cli::run()
-}
+fn main() {}

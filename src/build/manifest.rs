@@ -104,7 +104,8 @@ impl Manifest {
     /// # Errors
     /// A sentence that says what is wrong with it.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let manifest: Self = serde_json::from_str(text).map_err(|error| format!("is not a manifest: {error}"))?;
+        let manifest: Self =
+            serde_json::from_str(text).map_err(|error| format!("is not a manifest: {error}"))?;
         if manifest.format != FORMAT || manifest.version != VERSION {
             return Err(format!(
                 "has format \"{}\" version {}; this release reads \"{FORMAT}\" version {VERSION}",

@@ -112,9 +112,17 @@ impl Tree {
             if had_earlier && fs::rename(&earlier, out).is_err() {
                 // the earlier result must survive even this: leave the temporary folder where it is
                 let kept = staging.keep();
-                return Err(WriteError::Io { doing: "put the earlier result back; it is kept", path: kept, source });
+                return Err(WriteError::Io {
+                    doing: "put the earlier result back; it is kept",
+                    path: kept,
+                    source,
+                });
             }
-            return Err(WriteError::Io { doing: "put the new result in place", path: out.to_path_buf(), source });
+            return Err(WriteError::Io {
+                doing: "put the new result in place",
+                path: out.to_path_buf(),
+                source,
+            });
         }
         Ok(())
     }

@@ -5,8 +5,10 @@ use serde_json::json;
 
 use super::error::DesignError;
 use super::rules;
-use super::sections::{CameraSection, DesignFile, SpringPlaces};
+use super::sections::{CameraSection, DesignFile, DomeSection, ModelName, OpticsSection, SpringPlaces};
+use crate::camera::{LensSpec, Model};
 use crate::numeric::Rigid;
+use crate::optics::{Layer, OpticsSpec, SensorOptics};
 
 /// Something about a design that does not stop a build but that its maker should know.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,6 +27,8 @@ pub struct DesignWarning {
 pub struct Design {
     sections: DesignFile,
     text: String,
+    optics: SensorOptics,
+    warnings: Vec<DesignWarning>,
 }
 
 impl Design {
@@ -36,6 +40,16 @@ impl Design {
     /// The text that the design was read from.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Lens, layers and dome at rest.
+    pub fn optics(&self) -> &SensorOptics {
+        &self.optics
+    }
+
+    /// What the maker should know.
+    pub fn warnings(&self) -> &[DesignWarning] {
+        &self.warnings
     }
 
     /// Name of the design.
@@ -119,11 +133,81 @@ pub(super) fn sheet_thickness_mm(sections: &DesignFile) -> f64 {
     sections.optics.layers.iter().filter_map(|layer| layer.thickness_mm).sum()
 }
 
-/// Checks the rules between fields.
+/// The optics of a design.
+pub(super) fn optics(
+    camera: &CameraSection,
+    optics: &OpticsSection,
+    dome: &DomeSection,
+) -> Result<SensorOptics, DesignError> {
+    rules::layers(&optics.layers)?;
+    rules::camera_below_sheet(camera, optics)?;
+    let layers = optics.layers.iter().map(|layer| Layer {
+        name: layer.name.clone(),
+        index: layer.index.rgb(),
+        thickness_mm: layer.thickness_mm,
+    });
+    let spec = OpticsSpec {
+        lens: LensSpec {
+            model: match camera.model {
+                ModelName::Pinhole => Model::Pinhole,
+                ModelName::BrownConrady => Model::BrownConrady,
+                ModelName::KannalaBrandt => Model::KannalaBrandt,
+            },
+            width: camera.width,
+            height: camera.height,
+            matrix: camera.matrix,
+            distortion: camera.distortion.clone(),
+            field_of_view_rad: camera.field_of_view_deg.to_radians(),
+            pupil_shift_mm: camera.pupil_shift_mm.clone(),
+        },
+        sensor_from_camera: sensor_from_camera(camera),
+        layers: layers.collect(),
+        dome_radius_mm: dome.radius_mm,
+    };
+    SensorOptics::new(&spec).map_err(|fault| {
+        // the optics speak of their own inputs; the writer knows the fields of the file
+        let field = match fault.field.split_once('.') {
+            Some(("lens", rest)) => {
+                format!("camera.{}", rest.replace("field_of_view_rad", "field_of_view_deg"))
+            }
+            _ if fault.field.starts_with("layers") => format!("optics.{}", fault.field),
+            _ if fault.field == "dome_radius_mm" => "dome.radius_mm".to_owned(),
+            _ => "camera.position_mm".to_owned(),
+        };
+        DesignError::at(field, fault.value, "the optics cannot be", fault.allowed)
+    })
+}
+
+/// Checks the rules between fields and computes what follows from them.
 pub(super) fn resolve(sections: DesignFile, text: &str) -> Result<Design, DesignError> {
-    let design = Design { sections, text: text.to_owned() };
+    check_name(&sections.name)?;
+    let optics = optics(&sections.camera, &sections.optics, &sections.dome)?;
+    let warnings = field_of_view_warning(&sections.camera, &optics).into_iter().collect();
+    let design = Design { sections, text: text.to_owned(), optics, warnings };
     rules::check(&design)?;
     Ok(design)
+}
+
+/// A field of view that the lens model cannot reach is said, with the fold that ends it.
+fn field_of_view_warning(camera: &CameraSection, optics: &SensorOptics) -> Option<DesignWarning> {
+    let wanted_deg = camera.field_of_view_deg / 2.0;
+    let reached_deg = optics.lens().max_field_angle_rad().to_degrees();
+    if reached_deg >= wanted_deg * (1.0 - 1e-9) {
+        return None;
+    }
+    let fold = match optics.lens().fold_angle_rad() {
+        Some(fold_rad) => format!("folds at {:.2} degrees of field angle", fold_rad.to_degrees()),
+        None => "ends short of it".to_owned(),
+    };
+    Some(DesignWarning {
+        field: "camera.distortion".into(),
+        message: format!(
+            "the lens model {fold}, but the field of view asks for {wanted_deg:.2} (half of \
+             camera.field_of_view_deg); max_field_angle_rad is what can be reached, {:.4} rad = {reached_deg:.2} \
+             degrees; a kannala_brandt calibration reaches further",
+            optics.lens().max_field_angle_rad()
+        ),
+    })
 }
 
 /// Folder names come from design names, so a name must not be able to leave the output folder.

@@ -4,8 +4,8 @@ use glam::DVec2;
 use serde_json::json;
 
 use super::error::DesignError;
-use super::resolve::{Design, check_name};
-use super::sections::{LayerSection, SpringEnds};
+use super::resolve::Design;
+use super::sections::{CameraSection, LayerSection, OpticsSection, SpringEnds};
 
 /// Sums of written decimals (10.1 + 15.9) may miss the written limit by rounding; a nanometre is far
 /// below anything that can be made.
@@ -13,8 +13,6 @@ const ROUNDING_MM: f64 = 1e-6;
 
 /// Checks all of them; the first that does not hold is the answer.
 pub(super) fn check(design: &Design) -> Result<(), DesignError> {
-    check_name(design.name())?;
-    layers(&design.sections().optics.layers)?;
     sizes(design)?;
     dome_on_platform(design)?;
     envelope(design)?;
@@ -34,13 +32,40 @@ pub(super) fn layers(layers: &[LayerSection]) -> Result<(), DesignError> {
                     .with_help("only the last layer, which fills the dome, has no thickness"));
             }
             Some(thickness_mm) if index == last => {
-                return Err(DesignError::at(field, thickness_mm, "the last layer fills the dome", "no thickness")
-                    .with_help("leave the field out, or add the layer that fills the dome"));
+                return Err(DesignError::at(
+                    field,
+                    thickness_mm,
+                    "the last layer fills the dome",
+                    "no thickness",
+                )
+                .with_help("leave the field out, or add the layer that fills the dome"));
             }
             _ => {}
         }
     }
     Ok(())
+}
+
+/// The entrance pupil is in the air below the sheet, or touches it.
+pub(super) fn camera_below_sheet(camera: &CameraSection, optics: &OpticsSection) -> Result<(), DesignError> {
+    let thickness_mm: f64 = optics.layers.iter().filter_map(|layer| layer.thickness_mm).sum();
+    let z_mm = camera.position_mm[2];
+    // one part in 1e12 is the rounding of written decimals, not a place
+    if z_mm <= -thickness_mm * (1.0 - 1e-12) {
+        return Ok(());
+    }
+    let place = if z_mm > 0.0 { "above the sheet, inside or beyond the dome" } else { "inside the sheet" };
+    let fault = DesignError::at(
+        "camera.position_mm",
+        json!(camera.position_mm),
+        format!("the camera's pupil is {place}"),
+        format!("z of at most {} (the sheet's underside)", -thickness_mm),
+    );
+    Err(if z_mm > 0.0 {
+        fault.with_help("the dome is above, z is negative below the sheet: a sign lost?")
+    } else {
+        fault
+    })
 }
 
 /// Side lengths, which the schema cannot bound inside a list.
@@ -57,7 +82,12 @@ fn sizes(design: &Design) -> Result<(), DesignError> {
     ];
     for (field, values) in lists {
         if values.iter().any(|value| !(*value > 0.0 && *value <= 1e4)) {
-            return Err(DesignError::at(field, json!(values), "the value is out of range", "more than 0, at most 10000"));
+            return Err(DesignError::at(
+                field,
+                json!(values),
+                "the value is out of range",
+                "more than 0, at most 10000",
+            ));
         }
     }
     let deviations: [(&str, &[f64]); 2] = [
@@ -83,7 +113,10 @@ fn dome_on_platform(design: &Design) -> Result<(), DesignError> {
             "dome.radius_mm",
             radius_mm,
             format!("the dome is {} mm wide, wider than the platform or its sheet", 2.0 * radius_mm),
-            format!("at most {} (half of the smallest of platforms.outer_mm and sheet.size_mm)", smallest_mm / 2.0),
+            format!(
+                "at most {} (half of the smallest of platforms.outer_mm and sheet.size_mm)",
+                smallest_mm / 2.0
+            ),
         )
         .with_help("radius for diameter?"));
     }
@@ -219,7 +252,8 @@ fn white_markers(design: &Design) -> Result<(), DesignError> {
                 format!("within {} x {} mm, its radius included", 2.0 * half.x, 2.0 * half.y),
             ));
         }
-        let clash = places[..index].iter().position(|other| DVec2::from_array(*other).distance(at) < 2.0 * radius_mm);
+        let clash =
+            places[..index].iter().position(|other| DVec2::from_array(*other).distance(at) < 2.0 * radius_mm);
         if let Some(other) = clash {
             return Err(DesignError::at(
                 field,

@@ -23,7 +23,8 @@ pub fn design_schema() -> &'static Value {
 /// The schema of any type of ours, without the `null` that optional fields would allow: in a
 /// file that people write, a field either says something or is left out.
 pub fn schema_of<T: JsonSchema>() -> Value {
-    let generator = SchemaSettings::draft2020_12().with_transform(RecursiveTransform(forbid_null)).into_generator();
+    let generator =
+        SchemaSettings::draft2020_12().with_transform(RecursiveTransform(forbid_null)).into_generator();
     generator.into_root_schema_for::<T>().to_value()
 }
 
@@ -94,8 +95,10 @@ impl<'a> Walk<'a> {
         at: &str,
     ) -> Result<(), DesignError> {
         let options: Vec<&Value> = options.iter().map(|option| self.resolve(option)).collect();
-        let constants: Vec<&Value> =
-            options.iter().flat_map(|option| option.get("const").into_iter().chain(enumerated(option))).collect();
+        let constants: Vec<&Value> = options
+            .iter()
+            .flat_map(|option| option.get("const").into_iter().chain(enumerated(option)))
+            .collect();
         if constants.len() >= options.len() {
             return if constants.contains(&value) {
                 Ok(())
@@ -104,8 +107,10 @@ impl<'a> Walk<'a> {
             };
         }
         if let (Some(tag), Value::Object(map)) = (tag_of(&options), value) {
-            let tags: Vec<&Value> =
-                options.iter().filter_map(|option| option.pointer(&format!("/properties/{tag}/const"))).collect();
+            let tags: Vec<&Value> = options
+                .iter()
+                .filter_map(|option| option.pointer(&format!("/properties/{tag}/const")))
+                .collect();
             let Some(stands) = map.get(&tag) else {
                 return Err(missing(&tag, at).with_help(format!("one of {}", listed(&tags))));
             };
@@ -121,7 +126,8 @@ impl<'a> Walk<'a> {
         let mut fitting: Vec<&&Value> = options.iter().filter(|option| type_fits(option, value)).collect();
         // alternatives named by their only key: take the one whose key stands there
         if let (true, Value::Object(map)) = (fitting.len() > 1, value) {
-            let named: Vec<&Value> = fitting.iter().filter_map(|option| option.pointer("/required/0")).collect();
+            let named: Vec<&Value> =
+                fitting.iter().filter_map(|option| option.pointer("/required/0")).collect();
             if !map.keys().any(|key| named.iter().any(|name| *name == key)) {
                 return Err(not_a_choice(&named, value, at));
             }
@@ -139,13 +145,19 @@ impl<'a> Walk<'a> {
         }
         Err(first_fault.unwrap_or_else(|| {
             let names: Vec<&str> = options.iter().map(|option| type_words(option)).collect();
-            DesignError::at(at, value, format!("{} does not belong here", kind_of(value)), names.join(", or "))
+            DesignError::at(
+                at,
+                value,
+                format!("{} does not belong here", kind_of(value)),
+                names.join(", or "),
+            )
         }))
     }
 
     fn visit_items(&self, schema: &'a Value, items: &[Value], at: &str) -> Result<(), DesignError> {
         let whole = || Value::Array(items.to_vec());
-        let bound = |name: &str| schema.get(name).and_then(Value::as_u64).and_then(|n| usize::try_from(n).ok());
+        let bound =
+            |name: &str| schema.get(name).and_then(Value::as_u64).and_then(|n| usize::try_from(n).ok());
         let (least, most) = (bound("minItems"), bound("maxItems"));
         if least.is_some_and(|least| items.len() < least) || most.is_some_and(|most| items.len() > most) {
             let allowed = match (least, most) {
@@ -154,7 +166,12 @@ impl<'a> Walk<'a> {
                 (Some(least), None) => format!("at least {least}"),
                 (_, most) => format!("at most {}", most.unwrap_or(0)),
             };
-            return Err(DesignError::at(at, whole(), format!("the list has {} entries", items.len()), allowed));
+            return Err(DesignError::at(
+                at,
+                whole(),
+                format!("the list has {} entries", items.len()),
+                allowed,
+            ));
         }
         if let Some(each) = schema.get("items") {
             for (index, item) in items.iter().enumerate() {
@@ -183,8 +200,10 @@ impl<'a> Walk<'a> {
             .flat_map(|properties| properties.iter().map(|(key, value)| (key.clone(), value.clone())))
             .collect();
         for (key, value) in map {
-            let found =
-                sources.iter().flatten().find_map(|source| source.get("properties").and_then(|all| all.get(key)));
+            let found = sources
+                .iter()
+                .flatten()
+                .find_map(|source| source.get("properties").and_then(|all| all.get(key)));
             match (found, schema.get("additionalProperties")) {
                 (Some(field), _) => self.visit(field, value, &join(at, key))?,
                 (None, Some(rest @ Value::Object(_))) => self.visit(rest, value, &join(at, key))?,
@@ -195,7 +214,8 @@ impl<'a> Walk<'a> {
         for source in sources.iter().flatten() {
             for name in source.get("required").and_then(Value::as_array).into_iter().flatten() {
                 if let Some(name) = name.as_str().filter(|name| !map.contains_key(*name)) {
-                    let about = known.get(name).and_then(|field| field.get("description")).and_then(Value::as_str);
+                    let about =
+                        known.get(name).and_then(|field| field.get("description")).and_then(Value::as_str);
                     let fault = missing(name, at);
                     return Err(match about {
                         Some(about) => fault.with_help(format!("it says: {}", first_sentence(about))),
@@ -268,7 +288,11 @@ fn check_range(schema: &Value, number: f64, value: &Value, at: &str) -> Result<(
     let bound = |name: &str| schema.get(name).and_then(Value::as_f64);
     let rules = [
         (bound("minimum"), "at least", number >= bound("minimum").unwrap_or(number)),
-        (bound("exclusiveMinimum"), "more than", number > bound("exclusiveMinimum").unwrap_or(f64::NEG_INFINITY)),
+        (
+            bound("exclusiveMinimum"),
+            "more than",
+            number > bound("exclusiveMinimum").unwrap_or(f64::NEG_INFINITY),
+        ),
         (bound("maximum"), "at most", number <= bound("maximum").unwrap_or(number)),
         (bound("exclusiveMaximum"), "less than", number < bound("exclusiveMaximum").unwrap_or(f64::INFINITY)),
     ];
@@ -332,7 +356,10 @@ fn type_words(schema: &Value) -> &'static str {
 }
 
 fn first_sentence(text: &str) -> &str {
-    text.split_once(".\n").or_else(|| text.split_once(". ")).map_or(text, |(first, _)| first).trim_end_matches('.')
+    text.split_once(".\n")
+        .or_else(|| text.split_once(". "))
+        .map_or(text, |(first, _)| first)
+        .trim_end_matches('.')
 }
 
 /// `a.b` from `a` and `b`.

@@ -29,8 +29,8 @@ pub fn read_text(path: &Path) -> Result<String, DesignError> {
     if about.len() > LARGEST_FILE_BYTES {
         return Err(fault(format!("the file has {} bytes", about.len()), "at most 16 MiB"));
     }
-    let bytes =
-        std::fs::read(path).map_err(|error| fault(format!("cannot be read ({error})"), "a readable JSON file"))?;
+    let bytes = std::fs::read(path)
+        .map_err(|error| fault(format!("cannot be read ({error})"), "a readable JSON file"))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         fault(format!("byte {offset} is not UTF-8"), "UTF-8 text")

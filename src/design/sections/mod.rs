@@ -21,8 +21,8 @@ use serde::{Deserialize, Serialize};
 pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
 pub use loads::{LoadClaim, LoadsSection, NoiseSection, WhiteMarkersSection};
 pub use making::{
-    CouponSection, FillSection, JigSection, MeshSection, MouldSection, PinsSection, ProcessSection, StencilSection,
-    VentsSection,
+    CouponSection, FillSection, JigSection, MeshSection, MouldSection, PinsSection, ProcessSection,
+    StencilSection, VentsSection,
 };
 pub use optics::{DomeSection, IndexRgb, IndexValue, LayerSection, OpticsSection};
 pub use pattern::{
@@ -34,7 +34,8 @@ pub use platforms::{
 };
 pub use print::{Hits, MeasuredTransferSection, PrintSection, TransferMapName};
 pub use springs::{
-    GravitySection, MagnetFacing, MagnetsSection, SpringEnds, SpringPlaces, SpringRing, SpringsSection, WireSection,
+    GravitySection, MagnetFacing, MagnetsSection, SpringEnds, SpringPlaces, SpringRing, SpringsSection,
+    WireSection,
 };
 pub use tolerances::TolerancesSection;
 

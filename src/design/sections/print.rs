@@ -49,9 +49,10 @@ pub struct MeasuredTransferSection {
     /// Scatter from print to print, per axis, mm (a record; `tolerances.print_scatter_mm` is what counts).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter_mm: Option<f64>,
-    /// Points used and points rejected (a record).
+    /// Points used (a record).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points_used: Option<u32>,
+    /// Points rejected as outliers (a record).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points_rejected: Option<u32>,
 }

@@ -15,7 +15,7 @@ use super::pattern::{Pattern, PatternError};
 use super::spec::LayoutSpec;
 use super::zones::ImageZone;
 use super::{Hit, Layout, LayoutError, gaps, region, zones};
-use crate::design::{OnLost, PatternCentre, PatternKind};
+use crate::design::sections::{OnLost, PatternCentre, PatternKind};
 use crate::optics::Limit;
 
 /// Delaunay edges up to this multiple of the nearest distance count as neighbours: below the diagonal of a
@@ -182,8 +182,8 @@ fn edge(
 fn apparent_radius_px(carrier: &Carrier<'_>, even_px: DVec2) -> f64 {
     let reach = || -> Result<f64, Limit> {
         let point = carrier.optics.trace(carrier.frame.raw_from_even(even_px)?)?;
-        let curve = carrier.dome_curve(even_px, point.surface_mm);
-        let outline = carrier.image_outline(even_px, &curve).map_err(|_| Limit::Unreachable)?;
+        let curve = carrier.curve(even_px, point.surface_mm);
+        let outline = carrier.image_outline(&curve).map_err(|_| Limit::Unreachable)?;
         let mut furthest: f64 = 0.0;
         for corner in outline.polygon(4) {
             furthest = furthest.max(carrier.frame.even_from_raw(corner)?.distance(even_px));
@@ -200,6 +200,7 @@ fn places(spec: &LayoutSpec, edge: &Boundary) -> Result<(f64, Vec<DVec2>), Layou
         pitch_px: 0.0,
         centred_on: section.centred_on,
         rotation_rad: section.rotation_deg.to_radians(),
+        wanted: section.count.map(|count| count as usize),
     };
     let fault = |field: &'static str, value: String| {
         move |error: PatternError| match error {
@@ -250,8 +251,8 @@ fn check_dot(
     let lose = |reason: Reason| LostDot { id: 0, even_px, image_px: image_px.ok(), reason };
     let image_px = image_px.map_err(|limit| lose(Reason::Unseen(limit.into())))?;
     let surface = spec.optics.trace(image_px).map_err(|limit| lose(Reason::Unseen(limit)))?;
-    let curve = carrier.dome_curve(even_px, surface.surface_mm);
-    let image_outline = carrier.image_outline(even_px, &curve).map_err(lose)?;
+    let curve = carrier.curve(even_px, surface.surface_mm);
+    let image_outline = carrier.image_outline(&curve).map_err(lose)?;
     let diameter_mm = carrier.dome_diameter_mm(&curve).map_err(lose)?;
     check_seen(spec, &image_outline).map_err(lose)?;
     zones::check(zones, &image_outline).map_err(lose)?;

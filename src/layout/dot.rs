@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec2, DVec3};
+use nalgebra::{Vector2, Vector3};
 
 use super::frame::EvenFrame;
 use super::lost::Reason;
@@ -79,47 +80,58 @@ const IMAGE_TOLERANCE_PX: f64 = 1e-3;
 /// number; with 16 it is below 1e-9 for a dot as wide as a third of the dome's radius.
 const AREA_POINTS: u32 = 16;
 
-/// Step of central differences along a circle, rad: truncation 2e-9, rounding 1e-12.
-const DIFFERENCE_RAD: f64 = 1e-4;
-
-/// A dot's closed curve on the dome.
-pub(super) enum DomeCurve<'a> {
+/// A dot's closed curve, as a function of an angle.
+pub(super) enum DotCurve<'a> {
+    /// A circle in the even frame.
     Apparent { carrier: &'a Carrier<'a>, center_px: DVec2, radius_px: f64 },
-    OnDome { center: DVec3, side: DVec3, up: DVec3 },
+    /// A circle on the dome: the centre of its plane, and its two radii.
+    OnDome { carrier: &'a Carrier<'a>, center: DVec3, side: DVec3, up: DVec3 },
 }
 
-impl DomeCurve<'_> {
-    fn at(&self, angle: f64) -> Result<DVec3, Reason> {
+impl DotCurve<'_> {
+    /// The point on the dome and its derivative, mm.
+    fn on_dome(&self, angle: f64) -> Result<(DVec3, DVec3), Reason> {
         match self {
-            Self::Apparent { carrier, center_px, radius_px } => {
-                let place = *center_px + DVec2::from_angle(angle) * *radius_px;
-                let pixel =
-                    carrier.frame.raw_from_even(place).map_err(|limit| Reason::Unseen(limit.into()))?;
-                Ok(carrier.optics.trace(pixel).map_err(Reason::Unseen)?.surface_mm)
+            Self::Apparent { carrier, .. } => {
+                let pixel = self.in_image(angle)?;
+                let (surface, by_pixel) =
+                    carrier.optics.trace_with_jacobian(pixel.at).map_err(Reason::Unseen)?;
+                let slope = by_pixel * Vector2::new(pixel.slope.x, pixel.slope.y);
+                Ok((surface.surface_mm, DVec3::new(slope.x, slope.y, slope.z)))
             }
-            Self::OnDome { center, side, up } => {
+            Self::OnDome { center, side, up, .. } => {
                 let (sin, cos) = angle.sin_cos();
-                Ok(*center + *side * cos + *up * sin)
+                Ok((*center + *side * cos + *up * sin, *up * cos - *side * sin))
             }
         }
     }
 
-    /// The point and its derivative by the angle.
-    fn with_slope(&self, angle: f64) -> Result<(DVec3, DVec3), Reason> {
-        if let Self::OnDome { side, up, .. } = self {
-            let (sin, cos) = angle.sin_cos();
-            return Ok((self.at(angle)?, *up * cos - *side * sin));
+    /// The point in the raw image and its derivative, px.
+    fn in_image(&self, angle: f64) -> Result<CurvePoint, Reason> {
+        match self {
+            Self::Apparent { carrier, center_px, radius_px } => {
+                let out = DVec2::from_angle(angle) * *radius_px;
+                let (at, slope) = carrier
+                    .frame
+                    .raw_from_even_with_slope(*center_px + out, out.perp())
+                    .map_err(|limit| Reason::Unseen(limit.into()))?;
+                Ok(CurvePoint { at, slope })
+            }
+            Self::OnDome { carrier, .. } => {
+                let (point, slope) = self.on_dome(angle)?;
+                let (at, by_point) = carrier.optics.project_with_jacobian(point).map_err(Reason::Unseen)?;
+                let slope = by_point * Vector3::from(slope.to_array());
+                Ok(CurvePoint { at, slope: DVec2::new(slope.x, slope.y) })
+            }
         }
-        let (before, after) = (self.at(angle - DIFFERENCE_RAD)?, self.at(angle + DIFFERENCE_RAD)?);
-        Ok((self.at(angle)?, (after - before) / (2.0 * DIFFERENCE_RAD)))
     }
 }
 
 impl Carrier<'_> {
-    pub(super) fn dome_curve(&self, even_px: DVec2, surface_mm: DVec3) -> DomeCurve<'_> {
+    pub(super) fn curve(&self, even_px: DVec2, surface_mm: DVec3) -> DotCurve<'_> {
         match self.size {
             DotSize::Apparent(diameter) => {
-                DomeCurve::Apparent { carrier: self, center_px: even_px, radius_px: 0.5 * diameter }
+                DotCurve::Apparent { carrier: self, center_px: even_px, radius_px: 0.5 * diameter }
             }
             DotSize::OnDome(diameter_mm) => {
                 let radius = self.optics.dome_radius_mm();
@@ -127,43 +139,26 @@ impl Carrier<'_> {
                 let axis = surface_mm / radius;
                 let (side, up) = tangents(axis);
                 let center = axis * ((radius - flat) * (radius + flat)).max(0.0).sqrt();
-                DomeCurve::OnDome { center, side: side * flat, up: up * flat }
+                DotCurve::OnDome { carrier: self, center, side: side * flat, up: up * flat }
             }
         }
     }
 
     /// The dot's outline in the raw image.
-    pub(super) fn image_outline(&self, even_px: DVec2, curve: &DomeCurve<'_>) -> Result<Outline, Reason> {
-        let pixel = |angle: f64| -> Result<DVec2, Reason> {
-            match curve {
-                DomeCurve::Apparent { radius_px, .. } => self
-                    .frame
-                    .raw_from_even(even_px + DVec2::from_angle(angle) * *radius_px)
-                    .map_err(|limit| Reason::Unseen(limit.into())),
-                DomeCurve::OnDome { .. } => self.optics.project(curve.at(angle)?).map_err(Reason::Unseen),
-            }
-        };
-        let (outline, _) = Outline::of_curve(
-            |angle| {
-                let (before, after) = (pixel(angle - DIFFERENCE_RAD)?, pixel(angle + DIFFERENCE_RAD)?);
-                let slope = (after - before) / (2.0 * DIFFERENCE_RAD);
-                Ok(CurvePoint { at: pixel(angle)?, slope })
-            },
-            IMAGE_TOLERANCE_PX,
-        )?;
-        Ok(outline)
+    pub(super) fn image_outline(&self, curve: &DotCurve<'_>) -> Result<Outline, Reason> {
+        Ok(Outline::of_curve(|angle| curve.in_image(angle), IMAGE_TOLERANCE_PX)?.0)
     }
 
     /// The dot's outline on the plate of a hit, as `hit_from_sensor` turns the dome under the pad, counter-
     /// clockwise seen from above.
     pub(super) fn plate_outline(
         &self,
-        curve: &DomeCurve<'_>,
+        curve: &DotCurve<'_>,
         hit_from_sensor: DMat3,
     ) -> Result<Outline, Reason> {
         let (outline, fit) = Outline::of_curve(
             |angle| {
-                let (point, slope) = curve.with_slope(angle)?;
+                let (point, slope) = curve.on_dome(angle)?;
                 let plate = self
                     .transfer
                     .plate_from_dome_with_slope(hit_from_sensor * point)
@@ -178,14 +173,14 @@ impl Carrier<'_> {
     }
 
     /// Diameter of the flat disc whose area is the vector area of the curve on the dome, mm.
-    pub(super) fn dome_diameter_mm(&self, curve: &DomeCurve<'_>) -> Result<f64, Reason> {
+    pub(super) fn dome_diameter_mm(&self, curve: &DotCurve<'_>) -> Result<f64, Reason> {
         if let DotSize::OnDome(diameter_mm) = self.size {
             return Ok(diameter_mm);
         }
         let mut area = DVec3::ZERO;
         let mut first = None;
         for k in 0..AREA_POINTS {
-            let (point, slope) = curve.with_slope(TAU * f64::from(k) / f64::from(AREA_POINTS))?;
+            let (point, slope) = curve.on_dome(TAU * f64::from(k) / f64::from(AREA_POINTS))?;
             // Relative to a point of the curve: the vector area does not depend on it, its rounding does.
             let origin = *first.get_or_insert(point);
             area += (point - origin).cross(slope);

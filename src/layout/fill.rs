@@ -12,7 +12,7 @@ use glam::DVec2;
 use super::boundary::Boundary;
 use super::neighbors::delaunay_edges;
 use super::pattern::Pattern;
-use crate::design::CentredOn;
+use crate::design::sections::CentredOn;
 
 /// Bars are under pressure up to this multiple of the length that would fill the area.
 const PRESSURE: f64 = 1.2;
@@ -51,8 +51,26 @@ pub(super) fn seeds(pattern: &Pattern, edge: &Boundary) -> Vec<DVec2> {
         .map(|place| place * pitch)
         .filter(|place| inner.contains(*place) && inner.largest_px() > 0.0)
         .collect();
-    places.extend(row_on(edge, pitch, pattern.rotation_rad));
+    let row = row_on(edge, pitch, pattern.rotation_rad);
+    if let Some(wanted) = pattern.wanted {
+        give_up(&mut places, (wanted.saturating_sub(row.len())).max(1), edge);
+    }
+    places.extend(row);
     places
+}
+
+/// Leaves `wanted` places, taking every third from those nearest to the edge, where the lattice meets the
+/// boundary's row and has to find new places anyway.
+fn give_up(places: &mut Vec<DVec2>, wanted: usize, edge: &Boundary) {
+    let surplus = places.len().saturating_sub(wanted);
+    let from_edge = |place: &DVec2| (1e6 * (edge.radius_px(*place) - place.length())).round() as i64;
+    places.sort_by_cached_key(from_edge);
+    let step = if 3 * surplus <= places.len() { 3 } else { 1 };
+    let mut index = 0;
+    places.retain(|_| {
+        index += 1;
+        index > step * surplus || index % step != 0
+    });
 }
 
 /// Places on the boundary, evenly divided along it, as many as the pitch asks for.

@@ -1,9 +1,10 @@
 //! The frame in which a pattern is even: the raw image or the runtime's undistorted one.
 
 use glam::{DMat3, DVec2, DVec3};
+use nalgebra::Vector3;
 
 use crate::camera::{Lens, LensLimit};
-use crate::design::EvenIn;
+use crate::design::sections::EvenIn;
 
 /// The undistorted frame: what a pinhole camera with this matrix would show.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,6 +73,17 @@ impl<'a> EvenFrame<'a> {
             None => Ok(place),
             Some(frame) => self.lens.project(frame.ray(place)),
         }
+    }
+
+    /// The raw pixel of a place in this frame, and how it moves as the place moves by `slope`.
+    ///
+    /// # Errors
+    /// The lens does not see it.
+    pub fn raw_from_even_with_slope(&self, place: DVec2, slope: DVec2) -> Result<(DVec2, DVec2), LensLimit> {
+        let Some(frame) = &self.undistorted else { return Ok((place, slope)) };
+        let (pixel, by_ray) = self.lens.project_with_jacobian(frame.ray(place))?;
+        let moved = by_ray * Vector3::from((frame.inverse * slope.extend(0.0)).to_array());
+        Ok((pixel, DVec2::new(moved.x, moved.y)))
     }
 
     /// The place in this frame of a raw pixel.

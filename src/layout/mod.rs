@@ -30,6 +30,7 @@ pub use dot::{Dot, DotSize};
 pub use lost::{LostDot, Reason, Rule, Zone};
 pub use spec::{LayoutSpec, Mask, WhiteMarker};
 
+use crate::design::{Design, DesignError};
 use crate::transfer::TransferMap;
 
 /// The dots of a design.
@@ -113,7 +114,21 @@ impl fmt::Display for LayoutError {
 
 impl std::error::Error for LayoutError {}
 
+impl From<LayoutError> for DesignError {
+    fn from(error: LayoutError) -> Self {
+        Self::at(error.field, error.value, error.problem, error.allowed)
+    }
+}
+
 impl Layout {
+    /// Lays out the dots of a design.
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub fn of_design(design: &Design) -> Result<Self, LayoutError> {
+        Self::new(&LayoutSpec::of_design(design)?)
+    }
+
     /// Lays out the dots.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use glam::DVec2;
 
 use super::boundary::Boundary;
 use super::fill;
-use crate::design::{CentredOn, PatternKind};
+use crate::design::sections::{CentredOn, PatternKind};
 
 /// Bound on the number of places of one pattern: ten times what a camera of 100 megapixels could tell apart.
 const MOST_DOTS: usize = 4_000_000;
@@ -24,6 +24,9 @@ pub struct Pattern {
     pub centred_on: CentredOn,
     /// Turn of the pattern from image x towards image y, rad.
     pub rotation_rad: f64,
+    /// The number of dots that is wanted, if the pitch was solved for one. A fill and rings give up surplus
+    /// dots to meet it; a lattice is what its pitch makes it.
+    pub wanted: Option<usize>,
 }
 
 /// A pattern that cannot be laid out.
@@ -118,35 +121,47 @@ impl Pattern {
     /// Rings one pitch apart, each with as many dots as fit without coming closer than the pitch; turned by
     /// half a step against the ring before.
     fn rings(&self, edge: &Boundary) -> Vec<DVec2> {
+        let mut rings = self.ring_radii(edge);
+        if let Some(wanted) = self.wanted {
+            thin_out(&mut rings, wanted);
+        }
+        let mut places = Vec::new();
+        for (index, (radius, count)) in rings.into_iter().enumerate() {
+            let step = TAU / count as f64;
+            let phase = self.rotation_rad + if index % 2 == 0 { 0.0 } else { 0.5 * step };
+            let around = (0..count).map(|k| DVec2::from_angle(phase + step * k as f64) * radius);
+            places.extend(around.filter(|place| edge.contains(*place)));
+        }
+        places
+    }
+
+    /// Radius of each ring and how many dots fit on it.
+    fn ring_radii(&self, edge: &Boundary) -> Vec<(f64, usize)> {
         let pitch = self.pitch_px;
-        let (mut places, first) = match self.centred_on {
-            CentredOn::Dot => (vec![DVec2::ZERO], pitch),
+        let (mut rings, first) = match self.centred_on {
+            CentredOn::Dot => (vec![(0.0, 1)], pitch),
             // Three dots around the gap, one pitch apart.
             CentredOn::Gap => (Vec::new(), pitch / 3f64.sqrt()),
         };
-        let mut ring = 0;
-        loop {
-            let radius = first + pitch * f64::from(ring);
-            if radius > edge.largest_px() {
-                return places;
-            }
+        // As for `Boundary::contains`: a ring on the edge is inside.
+        let last = edge.largest_px() * (1.0 + 1e-9);
+        let mut radius = first;
+        while radius <= last {
             // The slack keeps a count that is whole by construction (6 on the first ring) from rounding down.
-            let count = (PI / (0.5 * pitch / radius).asin() + 1e-9).floor() as u32;
-            let step = TAU / f64::from(count);
-            let phase = self.rotation_rad + if ring % 2 == 0 { 0.0 } else { 0.5 * step };
-            let around = (0..count).map(|k| DVec2::from_angle(phase + step * f64::from(k)) * radius);
-            places.extend(around.filter(|place| edge.contains(*place)));
-            ring += 1;
+            rings.push((radius, (PI / (0.5 * pitch / radius).asin() + 1e-9).floor() as usize));
+            radius = first + pitch * (rings.len() - usize::from(first == pitch)) as f64;
         }
+        rings
     }
 
     /// The pitch at which the pattern has as close to `wanted` places inside the edge as it can; the pattern's
-    /// own pitch is not read.
+    /// own pitch is not read. Rings and a fill get a pitch with at least as many, since they can give some up.
     ///
     /// # Errors
     /// No dot fits.
     pub fn pitch_for_count(&self, wanted: usize, edge: &Boundary) -> Result<f64, PatternError> {
-        let count_at = |pitch_px: f64| Self { pitch_px, ..*self }.count(edge);
+        let count_at = |pitch_px: f64| Self { pitch_px, wanted: None, ..*self }.count(edge);
+        let can_give_up = matches!(self.kind, PatternKind::Rings | PatternKind::Fill);
         let area = edge.area_px2();
         if area <= 0.0 {
             return Err(PatternError::Empty);
@@ -174,7 +189,7 @@ impl Pattern {
         for _ in 0..48 {
             let middle = 0.5 * (fine + coarse);
             let count = count_at(middle);
-            let off = count.abs_diff(wanted);
+            let off = if can_give_up && count < wanted { usize::MAX } else { count.abs_diff(wanted) };
             if off < best.0 || (off == best.0 && middle > best.1) {
                 best = (off, middle);
             }
@@ -188,6 +203,28 @@ impl Pattern {
             }
         }
         if count_at(best.1) == 0 { Err(PatternError::Empty) } else { Ok(best.1) }
+    }
+}
+
+/// Takes dots from the rings, from each about in proportion to its number, until `wanted` are left. The dot at
+/// the centre and three on each ring stay.
+fn thin_out(rings: &mut [(f64, usize)], wanted: usize) {
+    let all: usize = rings.iter().map(|(_, count)| count).sum();
+    let mut surplus = all.saturating_sub(wanted);
+    let mut before = 0;
+    for (_, count) in rings.iter_mut() {
+        // Surplus of all rings up to this one, rounded, less what the rings before gave.
+        let share =
+            (before + *count) * all.saturating_sub(wanted) / all - before * all.saturating_sub(wanted) / all;
+        before += *count;
+        let give = share.min(surplus).min(count.saturating_sub(3));
+        *count -= give;
+        surplus -= give;
+    }
+    for (_, count) in rings.iter_mut().rev() {
+        let give = surplus.min(count.saturating_sub(3));
+        *count -= give;
+        surplus -= give;
     }
 }
 

@@ -5,7 +5,8 @@ use glam::{DVec2, DVec3};
 use super::LayoutError;
 use super::dot::DotSize;
 use super::frame::Undistorted;
-use crate::design::{PatternSection, PrintSection, TransferMapName};
+use crate::design::Design;
+use crate::design::sections::{PatternSection, PrintSection, TransferMapName};
 use crate::optics::SensorOptics;
 use crate::transfer::{Correction, Nominal, TransferError, TransferMap};
 
@@ -47,6 +48,38 @@ pub struct LayoutSpec {
 }
 
 impl LayoutSpec {
+    /// The parts of a design that a layout reads.
+    ///
+    /// # Errors
+    /// The runtime's camera matrix cannot be inverted.
+    pub fn of_design(design: &Design) -> Result<Self, LayoutError> {
+        let sections = design.sections();
+        let matrix = design.undistorted_matrix();
+        let undistorted = Undistorted::new(&matrix).ok_or_else(|| {
+            LayoutError::new(
+                "runtime.mask_field_angle_deg",
+                sections.runtime.mask_field_angle_deg,
+                "the undistorted frame has no camera matrix that can be inverted",
+                "an angle well inside 0 to 90",
+            )
+        })?;
+        let markers = (0u32..).zip(design.white_markers_mm());
+        let diameter_mm = sections.white_markers.diameter_mm;
+        Ok(Self {
+            optics: design.optics().clone(),
+            undistorted,
+            mask: Some(Mask {
+                center_px: DVec2::new(matrix[0][2], matrix[1][2]),
+                radius_px: sections.runtime.mask_radius_px,
+            }),
+            white_markers: markers
+                .map(|(id, position_mm)| WhiteMarker { id, position_mm, diameter_mm })
+                .collect(),
+            pattern: sections.pattern.clone(),
+            print: sections.print.clone(),
+        })
+    }
+
     /// The size of the dots as the design gives it.
     pub(super) fn size(&self) -> Result<DotSize, LayoutError> {
         let positive = |field: &str, value: f64, unit: &str| {

@@ -1,1 +1,41 @@
-//! (in the making)
+//! Lens models: the direction of a ray in air to a pixel, and back.
+//!
+//! One type, [`Lens`], serves three forms ([`Model`]): a pinhole, Brown-Conrady
+//! with 5 or 8 coefficients, and Kannala-Brandt with 4. All share one
+//! interface, one set of limits ([`LensLimit`]) and one conformance suite.
+//!
+//! # Domain
+//! A distortion polynomial is a lens only up to its *fold*, the first place
+//! where the image radius stops growing; past it two rays share a pixel and
+//! nothing that looks at pixels alone can notice. [`Lens::new`] finds the fold
+//! once, from the real roots of the derivative, and everything past it, or
+//! past the stated field of view, is answered with a named limit.
+//!
+//! # Frames and units
+//! Camera frame: x right, y down, z forward. Pixels: the centre of the
+//! top-left pixel is (0, 0). The *field angle* of a ray is its angle to +z, in
+//! air.
+//!
+//! # The entrance pupil
+//! The rays that a wide lens accepts do not all cross one point. The pupil
+//! lies on the axis at `s(theta) = c1 theta^2 + c2 theta^4 + ...` millimetres
+//! in front of the camera's origin ([`LensSpec::pupil_shift_mm`]): even powers
+//! only, since the lens turns about its axis, and zero on the axis, where the
+//! origin is put. See [`Lens::pupil_shift_mm`].
+
+mod brown_conrady;
+mod inverse;
+mod kannala_brandt;
+mod lens;
+mod limit;
+mod perspective;
+mod pinhole;
+mod pupil;
+mod spec;
+
+pub use lens::Lens;
+pub use limit::LensLimit;
+pub use spec::{LensError, LensSpec, Model};
+
+#[cfg(test)]
+mod tests;

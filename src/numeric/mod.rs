@@ -1,1 +1,18 @@
-//! (in the making)
+//! Numbers that know nothing of sensors: rigid motions, bracketed roots, real
+//! roots of polynomials.
+//!
+//! Every solver here has a bound on its iterations and answers either with a
+//! [`Root`], which carries its residual and the iterations it took, or with a
+//! [`RootError`] that names what went wrong. No function returns NaN for a
+//! finite input.
+
+mod polynomial;
+mod rigid;
+mod roots;
+
+pub use polynomial::Polynomial;
+pub use rigid::{ROTATION_TOLERANCE, Rigid, RigidError};
+pub use roots::{MAX_ITERATIONS, Root, RootError, bracketed_newton};
+
+#[cfg(test)]
+mod tests;

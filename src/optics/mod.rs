@@ -1,1 +1,30 @@
-//! (in the making)
+//! Pixel to dome and dome to pixel, through flat layers and a solid dome.
+//!
+//! The camera stands in air under a flat sheet of any number of layers; the
+//! sheet's top face (`z = 0`) carries a solid hemisphere. Everything is in the
+//! *sensor* frame: origin at the centre of the dome's base, +z out through the
+//! pole, millimetres.
+//!
+//! * [`SensorOptics::trace`]: a pixel's chief ray, by Snell's law in closed
+//!   form (the momentum along the layers is the same in all of them), to the
+//!   dome.
+//! * [`SensorOptics::project`]: a point on the dome, inside it, or on the
+//!   sheet's top, to its pixel. The unknown is the tangent of the ray in the
+//!   layer of lowest index; the sideways reach is a rising, concave function of
+//!   it, so Newton's method from below climbs to the one solution without ever
+//!   passing it.
+//!
+//! A point is seen only if its chief ray lies in the domain of the lens. Every
+//! way in which there is no answer has its name ([`Limit`]).
+
+mod limit;
+mod sensor;
+mod spec;
+mod stack;
+
+pub use limit::Limit;
+pub use sensor::{SensorOptics, SurfacePoint};
+pub use spec::{Channel, Layer, OpticsError, OpticsSpec};
+
+#[cfg(test)]
+mod tests;

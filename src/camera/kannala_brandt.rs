@@ -1,0 +1,128 @@
+//! Kannala-Brandt: `radius = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)`.
+
+use glam::{DVec2, DVec3};
+use nalgebra::{Matrix2x3, Matrix3x2};
+
+use super::LensLimit;
+use super::inverse::RadialInverse;
+use super::limit::{Domain, END_ROUNDING};
+use crate::numeric::Polynomial;
+
+/// Nearest approach to 180 degrees, where all azimuths meet in one ray.
+const NEAR_STRAIGHT_BACK_RAD: f64 = 1e-6;
+
+/// A lens in the angle itself; it may see past 90 degrees.
+#[derive(Debug, Clone)]
+pub(super) struct KannalaBrandt {
+    k: [f64; 4],
+    domain: Domain,
+    inverse: RadialInverse,
+}
+
+impl KannalaBrandt {
+    /// `None` when the radius does not grow from the centre on.
+    pub fn new(k: [f64; 4], field_of_view_rad: f64) -> Option<Self> {
+        let last = std::f64::consts::PI - NEAR_STRAIGHT_BACK_RAD;
+        // The derivative is a polynomial in theta^2.
+        let slope = Polynomial::new(&[1.0, 3.0 * k[0], 5.0 * k[1], 7.0 * k[2], 9.0 * k[3]]);
+        let fold_rad = slope.first_root_after(0.0, last * last).map(f64::sqrt);
+        let domain = Domain::new((0.5 * field_of_view_rad).min(last), fold_rad);
+        let inverse = RadialInverse::new(|theta| radius(&k, theta), domain.end_rad)?;
+        Some(Self { k, domain, inverse })
+    }
+
+    pub fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    pub fn max_radius(&self) -> f64 {
+        self.inverse.end_image()
+    }
+
+    fn polar(&self, ray: DVec3) -> Result<(f64, f64), LensLimit> {
+        let across = ray.x.hypot(ray.y);
+        let theta = across.atan2(ray.z);
+        if theta <= self.domain.end_rad * (1.0 + END_ROUNDING) {
+            Ok((across, theta))
+        } else if ray.z <= 0.0 {
+            Err(LensLimit::BehindCamera)
+        } else {
+            Err(self.domain.limit)
+        }
+    }
+
+    pub fn project(&self, ray: DVec3) -> Result<DVec2, LensLimit> {
+        let (across, theta) = self.polar(ray)?;
+        let flat = DVec2::new(ray.x, ray.y);
+        if across == 0.0 {
+            // On the axis, where the quotient below is 0/0.
+            return Ok(DVec2::ZERO);
+        }
+        Ok(flat * (radius(&self.k, theta).0 / across))
+    }
+
+    pub fn project_with_jacobian(&self, ray: DVec3) -> Result<(DVec2, Matrix2x3<f64>), LensLimit> {
+        let (across, theta) = self.polar(ray)?;
+        let (value, slope) = radius(&self.k, theta);
+        let (e, around) = if across == 0.0 {
+            (DVec2::X, 1.0 / ray.z)
+        } else {
+            (DVec2::new(ray.x, ray.y) / across, value / across)
+        };
+        let length_squared = across * across + ray.z * ray.z;
+        let along = slope * ray.z / length_squared;
+        // along e e^T + around (I - e e^T), then the column of z.
+        let mix = along - around;
+        let z = e * (-slope * across / length_squared);
+        let jacobian = Matrix2x3::new(
+            around + mix * e.x * e.x,
+            mix * e.x * e.y,
+            z.x,
+            mix * e.x * e.y,
+            around + mix * e.y * e.y,
+            z.y,
+        );
+        let image = if across == 0.0 { DVec2::ZERO } else { e * value };
+        Ok((image, jacobian))
+    }
+
+    fn angle(&self, image_radius: f64) -> Result<f64, LensLimit> {
+        self.inverse.solve(image_radius, |theta| radius(&self.k, theta)).ok_or(self.domain.limit)
+    }
+
+    pub fn unproject(&self, image: DVec2) -> Result<DVec3, LensLimit> {
+        let image_radius = image.length();
+        let theta = self.angle(image_radius)?;
+        let (sin, cos) = theta.sin_cos();
+        let scale = if image_radius == 0.0 { 1.0 } else { sin / image_radius };
+        Ok(DVec3::new(image.x * scale, image.y * scale, cos))
+    }
+
+    pub fn unproject_with_jacobian(&self, image: DVec2) -> Result<(DVec3, Matrix3x2<f64>), LensLimit> {
+        let image_radius = image.length();
+        let theta = self.angle(image_radius)?;
+        let (sin, cos) = theta.sin_cos();
+        let (e, around) =
+            if image_radius == 0.0 { (DVec2::X, 1.0) } else { (image / image_radius, sin / image_radius) };
+        let slope = radius(&self.k, theta).1;
+        let mix = cos / slope - around;
+        let ray = DVec3::new(e.x * sin, e.y * sin, cos);
+        let jacobian = Matrix3x2::new(
+            around + mix * e.x * e.x,
+            mix * e.x * e.y,
+            mix * e.x * e.y,
+            around + mix * e.y * e.y,
+            -sin * e.x / slope,
+            -sin * e.y / slope,
+        );
+        Ok((ray, jacobian))
+    }
+}
+
+/// Image radius and its derivative by the field angle.
+fn radius(k: &[f64; 4], theta: f64) -> (f64, f64) {
+    let u = theta * theta;
+    let value = theta * (1.0 + u * (k[0] + u * (k[1] + u * (k[2] + u * k[3]))));
+    let slope = 1.0 + u * (3.0 * k[0] + u * (5.0 * k[1] + u * (7.0 * k[2] + u * (9.0 * k[3]))));
+    (value, slope)
+}

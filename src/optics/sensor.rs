@@ -1,0 +1,285 @@
+//! The camera under the sheet under the dome.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use super::stack::{Path, Plate, travel};
+use super::{Channel, Layer, Limit, OpticsError, OpticsSpec};
+use crate::camera::Lens;
+use crate::numeric::{Rigid, RootError, bracketed_newton};
+
+/// Rounding slack at the dome's rim, relative to its radius: a ray that meets
+/// the sheet's top this little outside the base circle still meets the rim.
+const RIM_ROUNDING: f64 = 1e-11;
+
+/// How far outside the dome, relative to its radius, a point may be and still
+/// be on it: what a file with seven digits says of a surface point.
+const ON_DOME_TOLERANCE: f64 = 1e-6;
+
+/// Where a pixel's chief ray meets the dome.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// The pixel.
+    pub pixel: DVec2,
+    /// The point on the dome, sensor frame, millimetres.
+    pub surface_mm: DVec3,
+    /// Outward unit normal there.
+    pub normal: DVec3,
+    /// Angle of the ray in air to the camera's axis, radians.
+    pub field_angle_rad: f64,
+}
+
+/// Lens, layers and dome, at one pose of the platform and for one channel.
+#[derive(Debug, Clone)]
+pub struct SensorOptics {
+    lens: Arc<Lens>,
+    channel: Channel,
+    rest_from_camera: Rigid,
+    sensor_from_camera: Rigid,
+    layers: Vec<Layer>,
+    plates: Vec<Plate>,
+    fill: Plate,
+    bottom_mm: f64,
+    dome_radius_mm: f64,
+}
+
+impl SensorOptics {
+    /// The sensor at rest, for the reference channel (green).
+    ///
+    /// # Errors
+    /// The first field that cannot be used; a pupil above the sheet's lower
+    /// face.
+    pub fn new(spec: &OpticsSpec) -> Result<Self, OpticsError> {
+        spec.check()?;
+        let lens = Arc::new(Lens::new(spec.lens.clone())?);
+        let sheet = &spec.layers[..spec.layers.len() - 1];
+        let bottom_mm = -sheet.iter().filter_map(|l| l.thickness_mm).sum::<f64>();
+        let air = Layer { name: "air".to_owned(), index: [1.0; 3], thickness_mm: None };
+        let mut layers = vec![air];
+        layers.extend_from_slice(&spec.layers);
+        let rest_from_camera = spec.sensor_from_camera.orthonormalized();
+        let optics = Self {
+            lens,
+            channel: Channel::Green,
+            rest_from_camera,
+            sensor_from_camera: rest_from_camera,
+            layers,
+            plates: Vec::new(),
+            fill: Plate::new(1.0, 0.0),
+            bottom_mm,
+            dome_radius_mm: spec.dome_radius_mm,
+        };
+        optics.for_channel(Channel::Green).placed(rest_from_camera)
+    }
+
+    fn placed(mut self, sensor_from_camera: Rigid) -> Result<Self, OpticsError> {
+        let height = sensor_from_camera.translation_mm.z;
+        let air_mm = self.bottom_mm - height;
+        // One part in 1e12 of the lengths involved is rounding, not a place.
+        let rounding = 1e-12 * height.abs().max(self.bottom_mm.abs());
+        if air_mm.is_nan() || air_mm < -rounding {
+            return Err(OpticsError::new(
+                "camera.position_mm[2]",
+                height,
+                format!("the pupil must not be above the sheet's lower face at z = {} mm", self.bottom_mm),
+            ));
+        }
+        self.sensor_from_camera = sensor_from_camera;
+        if air_mm < 0.0 {
+            self.sensor_from_camera.translation_mm.z = self.bottom_mm;
+        }
+        self.layers[0].thickness_mm = Some(self.air_gap_mm());
+        Ok(self)
+    }
+
+    /// The same sensor after the platform, with sheet and dome, has moved; the
+    /// camera stays. The pose is taken from rest, not from the present one.
+    ///
+    /// # Errors
+    /// A pose that is not rigid, or one that puts the pupil into the sheet.
+    pub fn at_pose(&self, rest_from_platform: &Rigid) -> Result<Self, OpticsError> {
+        rest_from_platform
+            .check()
+            .map_err(|error| OpticsError::new("rest_from_platform", "not rigid", error.to_string()))?;
+        let platform_from_rest = rest_from_platform.orthonormalized().inverse();
+        self.clone().placed(platform_from_rest.compose(&self.rest_from_camera))
+    }
+
+    /// The same sensor as another colour channel sees it.
+    pub fn for_channel(&self, channel: Channel) -> Self {
+        let mut other = self.clone();
+        other.channel = channel;
+        let last = self.layers.len() - 1;
+        other.plates = self.layers[1..last]
+            .iter()
+            .map(|layer| Plate::new(layer.index_for(channel), layer.thickness_mm.unwrap_or(0.0)))
+            .collect();
+        other.fill = Plate::new(self.layers[last].index_for(channel), 0.0);
+        other
+    }
+
+    /// The channel that the indices are for.
+    pub fn channel(&self) -> Channel {
+        self.channel
+    }
+
+    /// The lens.
+    pub fn lens(&self) -> &Lens {
+        &self.lens
+    }
+
+    /// Camera frame to sensor frame at the present pose.
+    pub fn sensor_from_camera(&self) -> &Rigid {
+        &self.sensor_from_camera
+    }
+
+    /// Camera frame to sensor frame at rest.
+    pub fn rest_from_camera(&self) -> &Rigid {
+        &self.rest_from_camera
+    }
+
+    /// Air between the pupil (on the axis) and the sheet's lower face, along
+    /// the sheet's normal, at the present pose, millimetres.
+    pub fn air_gap_mm(&self) -> f64 {
+        self.bottom_mm - self.sensor_from_camera.translation_mm.z
+    }
+
+    /// All layers from the camera outwards, the air first with its present
+    /// thickness, the medium of the dome last.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// Radius of the dome, millimetres.
+    pub fn dome_radius_mm(&self) -> f64 {
+        self.dome_radius_mm
+    }
+
+    /// The entrance pupil of a ray with this field angle, sensor frame.
+    fn pupil_mm(&self, shift_mm: f64) -> DVec3 {
+        self.sensor_from_camera.translation_mm + self.sensor_from_camera.rotation.z_axis * shift_mm
+    }
+
+    /// Where the chief ray of a pixel meets the dome.
+    ///
+    /// # Errors
+    /// The limit that the pixel is past.
+    pub fn trace(&self, pixel: DVec2) -> Result<SurfacePoint, Limit> {
+        let ray = self.lens.unproject(pixel)?;
+        let field_angle_rad = Lens::field_angle_rad(ray);
+        let direction = self.sensor_from_camera.vector(ray);
+        let origin = if self.lens.is_central() {
+            self.sensor_from_camera.translation_mm
+        } else {
+            self.pupil_mm(self.lens.pupil_shift_mm(field_angle_rad).0)
+        };
+        let gap_mm = self.bottom_mm - origin.z;
+        if gap_mm < 0.0 {
+            return Err(Limit::PupilInsideSheet);
+        }
+        if direction.z <= 0.0 {
+            return Err(Limit::MissesDome);
+        }
+        let p = DVec2::new(direction.x, direction.y);
+        let base = DVec2::new(origin.x, origin.y)
+            + p * (gap_mm / direction.z)
+            + travel(&self.plates, p, direction.z);
+        let surface_mm = self.meet_dome(base, p, direction.z)?;
+        Ok(SurfacePoint { pixel, surface_mm, normal: surface_mm / self.dome_radius_mm, field_angle_rad })
+    }
+
+    /// From a point of the sheet's top on to the dome.
+    fn meet_dome(&self, base: DVec2, p: DVec2, cos: f64) -> Result<DVec3, Limit> {
+        let radius = self.dome_radius_mm;
+        let distance = base.length();
+        // Also refuses NaN, from a ray so grazing that its travel overflowed.
+        if distance.is_nan() || distance > radius * (1.0 + RIM_ROUNDING) {
+            return Err(Limit::MissesDome);
+        }
+        let n = self.fill.index;
+        let up = (self.fill.excess + cos * cos).sqrt() / n;
+        let sideways = p / n;
+        // |base + s (sideways, up)| = radius: s^2 + 2 b s - c = 0.
+        let b = base.dot(sideways);
+        let c = ((radius - distance) * (radius + distance)).max(0.0);
+        let root = (b * b + c).sqrt();
+        // The root that does not cancel.
+        let s = if b > 0.0 { c / (b + root) } else { root - b };
+        let flat = base + sideways * s;
+        let point = DVec3::new(flat.x, flat.y, up * s);
+        // Onto the sphere to the last bit that the arithmetic has.
+        Ok(point * (radius / point.length()))
+    }
+
+    /// The pixel that sees a point of the sensor frame (millimetres): on the
+    /// dome, inside it, or on or under the sheet's top, where it may lie beside
+    /// the dome.
+    ///
+    /// # Errors
+    /// The limit that the point is past.
+    pub fn project(&self, point_mm: DVec3) -> Result<DVec2, Limit> {
+        Ok(self.lens.project(self.chief_ray(point_mm)?)?)
+    }
+
+    /// Direction in air, camera frame, of the ray through a point.
+    fn chief_ray(&self, point_mm: DVec3) -> Result<DVec3, Limit> {
+        let point = self.usable_point(point_mm)?;
+        if self.lens.is_central() {
+            return self.central_ray(point, self.sensor_from_camera.translation_mm);
+        }
+        // The pupil's shift s must be the one that belongs to the field angle
+        // of the ray from there. S(theta(s)) - s changes sign over the range
+        // of S, and its slope is near -1.
+        let (low, high) = self.lens.pupil_range_mm();
+        let end = self.lens.max_field_angle_rad();
+        let mismatch = |shift: f64| {
+            let mut pupil = self.pupil_mm(shift);
+            pupil.z = pupil.z.min(self.bottom_mm);
+            let theta = self.central_ray(point, pupil).map_or(end, Lens::field_angle_rad);
+            (self.lens.pupil_shift_mm(theta).0 - shift, -1.0)
+        };
+        let shift = bracketed_newton(mismatch, low, high, 0.0).map_err(|error| match error {
+            RootError::NotFinite { .. } => Limit::NotFinite,
+            _ => Limit::NotConverged,
+        })?;
+        let pupil = self.pupil_mm(shift.value);
+        if pupil.z > self.bottom_mm {
+            return Err(Limit::PupilInsideSheet);
+        }
+        self.central_ray(point, pupil)
+    }
+
+    fn usable_point(&self, point: DVec3) -> Result<DVec3, Limit> {
+        if !point.is_finite() {
+            return Err(Limit::NotFinite);
+        }
+        let slack = ON_DOME_TOLERANCE * self.dome_radius_mm;
+        // Above the top, one has to be in the dome.
+        if point.z <= 0.0 || point.length() <= self.dome_radius_mm + slack {
+            Ok(point)
+        } else if point.z <= slack {
+            Ok(DVec3::new(point.x, point.y, 0.0))
+        } else {
+            Err(Limit::OutsideDome)
+        }
+    }
+
+    /// Direction in air, camera frame, of the ray from a point to a pupil.
+    fn central_ray(&self, point: DVec3, pupil: DVec3) -> Result<DVec3, Limit> {
+        if point.z <= pupil.z {
+            return Err(Limit::BehindCamera);
+        }
+        let path = Path {
+            air_mm: self.bottom_mm.min(point.z) - pupil.z,
+            plates: &self.plates,
+            spared_mm: (-point.z).clamp(0.0, -self.bottom_mm),
+            fill: Plate { thickness_mm: point.z.max(0.0), ..self.fill },
+        };
+        let sideways = DVec2::new(point.x - pupil.x, point.y - pupil.y);
+        let per_mm = path.air_tangent_per_mm(sideways.length())?;
+        let tangent = sideways * per_mm;
+        let direction = DVec3::new(tangent.x, tangent.y, 1.0);
+        Ok(self.sensor_from_camera.rotation.transpose() * direction)
+    }
+}

@@ -82,8 +82,7 @@ impl KannalaBrandt {
             around + mix * e.y * e.y,
             z.y,
         );
-        let image = if across == 0.0 { DVec2::ZERO } else { e * value };
-        Ok((image, jacobian))
+        Ok((DVec2::new(ray.x, ray.y) * around, jacobian))
     }
 
     fn angle(&self, image_radius: f64) -> Result<f64, LensLimit> {
@@ -106,7 +105,7 @@ impl KannalaBrandt {
             if image_radius == 0.0 { (DVec2::X, 1.0) } else { (image / image_radius, sin / image_radius) };
         let slope = radius(&self.k, theta).1;
         let mix = cos / slope - around;
-        let ray = DVec3::new(e.x * sin, e.y * sin, cos);
+        let ray = DVec3::new(image.x * around, image.y * around, cos);
         let jacobian = Matrix3x2::new(
             around + mix * e.x * e.x,
             mix * e.x * e.y,

@@ -17,11 +17,13 @@
 //! A point is seen only if its chief ray lies in the domain of the lens. Every
 //! way in which there is no answer has its name ([`Limit`]).
 
+mod jacobian;
 mod limit;
 mod sensor;
 mod spec;
 mod stack;
 
+pub use jacobian::PixelMotion;
 pub use limit::Limit;
 pub use sensor::{SensorOptics, SurfacePoint};
 pub use spec::{Channel, Layer, OpticsError, OpticsSpec};

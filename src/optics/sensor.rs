@@ -30,18 +30,33 @@ pub struct SurfacePoint {
     pub field_angle_rad: f64,
 }
 
+/// A ray's way to the dome, sensor frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hit {
+    /// Unit direction in air.
+    pub direction: DVec3,
+    /// Air in its way, along the normal.
+    pub gap_mm: f64,
+    /// Unit direction in the dome.
+    pub inside: DVec3,
+    /// Length of the way in the dome.
+    pub inside_mm: f64,
+    /// Where it meets the dome.
+    pub point: DVec3,
+}
+
 /// Lens, layers and dome, at one pose of the platform and for one channel.
 #[derive(Debug, Clone)]
 pub struct SensorOptics {
-    lens: Arc<Lens>,
+    pub(super) lens: Arc<Lens>,
     channel: Channel,
-    rest_from_camera: Rigid,
-    sensor_from_camera: Rigid,
+    pub(super) rest_from_camera: Rigid,
+    pub(super) sensor_from_camera: Rigid,
     layers: Vec<Layer>,
-    plates: Vec<Plate>,
-    fill: Plate,
-    bottom_mm: f64,
-    dome_radius_mm: f64,
+    pub(super) plates: Vec<Plate>,
+    pub(super) fill: Plate,
+    pub(super) bottom_mm: f64,
+    pub(super) dome_radius_mm: f64,
 }
 
 impl SensorOptics {
@@ -157,7 +172,7 @@ impl SensorOptics {
     }
 
     /// The entrance pupil of a ray with this field angle, sensor frame.
-    fn pupil_mm(&self, shift_mm: f64) -> DVec3 {
+    pub(super) fn pupil_mm(&self, shift_mm: f64) -> DVec3 {
         self.sensor_from_camera.translation_mm + self.sensor_from_camera.rotation.z_axis * shift_mm
     }
 
@@ -168,6 +183,21 @@ impl SensorOptics {
     pub fn trace(&self, pixel: DVec2) -> Result<SurfacePoint, Limit> {
         let ray = self.lens.unproject(pixel)?;
         let field_angle_rad = Lens::field_angle_rad(ray);
+        let hit = self.meet(ray, field_angle_rad)?;
+        Ok(self.surface_point(pixel, field_angle_rad, &hit))
+    }
+
+    pub(super) fn surface_point(&self, pixel: DVec2, field_angle_rad: f64, hit: &Hit) -> SurfacePoint {
+        SurfacePoint {
+            pixel,
+            surface_mm: hit.point,
+            normal: hit.point / self.dome_radius_mm,
+            field_angle_rad,
+        }
+    }
+
+    /// A ray of the camera, through the layers and on to the dome.
+    pub(super) fn meet(&self, ray: DVec3, field_angle_rad: f64) -> Result<Hit, Limit> {
         let direction = self.sensor_from_camera.vector(ray);
         let origin = if self.lens.is_central() {
             self.sensor_from_camera.translation_mm
@@ -182,15 +212,8 @@ impl SensorOptics {
             return Err(Limit::MissesDome);
         }
         let p = DVec2::new(direction.x, direction.y);
-        let base = DVec2::new(origin.x, origin.y)
-            + p * (gap_mm / direction.z)
-            + travel(&self.plates, p, direction.z);
-        let surface_mm = self.meet_dome(base, p, direction.z)?;
-        Ok(SurfacePoint { pixel, surface_mm, normal: surface_mm / self.dome_radius_mm, field_angle_rad })
-    }
-
-    /// From a point of the sheet's top on to the dome.
-    fn meet_dome(&self, base: DVec2, p: DVec2, cos: f64) -> Result<DVec3, Limit> {
+        let base =
+            DVec2::new(origin.x, origin.y) + p * (gap_mm / direction.z + travel(&self.plates, direction.z));
         let radius = self.dome_radius_mm;
         let distance = base.length();
         // Also refuses NaN, from a ray so grazing that its travel overflowed.
@@ -198,7 +221,7 @@ impl SensorOptics {
             return Err(Limit::MissesDome);
         }
         let n = self.fill.index;
-        let up = (self.fill.excess + cos * cos).sqrt() / n;
+        let up = (self.fill.excess + direction.z * direction.z).sqrt() / n;
         let sideways = p / n;
         // |base + s (sideways, up)| = radius: s^2 + 2 b s - c = 0.
         let b = base.dot(sideways);
@@ -208,8 +231,14 @@ impl SensorOptics {
         let s = if b > 0.0 { c / (b + root) } else { root - b };
         let flat = base + sideways * s;
         let point = DVec3::new(flat.x, flat.y, up * s);
-        // Onto the sphere to the last bit that the arithmetic has.
-        Ok(point * (radius / point.length()))
+        Ok(Hit {
+            direction,
+            gap_mm,
+            inside: DVec3::new(sideways.x, sideways.y, up),
+            inside_mm: s,
+            // Onto the sphere to the last bit that the arithmetic has.
+            point: point * (radius / point.length()),
+        })
     }
 
     /// The pixel that sees a point of the sensor frame (millimetres): on the
@@ -225,8 +254,14 @@ impl SensorOptics {
     /// Direction in air, camera frame, of the ray through a point.
     fn chief_ray(&self, point_mm: DVec3) -> Result<DVec3, Limit> {
         let point = self.usable_point(point_mm)?;
+        let pupil = self.chief_pupil(point)?;
+        self.central_ray(point, pupil)
+    }
+
+    /// The entrance pupil of the ray through a usable point, sensor frame.
+    pub(super) fn chief_pupil(&self, point: DVec3) -> Result<DVec3, Limit> {
         if self.lens.is_central() {
-            return self.central_ray(point, self.sensor_from_camera.translation_mm);
+            return Ok(self.sensor_from_camera.translation_mm);
         }
         // The pupil's shift s must be the one that belongs to the field angle
         // of the ray from there. S(theta(s)) - s changes sign over the range
@@ -247,10 +282,10 @@ impl SensorOptics {
         if pupil.z > self.bottom_mm {
             return Err(Limit::PupilInsideSheet);
         }
-        self.central_ray(point, pupil)
+        Ok(pupil)
     }
 
-    fn usable_point(&self, point: DVec3) -> Result<DVec3, Limit> {
+    pub(super) fn usable_point(&self, point: DVec3) -> Result<DVec3, Limit> {
         if !point.is_finite() {
             return Err(Limit::NotFinite);
         }
@@ -265,19 +300,23 @@ impl SensorOptics {
         }
     }
 
-    /// Direction in air, camera frame, of the ray from a point to a pupil.
-    fn central_ray(&self, point: DVec3, pupil: DVec3) -> Result<DVec3, Limit> {
+    /// The layers between a pupil and a point.
+    pub(super) fn path(&self, point: DVec3, pupil: DVec3) -> Result<Path<'_>, Limit> {
         if point.z <= pupil.z {
             return Err(Limit::BehindCamera);
         }
-        let path = Path {
+        Ok(Path {
             air_mm: self.bottom_mm.min(point.z) - pupil.z,
             plates: &self.plates,
             spared_mm: (-point.z).clamp(0.0, -self.bottom_mm),
             fill: Plate { thickness_mm: point.z.max(0.0), ..self.fill },
-        };
+        })
+    }
+
+    /// Direction in air, camera frame, of the ray from a point to a pupil.
+    fn central_ray(&self, point: DVec3, pupil: DVec3) -> Result<DVec3, Limit> {
         let sideways = DVec2::new(point.x - pupil.x, point.y - pupil.y);
-        let per_mm = path.air_tangent_per_mm(sideways.length())?;
+        let per_mm = self.path(point, pupil)?.tangent_per_mm(sideways.length())?;
         let tangent = sideways * per_mm;
         let direction = DVec3::new(tangent.x, tangent.y, 1.0);
         Ok(self.sensor_from_camera.rotation.transpose() * direction)

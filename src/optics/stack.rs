@@ -1,7 +1,5 @@
 //! Flat layers between the pupil and a height, and the ray through them.
 
-use glam::DVec2;
-
 use super::Limit;
 
 /// Newton steps of the climb to a point. Observed: at most 14; each step past
@@ -39,82 +37,157 @@ pub(super) struct Path<'a> {
     pub fill: Plate,
 }
 
+/// A ray in air towards a point, and how it changes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AirRay {
+    /// Tangent of its angle to the normal, per millimetre of reach: finite on
+    /// the axis.
+    pub tangent_per_mm: f64,
+    /// Derivative of the tangent by the reach.
+    pub by_reach: f64,
+    /// Derivative of the tangent by the height of the point.
+    pub by_height: f64,
+    /// Derivative of the tangent by the thickness of the air.
+    pub by_air: f64,
+}
+
 impl Path<'_> {
-    /// The layers with thickness in the way.
-    fn crossed(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let mut left: f64 = self.plates.iter().map(|p| p.thickness_mm).sum::<f64>() - self.spared_mm;
-        let whole = self.spared_mm == 0.0;
-        let sheet = self.plates.iter().map(move |plate| {
-            let thickness = if whole { plate.thickness_mm } else { left.clamp(0.0, plate.thickness_mm) };
-            left -= plate.thickness_mm;
-            (plate.index, thickness)
-        });
-        std::iter::once((1.0, self.air_mm))
-            .chain(sheet)
-            .chain(std::iter::once((self.fill.index, self.fill.thickness_mm)))
-            .filter(|&(_, thickness)| thickness > 0.0)
+    /// Calls `visit(index, thickness)` for every layer with thickness in the
+    /// way, from the air up.
+    fn for_each(&self, mut visit: impl FnMut(f64, f64)) {
+        if self.air_mm > 0.0 {
+            visit(1.0, self.air_mm);
+        }
+        if self.spared_mm == 0.0 {
+            for plate in self.plates {
+                if plate.thickness_mm > 0.0 {
+                    visit(plate.index, plate.thickness_mm);
+                }
+            }
+        } else {
+            let whole: f64 = self.plates.iter().map(|p| p.thickness_mm).sum();
+            let mut left = whole - self.spared_mm;
+            for plate in self.plates {
+                let thickness = left.min(plate.thickness_mm);
+                if thickness > 0.0 {
+                    visit(plate.index, thickness);
+                }
+                left -= plate.thickness_mm;
+            }
+        }
+        if self.fill.thickness_mm > 0.0 {
+            visit(self.fill.index, self.fill.thickness_mm);
+        }
     }
 
-    /// Tangent of the ray in air whose sideways reach is `reach_mm`, per unit
-    /// of reach: `tan / reach_mm`, which stays finite on the axis.
-    pub fn air_tangent_per_mm(&self, reach_mm: f64) -> Result<f64, Limit> {
-        // The layer of lowest index, n0.
-        let n0 = self.crossed().fold(f64::INFINITY, |n, (m, _)| n.min(m));
-        if n0.is_infinite() {
-            return Err(Limit::Unreachable);
+    /// `X(t) / t` and `X'(t)` of the sideways reach
+    /// `X(t) = sum d n0 t / sqrt(n^2 + a t^2)`, `a = n^2 - n0^2`.
+    fn reach(&self, n0: f64, t: f64) -> (f64, f64) {
+        let (mut by_t, mut slope) = (0.0, 0.0);
+        let square = t * t;
+        self.for_each(|n, d| {
+            let inverse = 1.0 / (n * n + (n - n0) * (n + n0) * square);
+            let part = d * inverse.sqrt();
+            by_t += part;
+            slope += part * (n * n * inverse);
+        });
+        (n0 * by_t, n0 * slope)
+    }
+
+    /// Lowest index in the way.
+    fn lowest_index(&self) -> Result<f64, Limit> {
+        if self.air_mm > 0.0 {
+            return Ok(1.0);
         }
-        // X(t) = sum d n0 t / sqrt(n^2 + a t^2), a = n^2 - n0^2.
-        let value_and_slope = |t: f64| {
-            let (mut x_by_t, mut slope) = (0.0, 0.0);
-            for (n, d) in self.crossed() {
-                let square = n * n + (n - n0) * (n + n0) * (t * t);
-                let part = d * n0 / square.sqrt();
-                x_by_t += part;
-                slope += part * (n * n / square);
-            }
-            (x_by_t, slope)
-        };
-        let (at_axis, _) = value_and_slope(0.0);
+        let mut lowest = f64::INFINITY;
+        self.for_each(|n, _| lowest = lowest.min(n));
+        if lowest.is_finite() { Ok(lowest) } else { Err(Limit::Unreachable) }
+    }
+
+    /// The climb: tangent in the layer of index `n0` whose reach is `reach_mm`.
+    ///
+    /// `X` rises and is concave, so each Newton step from below ends below.
+    fn climb(&self, n0: f64, reach_mm: f64) -> Result<f64, Limit> {
+        let (at_axis, _) = self.reach(n0, 0.0);
+        // X(t) <= t X'(0): a lower bound of the solution.
         let mut t = reach_mm / at_axis;
-        let mut x_by_t = at_axis;
-        let mut converged = t == 0.0;
+        if t == 0.0 {
+            return Ok(0.0);
+        }
         for _ in 0..MAX_CLIMB_STEPS {
-            if converged {
-                break;
-            }
-            let slope;
-            (x_by_t, slope) = value_and_slope(t);
-            let step = (reach_mm - x_by_t * t) / slope;
-            // Below the solution every step is upwards; the first one that is
-            // not is rounding.
-            let next = t + step;
-            converged = step <= 2.0 * f64::EPSILON * t || next.is_nan();
-            if step.is_finite() && step.abs() < 1e-3 * t {
-                t = next;
-            } else if step > 0.0 {
-                t = next;
+            let (by_t, slope) = self.reach(n0, t);
+            let step = (reach_mm - by_t * t) / slope;
+            t += step;
+            // |X''| / X' is at most 3 / (2 n) and at most 3 / t, which bounds
+            // what Newton's method leaves; a step down is rounding.
+            let left = step * step * (0.75_f64).min(1.5 / t);
+            if step <= 0.0 || left <= 1e-17 * t {
+                return Ok(t);
             }
         }
-        if !converged || !t.is_finite() {
-            return Err(Limit::NotConverged);
+        Err(Limit::NotConverged)
+    }
+
+    /// Tangent in air of the ray with this reach, per millimetre of reach.
+    pub fn tangent_per_mm(&self, reach_mm: f64) -> Result<f64, Limit> {
+        let n0 = self.lowest_index()?;
+        let t = self.climb(n0, reach_mm)?;
+        let per_mm = 1.0 / self.reach_by(n0, t, reach_mm);
+        finite(per_mm * in_air(n0, t)?.0)
+    }
+
+    /// `reach / t`, also on the axis.
+    fn reach_by(&self, n0: f64, t: f64, reach_mm: f64) -> f64 {
+        if t > 0.0 { reach_mm / t } else { self.reach(n0, 0.0).0 }
+    }
+
+    /// [`Path::tangent_per_mm`] with derivatives.
+    pub fn air_ray(&self, reach_mm: f64) -> Result<AirRay, Limit> {
+        let n0 = self.lowest_index()?;
+        let t = self.climb(n0, reach_mm)?;
+        let (scale, slope) = in_air(n0, t)?;
+        let (_, reach_slope) = self.reach(n0, t);
+        let tangent_in = |n: f64| n0 * t / (n * n + (n - n0) * (n + n0) * (t * t)).sqrt();
+        // The point moves up into the medium that it is in: the last one.
+        let mut last = 1.0;
+        self.for_each(|n, _| last = n);
+        if self.spared_mm == 0.0 {
+            last = self.fill.index;
         }
-        let per_mm = if reach_mm > 0.0 { t / reach_mm } else { 1.0 / x_by_t };
-        if n0 == 1.0 {
-            return Ok(per_mm);
-        }
-        // No air in the way: sin in air = n0 sin in that layer, and
-        // 1 - sin^2 = (1 - (n0^2 - 1) t^2) / (1 + t^2).
-        let left = 1.0 - (n0 - 1.0) * (n0 + 1.0) * t * t;
-        if left <= 0.0 {
-            return Err(Limit::TotalInternalReflection);
-        }
-        Ok(per_mm * n0 / left.sqrt())
+        let by_reach = slope / reach_slope;
+        Ok(AirRay {
+            tangent_per_mm: finite(scale / self.reach_by(n0, t, reach_mm))?,
+            by_reach: finite(by_reach)?,
+            by_height: finite(-by_reach * tangent_in(last))?,
+            by_air: finite(-by_reach * t * scale)?,
+        })
     }
 }
 
-/// Sideways travel of a ray through whole plates: `p` is the momentum along
-/// them (the sine in air), `cos` the cosine in air.
-pub(super) fn travel(plates: &[Plate], p: DVec2, cos: f64) -> DVec2 {
+/// From the tangent `t` in index `n0` to the tangent in air: the factor, and
+/// the derivative. The sine in air is `n0 sin`, and
+/// `1 - n0^2 sin^2 = (1 - (n0^2 - 1) t^2) / (1 + t^2)`.
+fn in_air(n0: f64, t: f64) -> Result<(f64, f64), Limit> {
+    if n0 == 1.0 {
+        return Ok((1.0, 1.0));
+    }
+    let left = 1.0 - (n0 - 1.0) * (n0 + 1.0) * t * t;
+    if left <= 0.0 {
+        return Err(Limit::TotalInternalReflection);
+    }
+    let root = left.sqrt();
+    Ok((n0 / root, n0 / (root * left)))
+}
+
+/// A value that overflowed belongs to a ray along the layers, which no point
+/// at a finite distance has.
+fn finite(value: f64) -> Result<f64, Limit> {
+    if value.is_finite() { Ok(value) } else { Err(Limit::Unreachable) }
+}
+
+/// Sideways travel of a ray through whole plates, per unit of its momentum
+/// along them (the sine in air); `cos` is the cosine in air.
+pub(super) fn travel(plates: &[Plate], cos: f64) -> f64 {
     let square = cos * cos;
     let mut by_p = 0.0;
     for plate in plates {
@@ -122,5 +195,18 @@ pub(super) fn travel(plates: &[Plate], p: DVec2, cos: f64) -> DVec2 {
             by_p += plate.thickness_mm / (plate.excess + square).sqrt();
         }
     }
-    p * by_p
+    by_p
+}
+
+/// Derivative of [`travel`] by `cos`.
+pub(super) fn travel_by_cos(plates: &[Plate], cos: f64) -> f64 {
+    let square = cos * cos;
+    let mut slope = 0.0;
+    for plate in plates {
+        if plate.thickness_mm > 0.0 {
+            let inverse = 1.0 / (plate.excess + square);
+            slope -= plate.thickness_mm * cos * inverse * inverse.sqrt();
+        }
+    }
+    slope
 }

@@ -187,3 +187,122 @@ fn a_pupil_in_the_sheet_is_refused() {
     assert!(optics.at_pose(&down(-9.5)).is_err());
     assert_eq!(optics.layers()[0].name, "air");
 }
+
+/// Central differences of a function of a vector.
+fn differences<const N: usize>(f: impl Fn(&[f64; N]) -> Vec<f64>, at: [f64; N], step: f64) -> Vec<Vec<f64>> {
+    (0..N)
+        .map(|j| {
+            let (mut low, mut high) = (at, at);
+            low[j] -= step;
+            high[j] += step;
+            let (low, high) = (f(&low), f(&high));
+            high.iter().zip(&low).map(|(h, l)| (h - l) / (2.0 * step)).collect()
+        })
+        .collect()
+}
+
+fn tilted() -> Vec<OpticsSpec> {
+    let mut specs = lenses();
+    for (i, spec) in specs.iter_mut().enumerate() {
+        spec.sensor_from_camera = Rigid::new(
+            DMat3::from_rotation_z(0.3) * DMat3::from_rotation_y(0.2) * DMat3::from_rotation_x(-0.1),
+            DVec3::new(0.5, -0.7, -9.0),
+        );
+        if i % 2 == 0 {
+            spec.lens.pupil_shift_mm = vec![0.4, -0.05];
+        }
+    }
+    specs
+}
+
+#[test]
+fn trace_jacobian_is_the_derivative() {
+    for spec in lenses().into_iter().chain(tilted()) {
+        let optics = SensorOptics::new(&spec).unwrap();
+        for pixel in [[319.5, 239.5], [300.0, 350.0], [200.25, 180.0]] {
+            let (hit, jacobian) = optics.trace_with_jacobian(DVec2::from_array(pixel)).unwrap();
+            assert_eq!(hit, optics.trace(DVec2::from_array(pixel)).unwrap());
+            let numeric = differences(
+                |p| {
+                    let at = optics.trace(DVec2::from_array(*p)).unwrap().surface_mm;
+                    at.to_array().to_vec()
+                },
+                pixel,
+                1e-3,
+            );
+            for (j, column) in numeric.iter().enumerate() {
+                for (i, value) in column.iter().enumerate() {
+                    assert!((jacobian[(i, j)] - value).abs() < 1e-8);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn project_jacobians_are_the_derivatives() {
+    let touching = |mut spec: OpticsSpec| {
+        spec.sensor_from_camera.translation_mm.z = -1.0;
+        spec
+    };
+    let specs = lenses()
+        .into_iter()
+        .chain(tilted())
+        .chain([touching(lenses()[0].clone()), touching(lenses()[4].clone())]);
+    for spec in specs {
+        let rest = SensorOptics::new(&spec).unwrap();
+        let pose = Rigid::new(
+            DMat3::from_rotation_y(0.03) * DMat3::from_rotation_z(-0.02),
+            DVec3::new(0.1, -0.2, if rest.air_gap_mm() > 1.0 { -1.5 } else { 0.5 }),
+        );
+        for (base, optics) in [(Rigid::identity(), rest.clone()), (pose, rest.at_pose(&pose).unwrap())] {
+            for point in
+                [[0.0, 0.0, 5.0], [0.3, -0.2, 0.05], [1.0, 2.0, 5.0], [-0.2, 0.4, 8.0], [0.1, 0.2, -0.5]]
+            {
+                let motion = optics.project_with_motion(DVec3::from_array(point)).unwrap();
+                let plain = optics.project(DVec3::from_array(point)).unwrap();
+                assert!((motion.pixel - plain).length() < 1e-11);
+                let numeric = differences(
+                    |p| {
+                        let pixel = optics.project(DVec3::from_array(*p)).unwrap();
+                        pixel.to_array().to_vec()
+                    },
+                    point,
+                    1e-5,
+                );
+                for (j, column) in numeric.iter().enumerate() {
+                    for (i, value) in column.iter().enumerate() {
+                        let error = (motion.by_point[(i, j)] - value).abs();
+                        assert!(error < 2e-6 * (1.0 + value.abs()), "{point:?}: {error:e}");
+                    }
+                }
+                if base == Rigid::identity() && optics.air_gap_mm() == 0.0 {
+                    // Half of the differences would push the pupil into the sheet.
+                    continue;
+                }
+                let numeric = differences(
+                    |x: &[f64; 6]| {
+                        let turn =
+                            DMat3::from_quat(glam::DQuat::from_scaled_axis(DVec3::new(x[3], x[4], x[5])));
+                        let moved = Rigid::new(turn, DVec3::new(x[0], x[1], x[2])).compose(&base);
+                        let pixel = rest.at_pose(&moved).unwrap();
+                        let pixel = pixel.project(DVec3::from_array(point)).unwrap();
+                        pixel.to_array().to_vec()
+                    },
+                    [0.0; 6],
+                    1e-5,
+                );
+                for (j, column) in numeric.iter().enumerate() {
+                    for (i, value) in column.iter().enumerate() {
+                        let error = (motion.by_pose[(i, j)] - value).abs();
+                        assert!(
+                            error < 2e-6 * (1.0 + value.abs()),
+                            "{point:?} {j}: {value} but {}",
+                            motion.by_pose[(i, j)]
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

@@ -103,7 +103,10 @@ impl Part {
         let problem = found.problem().or_else(|| {
             let genus = found.genus()?;
             (genus != self.genus).then(|| {
-                format!("its mesh has {genus} handles, its features make {}: features touch or miss", self.genus)
+                format!(
+                    "its mesh has {genus} handles, its features make {}: features touch or miss",
+                    self.genus
+                )
             })
         });
         match problem {

@@ -58,7 +58,8 @@ fn window_lets_the_view_through() {
         let moved = optics.at_pose(&crate::numeric::Rigid::from_translation(DVec3::NEG_Z * travel)).unwrap();
         for marker in design.white_markers_mm() {
             for k in 0..16 {
-                let edge = glam::DVec2::from_angle(f64::from(k) * 0.3927) * (0.5 * marker_mm);
+                let edge =
+                    glam::DVec2::from_angle(f64::from(k) * std::f64::consts::FRAC_PI_8) * (0.5 * marker_mm);
                 let pixel = moved.project(marker + edge.extend(0.0)).unwrap();
                 let direction = moved.sensor_from_camera().vector(moved.lens().unproject(pixel).unwrap());
                 let from = moved.sensor_from_camera().translation_mm;

@@ -1,7 +1,8 @@
 //! domecast: from a parameter file to a dome-shaped camera tactile sensor.
 pub mod artwork;
 pub mod camera;
-pub mod cli;
+//pub mod cli;
+pub mod build;
 pub mod constants;
 pub mod design;
 pub mod layout;
@@ -10,4 +11,5 @@ pub mod mesh;
 pub mod numeric;
 pub mod optics;
 pub mod parts;
+pub mod pose;
 pub mod transfer;

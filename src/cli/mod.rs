@@ -1,1 +1,100 @@
-//! (in the making)
+//! Arguments, progress, messages and exit codes: the only place that prints.
+
+mod build;
+mod check;
+mod output;
+mod points;
+mod schema;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use output::{Failure, Output};
+
+/// From a parameter file to a dome-shaped camera tactile sensor that can be made, calibrated and read.
+#[derive(Debug, Parser)]
+#[command(name = "domecast", version, about, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// Print the result as JSON, for programs.
+    #[arg(long, global = true)]
+    json: bool,
+    /// No progress and no summary; errors are still told.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Make everything that a design needs: artwork, parts, constants.
+    Build {
+        /// The design file.
+        design: PathBuf,
+        /// Where to write [default: output/<design name>].
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+    /// Read a build again and verify it: hashes, meshes, dots against constants.
+    Check {
+        /// The folder of a build.
+        dir: PathBuf,
+    },
+    /// From pixels to points on the dome.
+    Trace {
+        /// The design file (only its name, camera, optics and dome are read).
+        design: PathBuf,
+        /// Pixels: CSV of `u,v`, or a JSON list of [u, v]; `-` for standard input.
+        #[arg(long)]
+        pixels: PathBuf,
+        /// Where the platform is: a JSON 4x4 `rest_from_platform`, mm.
+        #[arg(long)]
+        pose: Option<PathBuf>,
+    },
+    /// From points in the sensor frame to pixels.
+    Project {
+        /// The design file (only its name, camera, optics and dome are read).
+        design: PathBuf,
+        /// Points: CSV of `x,y,z` in mm, or a JSON list of [x, y, z]; `-` for standard input.
+        #[arg(long)]
+        points: PathBuf,
+        /// Where the platform is: a JSON 4x4 `rest_from_platform`, mm.
+        #[arg(long)]
+        pose: Option<PathBuf>,
+    },
+    /// Print the JSON schema of the design file.
+    Schema,
+}
+
+/// Runs the program on the process's arguments.
+///
+/// Exit codes: 0 done, 1 the input is at fault, 2 usage, 3 our fault.
+pub fn run() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // help and version are asked for, not errors
+            let code = u8::from(error.use_stderr()) * 2;
+            // nothing is left to tell if even this cannot be printed
+            let _ = error.print();
+            return ExitCode::from(code);
+        }
+    };
+    let output = Output::new(arguments.json, arguments.quiet);
+    let done = match &arguments.command {
+        Command::Build { design, out } => build::run(&output, design, out.as_deref()),
+        Command::Check { dir } => check::run(&output, dir),
+        Command::Trace { design, pixels, pose } => points::trace(&output, design, pixels, pose.as_deref()),
+        Command::Project { design, points, pose } => points::project(&output, design, points, pose.as_deref()),
+        Command::Schema => schema::run(&output),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output.failure(&failure);
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}

@@ -1,1 +1,3 @@
-//! (in the making)
+//! Constants.
+
+pub mod model;

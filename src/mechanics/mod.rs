@@ -1,1 +1,24 @@
-//! (in the making)
+//! Springs, stiffness, load limits: forces, not images.
+//!
+//! A [`Spring`] gives the figures of one spring; a [`Suspension`] sums them over any layout into a conservative
+//! law between pose and [`Wrench`]. Lengths mm, forces N, moments N*mm, angles rad, stress MPa.
+
+mod column;
+mod dual;
+mod limits;
+mod load;
+mod magnet;
+mod spring;
+mod suspension;
+
+pub use column::{Column, EndStiffness};
+pub use limits::{Check, Limit, Limits, LoadCase, Stop, StopShape, checks_at, sort_worst_first, try_load};
+pub use load::Wrench;
+pub use magnet::MagnetPair;
+pub use spring::{EndType, SpecError, Spring, SpringSpec};
+pub use suspension::{
+    Displacement, Equilibrium, MOST_SPRINGS, MechanicsError, SpringState, Suspension, SuspensionSpec,
+};
+
+#[cfg(test)]
+mod tests;

@@ -10,11 +10,13 @@ pub mod batch;
 mod polynomial;
 mod rigid;
 mod roots;
+mod rotation;
 
 pub use batch::LengthMismatch;
 pub use polynomial::Polynomial;
 pub use rigid::{ROTATION_TOLERANCE, Rigid, RigidError};
 pub use roots::{MAX_ITERATIONS, Root, RootError, bracketed_newton};
+pub use rotation::{cross_matrix, rotation_from_vector, vector_from_rotation};
 
 #[cfg(test)]
 mod tests;

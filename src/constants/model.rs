@@ -1,0 +1,163 @@
+//! The form of `constants.json`.
+
+use serde::{Deserialize, Serialize};
+
+/// Marks the file for readers.
+pub const FORMAT: &str = "domecast-constants";
+/// Raised when a reader of an earlier version would misread the file.
+pub const VERSION: u32 = 1;
+
+/// A 4x4 homogeneous transform, row-major.
+pub type Matrix4 = [[f64; 4]; 4];
+
+/// What a runtime must know of one sensor.
+///
+/// Lengths mm, angles rad, pixels px (the centre of the top-left pixel is 0, 0).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Constants {
+    /// Always `domecast-constants`.
+    pub format: String,
+    /// Version of this file's form.
+    pub version: u32,
+    /// Name of the design.
+    pub design: String,
+    /// Intrinsics and place of the camera.
+    pub camera: CameraConstants,
+    /// Layers and dome.
+    pub optics: OpticsConstants,
+    /// The circle that the paper's runtime looks into, in the undistorted frame.
+    pub mask: MaskConstants,
+    /// The markers on the sheet's top face.
+    pub white_markers: Vec<WhiteMarker>,
+    /// The dots on the dome.
+    pub black_dots: Vec<BlackDot>,
+    /// The springs between the platforms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub springs: Option<SpringConstants>,
+}
+
+/// The camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraConstants {
+    /// `pinhole`, `brown_conrady` or `kannala_brandt`.
+    pub model: String,
+    /// Image width, px.
+    pub width: u32,
+    /// Image height, px.
+    pub height: u32,
+    /// Intrinsic matrix.
+    pub matrix: [[f64; 3]; 3],
+    /// k1, k2, p1, p2, k3 (then k4, k5, k6), or k1..k4, or none.
+    pub distortion: Vec<f64>,
+    /// Shift of the entrance pupil along the axis as a series in the field angle, mm; left out for a central lens.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pupil_shift_mm: Vec<f64>,
+    /// Camera matrix of the undistorted frame, which has the raw frame's size.
+    pub undistorted_matrix: [[f64; 3]; 3],
+    /// Largest field angle at which the lens model holds.
+    pub max_field_angle_rad: f64,
+    /// From the sensor frame to the camera's, at rest.
+    pub camera_from_sensor: Matrix4,
+}
+
+/// The layers and the dome.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OpticsConstants {
+    /// Radius of the dots' surface.
+    pub dome_radius_mm: f64,
+    /// From the camera outwards, the air gap at rest first.
+    pub layers: Vec<LayerConstants>,
+}
+
+/// One flat layer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LayerConstants {
+    /// What it is made of.
+    pub name: String,
+    /// Refractive index of the reference (green) channel.
+    pub index: f64,
+    /// One for each channel, where the design gives three.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub index_rgb: Option<[f64; 3]>,
+    /// Thickness; null for the medium that fills the dome.
+    pub thickness_mm: Option<f64>,
+}
+
+/// The circular mask of the undistorted frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MaskConstants {
+    /// Its centre.
+    pub center_px: [f64; 2],
+    /// Its radius.
+    pub radius_px: f64,
+}
+
+/// A white marker.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WhiteMarker {
+    /// Its number.
+    pub id: usize,
+    /// Centre as painted, in the sensor frame.
+    pub position_mm: [f64; 3],
+    /// Diameter as painted.
+    pub diameter_mm: f64,
+    /// Where it appears to be for a runtime that knows nothing of refraction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub apparent_position_mm: Option<[f64; 3]>,
+    /// Its centre in the raw image at rest.
+    pub image_px: [f64; 2],
+}
+
+/// A black dot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BlackDot {
+    /// Its number.
+    pub id: usize,
+    /// Its centre in the raw image at rest.
+    pub image_px: [f64; 2],
+    /// Its centre on the dome, in the sensor frame.
+    pub surface_mm: [f64; 3],
+    /// Outward unit normal there.
+    pub normal: [f64; 3],
+    /// Its centre on the printing plate.
+    pub plate_mm: [f64; 2],
+    /// Diameter on the dome.
+    pub diameter_mm: f64,
+    /// The dots beside it, by number, ascending.
+    pub neighbors: Vec<usize>,
+}
+
+/// The springs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SpringConstants {
+    /// From displacement to wrench at `at_mm`, at rest.
+    pub stiffness: [[f64; 6]; 6],
+    /// Reference point, in the rest frame.
+    pub at_mm: [f64; 3],
+    /// `nominal` (from geometry) or `measured`.
+    pub source: String,
+    /// Stiffness as the springs are compressed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stiffness_at: Vec<StiffnessAt>,
+    /// For a runtime that runs plain solvePnP on the apparent positions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plain_runtime: Option<PlainRuntime>,
+}
+
+/// The stiffness at one compression.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StiffnessAt {
+    /// Axial compression of the springs from their free length.
+    pub compression_mm: f64,
+    /// The 6x6 there.
+    pub stiffness: [[f64; 6]; 6],
+}
+
+/// Constants for plain solvePnP.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlainRuntime {
+    /// From pose relative to `rest_pose` to wrench.
+    pub stiffness: [[f64; 6]; 6],
+    /// The pose that plain solvePnP finds at rest.
+    pub rest_pose: Matrix4,
+}

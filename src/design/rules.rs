@@ -1,0 +1,272 @@
+//! The rules that hold between the fields of a design.
+
+use glam::DVec2;
+use serde_json::json;
+
+use super::error::DesignError;
+use super::resolve::Design;
+use super::sections::{CameraSection, LayerSection, OpticsSection, SpringEnds};
+
+/// Sums of written decimals (10.1 + 15.9) may miss the written limit by rounding; a nanometre is far
+/// below anything that can be made.
+const ROUNDING_MM: f64 = 1e-6;
+
+/// Checks all of them; the first that does not hold is the answer.
+pub(super) fn check(design: &Design) -> Result<(), DesignError> {
+    sizes(design)?;
+    dome_on_platform(design)?;
+    envelope(design)?;
+    pattern(design)?;
+    springs(design)?;
+    white_markers(design)
+}
+
+/// Every layer has a thickness but the last, which fills the dome.
+pub(super) fn layers(layers: &[LayerSection]) -> Result<(), DesignError> {
+    let last = layers.len().saturating_sub(1);
+    for (index, layer) in layers.iter().enumerate() {
+        let field = format!("optics.layers[{index}].thickness_mm");
+        match layer.thickness_mm {
+            None if index != last => {
+                return Err(DesignError::at(field, "", "the field is missing", "0 or more, in mm")
+                    .with_help("only the last layer, which fills the dome, has no thickness"));
+            }
+            Some(thickness_mm) if index == last => {
+                return Err(DesignError::at(
+                    field,
+                    thickness_mm,
+                    "the last layer fills the dome",
+                    "no thickness",
+                )
+                .with_help("leave the field out, or add the layer that fills the dome"));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// The entrance pupil is in the air below the sheet, or touches it.
+pub(super) fn camera_below_sheet(camera: &CameraSection, optics: &OpticsSection) -> Result<(), DesignError> {
+    let thickness_mm: f64 = optics.layers.iter().filter_map(|layer| layer.thickness_mm).sum();
+    let z_mm = camera.position_mm[2];
+    // one part in 1e12 is the rounding of written decimals, not a place
+    if z_mm <= -thickness_mm * (1.0 - 1e-12) {
+        return Ok(());
+    }
+    let place = if z_mm > 0.0 { "above the sheet, inside or beyond the dome" } else { "inside the sheet" };
+    let fault = DesignError::at(
+        "camera.position_mm",
+        json!(camera.position_mm),
+        format!("the camera's pupil is {place}"),
+        format!("z of at most {} (the sheet's underside)", -thickness_mm),
+    );
+    Err(if z_mm > 0.0 {
+        fault.with_help("the dome is above, z is negative below the sheet: a sign lost?")
+    } else {
+        fault
+    })
+}
+
+/// Side lengths, which the schema cannot bound inside a list.
+fn sizes(design: &Design) -> Result<(), DesignError> {
+    let sections = design.sections();
+    let lists: [(&str, &[f64]); 7] = [
+        ("envelope.size_mm", &sections.envelope.size_mm),
+        ("platforms.outer_mm", &sections.platforms.outer_mm),
+        ("sheet.size_mm", &sections.sheet.size_mm),
+        ("leds.package_mm", &sections.leds.package_mm),
+        ("leds.board_mm", &sections.leds.board_mm),
+        ("jig.base_mm", &sections.jig.base_mm),
+        ("process.build_volume_mm", &sections.process.build_volume_mm),
+    ];
+    for (field, values) in lists {
+        if values.iter().any(|value| !(*value > 0.0 && *value <= 1e4)) {
+            return Err(DesignError::at(
+                field,
+                json!(values),
+                "the value is out of range",
+                "more than 0, at most 10000",
+            ));
+        }
+    }
+    let deviations: [(&str, &[f64]); 2] = [
+        ("tolerances.pupil_mm", &sections.tolerances.pupil_mm),
+        ("tolerances.camera_rotation_deg", &sections.tolerances.camera_rotation_deg),
+    ];
+    for (field, values) in deviations {
+        if values.iter().any(|value| !(0.0..=100.0).contains(value)) {
+            return Err(DesignError::at(field, json!(values), "the value is out of range", "0 to 100"));
+        }
+    }
+    Ok(())
+}
+
+fn dome_on_platform(design: &Design) -> Result<(), DesignError> {
+    let sections = design.sections();
+    let smallest_mm = DVec2::from_array(sections.platforms.outer_mm)
+        .min_element()
+        .min(DVec2::from_array(sections.sheet.size_mm).min_element());
+    let radius_mm = sections.dome.radius_mm;
+    if 2.0 * radius_mm > smallest_mm {
+        return Err(DesignError::at(
+            "dome.radius_mm",
+            radius_mm,
+            format!("the dome is {} mm wide, wider than the platform or its sheet", 2.0 * radius_mm),
+            format!(
+                "at most {} (half of the smallest of platforms.outer_mm and sheet.size_mm)",
+                smallest_mm / 2.0
+            ),
+        )
+        .with_help("radius for diameter?"));
+    }
+    Ok(())
+}
+
+fn envelope(design: &Design) -> Result<(), DesignError> {
+    let [low, high] = design.bounds_mm();
+    let size = (high - low).to_array();
+    let allowed = design.sections().envelope.size_mm;
+    let fields = ["platforms.outer_mm", "platforms.outer_mm", "platforms.lower.underside_z_mm"];
+    for axis in 0..3 {
+        if size[axis] > allowed[axis] + ROUNDING_MM {
+            let name = ["x", "y", "z"][axis];
+            return Err(DesignError::at(
+                "envelope.size_mm",
+                json!(allowed),
+                format!("the sensor is {} mm along {name}", rounded(size[axis])),
+                format!("an envelope of at least that, or a smaller sensor (`{}`)", fields[axis]),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn pattern(design: &Design) -> Result<(), DesignError> {
+    let pattern = &design.sections().pattern;
+    let one_of = |names: [&str; 2], given: [bool; 2]| {
+        let problem = match given {
+            [true, true] => "both are given",
+            [false, false] => "neither is given",
+            _ => return Ok(()),
+        };
+        let fields = format!("pattern.{} / pattern.{}", names[0], names[1]);
+        Err(DesignError::at(fields, "", problem, "exactly one of the two"))
+    };
+    one_of(["pitch_px", "count"], [pattern.pitch_px.is_some(), pattern.count.is_some()])?;
+    one_of(
+        ["dot_diameter_px", "dot_diameter_mm"],
+        [pattern.dot_diameter_px.is_some(), pattern.dot_diameter_mm.is_some()],
+    )?;
+    if pattern.polar_angle_deg.is_none() && pattern.image_radius_px.is_none() {
+        return Err(DesignError::at(
+            "pattern.polar_angle_deg",
+            "",
+            "the pattern has no end",
+            "polar_angle_deg, or image_radius_px, or both",
+        ));
+    }
+    if let (Some(pitch_px), Some(diameter_px)) = (pattern.pitch_px, pattern.dot_diameter_px)
+        && diameter_px >= pitch_px
+    {
+        return Err(DesignError::at(
+            "pattern.dot_diameter_px",
+            diameter_px,
+            "the dots would touch",
+            format!("less than the pitch, {pitch_px} px"),
+        ));
+    }
+    let print = &design.sections().print;
+    if print.wrap_warn_deg > print.wrap_limit_deg {
+        return Err(DesignError::at(
+            "print.wrap_warn_deg",
+            print.wrap_warn_deg,
+            "the warning would come after the limit",
+            format!("at most print.wrap_limit_deg, {}", print.wrap_limit_deg),
+        ));
+    }
+    Ok(())
+}
+
+fn springs(design: &Design) -> Result<(), DesignError> {
+    let springs = &design.sections().springs;
+    if springs.outer_diameter_mm <= 2.0 * springs.wire_diameter_mm {
+        return Err(DesignError::at(
+            "springs.outer_diameter_mm",
+            springs.outer_diameter_mm,
+            "no room is left inside the coil",
+            format!("more than twice the wire, {}", 2.0 * springs.wire_diameter_mm),
+        ));
+    }
+    // coils that stand in the solid height beside the active ones (Shigley, compression-spring ends)
+    let dead_coils = match springs.ends {
+        SpringEnds::Open | SpringEnds::OpenGround => 1.0,
+        SpringEnds::Closed => 3.0,
+        SpringEnds::ClosedGround => 2.0,
+    };
+    let solid_mm = (springs.active_coils + dead_coils) * springs.wire_diameter_mm;
+    if springs.free_length_mm <= solid_mm {
+        return Err(DesignError::at(
+            "springs.free_length_mm",
+            springs.free_length_mm,
+            "the spring is solid already",
+            format!("more than its solid height, {} mm", rounded(solid_mm)),
+        ));
+    }
+    let reach_mm = DVec2::from_array(design.sections().platforms.outer_mm) / 2.0;
+    let coil_mm = springs.outer_diameter_mm / 2.0;
+    for (index, at_mm) in design.springs_at_mm().into_iter().enumerate() {
+        if (at_mm.abs() + coil_mm).cmpgt(reach_mm).any() {
+            return Err(DesignError::at(
+                "springs.places",
+                json!(at_mm.to_array().map(rounded)),
+                format!("spring {index} reaches out of the platforms"),
+                format!("within {} x {} mm, coils included", 2.0 * reach_mm.x, 2.0 * reach_mm.y),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn white_markers(design: &Design) -> Result<(), DesignError> {
+    let sections = design.sections();
+    let radius_mm = sections.white_markers.diameter_mm / 2.0;
+    let half = DVec2::from_array(sections.sheet.size_mm) / 2.0;
+    let places = &sections.white_markers.positions_mm;
+    for (index, place) in places.iter().enumerate() {
+        let at = DVec2::from_array(*place);
+        let field = format!("white_markers.positions_mm[{index}]");
+        if at.length() - radius_mm < sections.dome.radius_mm {
+            return Err(DesignError::at(
+                field,
+                json!(place),
+                "the marker lies under the dome and would hide dots",
+                format!("at least {} mm from the axis", rounded(sections.dome.radius_mm + radius_mm)),
+            ));
+        }
+        if (at.abs() + radius_mm).cmpgt(half).any() {
+            return Err(DesignError::at(
+                field,
+                json!(place),
+                "the marker reaches over the sheet's edge",
+                format!("within {} x {} mm, its radius included", 2.0 * half.x, 2.0 * half.y),
+            ));
+        }
+        let clash =
+            places[..index].iter().position(|other| DVec2::from_array(*other).distance(at) < 2.0 * radius_mm);
+        if let Some(other) = clash {
+            return Err(DesignError::at(
+                field,
+                json!(place),
+                format!("the marker overlaps marker {other}"),
+                "markers that are apart by a diameter or more",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Numbers in messages are for people: to a nanometre, without the tail of binary fractions.
+fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}

@@ -1,0 +1,181 @@
+//! The sections of a design file, as they are written.
+//!
+//! Their doc comments are the descriptions in the JSON schema, and the bounds given here are the
+//! bounds of a single field; rules between fields are in [`super::resolve`].
+
+mod camera;
+mod loads;
+mod making;
+mod optics;
+mod pattern;
+mod platforms;
+mod print;
+mod springs;
+mod tolerances;
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
+pub use loads::{LoadClaim, LoadsSection, NoiseSection, WhiteMarkersSection};
+pub use making::{
+    CouponSection, FillSection, JigSection, MeshSection, MouldSection, PinsSection, ProcessSection,
+    StencilSection, VentsSection,
+};
+pub use optics::{DomeSection, IndexRgb, IndexValue, LayerSection, OpticsSection};
+pub use pattern::{
+    CentredOn, EvenIn, ImageDiscSection, KeepOutSection, OnLost, PatternCentre, PatternKind, PatternSection,
+};
+pub use platforms::{
+    CableExitSection, ClampSection, LedColor, LedSection, LedsSection, LowerPlatform, MagnetPocketsSection,
+    MountingSection, PlatformsSection, SheetSection, UpperPlatform,
+};
+pub use print::{Hits, MeasuredTransferSection, PrintSection, TransferMapName};
+pub use springs::{
+    GravitySection, MagnetFacing, MagnetsSection, SpringEnds, SpringPlaces, SpringRing, SpringsSection,
+    WireSection,
+};
+pub use tolerances::TolerancesSection;
+
+/// The reason for what a section says: one sentence for the whole, or one for each field.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Why {
+    /// For the section as a whole.
+    Whole(String),
+    /// By the field's name.
+    ByField(BTreeMap<String, String>),
+}
+
+/// A dome-shaped camera tactile sensor, complete: everything that domecast makes comes from this file.
+///
+/// Lengths are mm, angles degrees, forces N, pixels px, as the names say.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "domecast design")]
+pub struct DesignFile {
+    /// Where editors find the schema of this file; not read.
+    #[serde(rename = "$schema", default, skip_serializing_if = "Option::is_none")]
+    pub schema: Option<String>,
+    /// Version of the design file's form; 1 is the only one.
+    #[schemars(range(min = 1, max = 1))]
+    pub version: u32,
+    /// Name of the design: letters, digits, `-` and `_`; results go to `output/<name>`.
+    pub name: String,
+    /// What it is, in a sentence or two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub description: Option<String>,
+    /// Where the design comes from, and the facts of that source that no other section holds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<SourceSection>,
+    /// The camera's intrinsics and place.
+    pub camera: CameraSection,
+    /// The camera's housing.
+    pub camera_body: CameraBodySection,
+    /// The flat layers between camera and membrane.
+    pub optics: OpticsSection,
+    /// The dome.
+    pub dome: DomeSection,
+    /// What the dome is cast from and coated with.
+    pub elastomer: ElastomerSection,
+    /// The room that the whole sensor may take.
+    pub envelope: EnvelopeSection,
+    /// The frame of the paper's runtime.
+    pub runtime: RuntimeSection,
+    /// The black dots, as they shall appear in the image.
+    pub pattern: PatternSection,
+    /// How they are printed.
+    pub print: PrintSection,
+    /// The markers on the sheet.
+    pub white_markers: WhiteMarkersSection,
+    /// The springs between the platforms.
+    pub springs: SpringsSection,
+    /// The magnets that hold the springs.
+    pub magnets: MagnetsSection,
+    /// The pockets of those magnets.
+    pub magnet_pockets: MagnetPocketsSection,
+    /// Weight of what the springs carry; left out where it shall not count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<GravitySection>,
+    /// The loads that the design claims to carry.
+    pub loads: LoadsSection,
+    /// What the image processing can measure.
+    pub noise: NoiseSection,
+    /// How far a built sensor may be off.
+    pub tolerances: TolerancesSection,
+    /// The printed platforms.
+    pub platforms: PlatformsSection,
+    /// The sheet's outline.
+    pub sheet: SheetSection,
+    /// The lights.
+    pub leds: LedsSection,
+    /// The mould.
+    pub mould: MouldSection,
+    /// The pad-print jig.
+    pub jig: JigSection,
+    /// The stencil for the white markers.
+    pub stencil: StencilSection,
+    /// The fit coupon.
+    pub coupon: CouponSection,
+    /// What the printing process can make.
+    pub process: ProcessSection,
+    /// How exact the meshes are.
+    pub mesh: MeshSection,
+}
+
+/// What tracing and projecting need of a design file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OpticsFile {
+    /// Name of the design.
+    pub name: String,
+    /// The camera's intrinsics and place.
+    pub camera: CameraSection,
+    /// The flat layers between camera and membrane.
+    pub optics: OpticsSection,
+    /// The dome.
+    pub dome: DomeSection,
+}
+
+/// The publication or device that a design follows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SourceSection {
+    /// Title.
+    pub title: String,
+    /// Where it is found: an arXiv number, a DOI, an address.
+    pub reference: String,
+    /// Facts that it gives, by subject, word for number as it gives them; they inform, nothing computes with them.
+    #[serde(default)]
+    pub facts: BTreeMap<String, String>,
+}
+
+/// What the dome is cast from and coated with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ElastomerSection {
+    /// What it is, in a word or two.
+    pub material: String,
+    /// Thickness of the reflective membrane outside the dome, mm.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub membrane_thickness_mm: f64,
+    /// Linear shrinkage on curing, percent of the length.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub shrinkage_percent: f64,
+    /// Reasons and sources, by field.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub why: Option<Why>,
+}
+
+/// The room that the whole sensor may take at rest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EnvelopeSection {
+    /// Along x, y and z, mm.
+    pub size_mm: [f64; 3],
+    /// Reasons and sources, by field.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub why: Option<Why>,
+}

@@ -1,0 +1,233 @@
+//! Numbers that carry their derivatives, so that every stiffness is the exact derivative of its force.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use nalgebra::Matrix6;
+
+/// A value with its first and second derivative by one variable.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Jet {
+    /// The value.
+    pub v: f64,
+    /// First derivative.
+    pub d: f64,
+    /// Second derivative.
+    pub dd: f64,
+}
+
+impl Jet {
+    pub fn constant(v: f64) -> Self {
+        Self { v, d: 0.0, dd: 0.0 }
+    }
+
+    pub fn variable(v: f64) -> Self {
+        Self { v, d: 1.0, dd: 0.0 }
+    }
+
+    /// A function of this value, from its value and two derivatives there.
+    pub fn chain(self, f: f64, df: f64, ddf: f64) -> Self {
+        Self { v: f, d: df * self.d, dd: ddf * self.d * self.d + df * self.dd }
+    }
+
+    pub fn recip(self) -> Self {
+        let r = 1.0 / self.v;
+        self.chain(r, -r * r, 2.0 * r * r * r)
+    }
+
+    /// `stumpff(k)` of this value.
+    pub fn stumpff(self, k: u32) -> Self {
+        let (f, df) = (stumpff(k, self.v), stumpff_slope(k, self.v));
+        let ddf = 0.5 * (f64::from(k) * stumpff_slope(k + 2, self.v) - stumpff_slope(k + 1, self.v));
+        self.chain(f, df, ddf)
+    }
+}
+
+impl Add for Jet {
+    type Output = Self;
+    fn add(self, o: Self) -> Self {
+        Self { v: self.v + o.v, d: self.d + o.d, dd: self.dd + o.dd }
+    }
+}
+
+impl Sub for Jet {
+    type Output = Self;
+    fn sub(self, o: Self) -> Self {
+        Self { v: self.v - o.v, d: self.d - o.d, dd: self.dd - o.dd }
+    }
+}
+
+impl Mul for Jet {
+    type Output = Self;
+    fn mul(self, o: Self) -> Self {
+        Self {
+            v: self.v * o.v,
+            d: self.d * o.v + self.v * o.d,
+            dd: self.dd * o.v + 2.0 * self.d * o.d + self.v * o.dd,
+        }
+    }
+}
+
+impl Mul<f64> for Jet {
+    type Output = Self;
+    fn mul(self, k: f64) -> Self {
+        Self { v: self.v * k, d: self.d * k, dd: self.dd * k }
+    }
+}
+
+/// Stumpff's entire functions: `c_k(z) = sum_j (-z)^j / (2 j + k)!`.
+///
+/// With `z = x^2`: c_0 = cos x, c_1 = sin x / x, c_2 = (1 - cos x) / x^2, c_3 = (x - sin x) / x^3;
+/// for negative z the hyperbolic ones. The series has no removable singularity at zero and loses
+/// about `e^sqrt|z|` of relative precision: callers keep |z| below some tens.
+pub(super) fn stumpff(k: u32, z: f64) -> f64 {
+    let mut term = 1.0;
+    for i in 2..=k {
+        term /= f64::from(i);
+    }
+    let mut sum = term;
+    // 40 terms reach 80!, far below rounding for every |z| that is let in (see `Column`).
+    for j in 1..=40_u32 {
+        let n = f64::from(2 * j + k);
+        term *= -z / (n * (n - 1.0));
+        sum += term;
+        if term.abs() <= 1e-18 * sum.abs() {
+            break;
+        }
+    }
+    sum
+}
+
+/// Derivative of [`stumpff`] by z: `(k c_(k+2) - c_(k+1)) / 2`.
+pub(super) fn stumpff_slope(k: u32, z: f64) -> f64 {
+    0.5 * (f64::from(k) * stumpff(k + 2, z) - stumpff(k + 1, z))
+}
+
+/// A value with its gradient by the six coordinates of a displacement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Dual {
+    pub v: f64,
+    pub d: [f64; 6],
+}
+
+impl Dual {
+    pub fn constant(v: f64) -> Self {
+        Self { v, d: [0.0; 6] }
+    }
+
+    pub fn variable(v: f64, index: usize) -> Self {
+        let mut d = [0.0; 6];
+        d[index] = 1.0;
+        Self { v, d }
+    }
+
+    /// A function of this value, from its value and slope there.
+    pub fn chain(self, f: f64, slope: f64) -> Self {
+        Self { v: f, d: self.d.map(|d| slope * d) }
+    }
+
+    pub fn recip(self) -> Self {
+        let r = 1.0 / self.v;
+        self.chain(r, -r * r)
+    }
+
+    pub fn stumpff(self, k: u32) -> Self {
+        self.chain(stumpff(k, self.v), stumpff_slope(k, self.v))
+    }
+}
+
+impl Add for Dual {
+    type Output = Self;
+    fn add(self, o: Self) -> Self {
+        Self { v: self.v + o.v, d: std::array::from_fn(|i| self.d[i] + o.d[i]) }
+    }
+}
+
+impl Sub for Dual {
+    type Output = Self;
+    fn sub(self, o: Self) -> Self {
+        Self { v: self.v - o.v, d: std::array::from_fn(|i| self.d[i] - o.d[i]) }
+    }
+}
+
+impl Neg for Dual {
+    type Output = Self;
+    fn neg(self) -> Self {
+        self.chain(-self.v, -1.0)
+    }
+}
+
+impl Mul for Dual {
+    type Output = Self;
+    fn mul(self, o: Self) -> Self {
+        let (left, right) = (self.chain(self.v * o.v, o.v), o.chain(0.0, self.v));
+        left + right
+    }
+}
+
+impl Mul<f64> for Dual {
+    type Output = Self;
+    fn mul(self, k: f64) -> Self {
+        self.chain(self.v * k, k)
+    }
+}
+
+/// A vector of [`Dual`]s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct DualVec(pub [Dual; 3]);
+
+impl DualVec {
+    pub fn constant(v: glam::DVec3) -> Self {
+        Self([Dual::constant(v.x), Dual::constant(v.y), Dual::constant(v.z)])
+    }
+
+    pub fn cross(self, o: Self) -> Self {
+        let ([ax, ay, az], [bx, by, bz]) = (self.0, o.0);
+        Self([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+    }
+
+    pub fn scaled(self, k: Dual) -> Self {
+        Self(self.0.map(|v| v * k))
+    }
+
+    pub fn value(self) -> glam::DVec3 {
+        glam::DVec3::new(self.0[0].v, self.0[1].v, self.0[2].v)
+    }
+
+    /// The rotation `exp [self]x` applied to a vector.
+    pub fn rotate(self, v: Self) -> Self {
+        let square = self.0[0] * self.0[0] + self.0[1] * self.0[1] + self.0[2] * self.0[2];
+        let once = self.cross(v);
+        let twice = self.cross(once);
+        v + once.scaled(square.stumpff(1)) + twice.scaled(square.stumpff(2))
+    }
+
+    /// Turns a gradient by the rotation vector `self` into the moment that does the same work:
+    /// `J_l^-T g`, with `J_l` the left Jacobian of the rotation group.
+    pub fn moment_of_gradient(self, gradient: Self) -> Self {
+        let square = self.0[0] * self.0[0] + self.0[1] * self.0[1] + self.0[2] * self.0[2];
+        // (1 - (a/2) cot(a/2)) / a^2, written without a singularity at zero.
+        let factor = (square.stumpff(3) - square.stumpff(4) * 2.0) * (square.stumpff(2) * 2.0).recip();
+        let once = self.cross(gradient);
+        let twice = self.cross(once);
+        gradient + once.scaled(Dual::constant(0.5)) + twice.scaled(factor)
+    }
+}
+
+impl Add for DualVec {
+    type Output = Self;
+    fn add(self, o: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + o.0[i]))
+    }
+}
+
+impl Sub for DualVec {
+    type Output = Self;
+    fn sub(self, o: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] - o.0[i]))
+    }
+}
+
+/// The derivative matrix of two stacked vectors: row i is the gradient of the i-th component.
+pub(super) fn jacobian(upper: DualVec, lower: DualVec) -> Matrix6<f64> {
+    Matrix6::from_fn(|row, col| if row < 3 { upper.0[row].d[col] } else { lower.0[row - 3].d[col] })
+}

@@ -80,6 +80,11 @@ impl Outline {
         Ok((Self { pieces }, error))
     }
 
+    /// An outline from its pieces, each as (first control point, second control point, end).
+    pub fn from_pieces(pieces: Vec<[DVec2; 3]>) -> Self {
+        Self { pieces }
+    }
+
     /// A circle, within 2.7e-4 of its radius.
     pub fn circle(center: DVec2, radius: f64) -> Self {
         let curve = |angle: f64| -> Result<CurvePoint, std::convert::Infallible> {

@@ -21,7 +21,7 @@ pub(super) fn planar_poses(points_mm: &[DVec2; 4], rays: &[DVec3; 4]) -> Option<
     // Points in front: the ray times a positive depth.
     let depth: f64 = points.iter().zip(rays).map(|(p, r)| (h * *p).dot(*r).signum()).sum();
     if depth < 0.0 {
-        h = h * -1.0;
+        h *= -1.0;
     }
     let scale = 2.0 / (h.x_axis.length() + h.y_axis.length());
     if !scale.is_finite() {

@@ -1,3 +1,2 @@
-//! Constants.
-
+//! c
 pub mod model;

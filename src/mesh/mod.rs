@@ -1,1 +1,39 @@
-//! (in the making)
+//! Solids as triangle meshes: exact shapes, their triangulation to a chord
+//! tolerance, booleans, checks, and writers.
+//!
+//! The road of a part:
+//!
+//! 1. it is described by exact [`Shape`]s (turned bodies and prisms) that are
+//!    added and cut ([`Construction`]);
+//! 2. every shape is triangulated in `f64` so that no triangle is farther from
+//!    the exact surface than the user's [`Chord`] tolerance;
+//! 3. the shapes are joined by [`Solid`], the only place that knows the boolean
+//!    kernel: tools are united in a balanced tree and subtracted once;
+//! 4. the result becomes a [`TriMesh`] whose vertices are rounded to `f32` and
+//!    welded, because that is what a reader of an STL gets; [`inspect`] tells
+//!    whether *that* mesh is closed, consistently wound and in one piece.
+//!
+//! Two lengths must not be mixed. The *chord tolerance* is the user's and
+//! decides how many triangles a circle gets. The *rounding epsilon*
+//! ([`TriMesh::rounding_mm`]) follows from the size of the numbers and decides
+//! what counts as equal. Neither ever stands in for the other.
+
+mod check;
+mod chord;
+mod error;
+mod primitives;
+mod shape;
+mod solid;
+mod stl;
+mod triangles;
+
+#[cfg(test)]
+mod tests;
+
+pub use check::{Inspection, inspect};
+pub use chord::{Chord, Fit};
+pub use error::MeshError;
+pub use shape::{Construction, Piece, Profile, ProfileEdge, Shape};
+pub use solid::Solid;
+pub use stl::write_stl;
+pub use triangles::{BoundingBox, TriMesh};

@@ -1,1 +1,140 @@
-//! (in the making)
+//! The parts that are printed, cut and cast, as exact solids and as meshes.
+//!
+//! Every dimension comes from the resolved design through [`Measures`]; a part
+//! is first a [`Construction`] of exact shapes, then a mesh. What a part should
+//! be is stated beside it, from the count of its features and not from the
+//! mesh: the number of handles ([`Part::genus`]) is checked against the mesh by
+//! [`Part::check`], and again by independent programs that read the written
+//! file.
+//!
+//! Frames: the platforms are in the sensor frame at rest, the mould has its own
+//! with the parting plane at z = 0 and the cavity below.
+
+mod error;
+mod lower;
+mod measures;
+mod mould;
+mod upper;
+mod view;
+
+#[cfg(test)]
+mod tests;
+
+use std::io::{self, Write};
+
+use rayon::prelude::*;
+
+pub use error::PartError;
+pub use measures::Measures;
+pub use view::ViewCone;
+
+use crate::design::Design;
+use crate::mesh::{BoundingBox, Chord, Construction, Inspection, TriMesh, inspect, write_stl};
+
+/// One part, ready to be written.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// Name, also of its files: `upper_platform`.
+    pub name: &'static str,
+    /// One line on what it is and what it is made of.
+    pub summary: &'static str,
+    /// The exact shapes that it is made of.
+    pub construction: Construction,
+    /// Tolerance that the mesh was made with.
+    pub chord_tolerance_mm: f64,
+    /// The mesh as a reader of the STL gets it: vertices rounded to `f32` and
+    /// welded.
+    pub mesh: TriMesh,
+    /// Volume before rounding to `f32`, mm^3.
+    pub volume_mm3: f64,
+    /// Surface, mm^2.
+    pub area_mm2: f64,
+    /// Handles that the part has by the count of its holes.
+    pub genus: i64,
+    /// Box of the mesh.
+    pub bounds: BoundingBox,
+}
+
+/// A part before it is meshed.
+pub(crate) struct Blueprint {
+    pub name: &'static str,
+    pub summary: &'static str,
+    pub construction: Construction,
+    pub genus: i64,
+    pub chord: Chord,
+}
+
+impl Blueprint {
+    fn build(self) -> Result<Part, PartError> {
+        let Self { name, summary, construction, genus, chord } = self;
+        let solid = construction.solid(chord).map_err(|error| PartError::Mesh { part: name, error })?;
+        let exact_vertices = solid.to_mesh();
+        let mesh = exact_vertices.welded_f32();
+        let broken = |problem: String| PartError::Broken { part: name, problem };
+        let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
+        let part = Part {
+            name,
+            summary,
+            construction,
+            chord_tolerance_mm: chord.tolerance_mm(),
+            volume_mm3: exact_vertices.volume_mm3(),
+            area_mm2: exact_vertices.area_mm2(),
+            genus,
+            bounds,
+            mesh,
+        };
+        part.check()?;
+        Ok(part)
+    }
+}
+
+impl Part {
+    /// Looks at the welded mesh.
+    pub fn inspect(&self) -> Inspection {
+        inspect(&self.mesh)
+    }
+
+    /// One closed solid with the handles that were designed?
+    ///
+    /// # Errors
+    /// [`PartError::Broken`] with what is wrong.
+    pub fn check(&self) -> Result<(), PartError> {
+        let found = self.inspect();
+        let problem = found.problem().or_else(|| {
+            let genus = found.genus()?;
+            (genus != self.genus).then(|| {
+                format!("its mesh has {genus} handles, its features make {}: features touch or miss", self.genus)
+            })
+        });
+        match problem {
+            None => Ok(()),
+            Some(problem) => Err(PartError::Broken { part: self.name, problem }),
+        }
+    }
+
+    /// Writes the mesh as binary STL.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_stl(&self, writer: &mut impl Write) -> io::Result<()> {
+        write_stl(&self.mesh, writer)
+    }
+}
+
+/// Makes all parts of a design, in a fixed order.
+///
+/// # Errors
+/// The first part, in that order, that cannot be made.
+pub fn build(design: &Design) -> Result<Vec<Part>, PartError> {
+    build_measured(&Measures::of(design)?)
+}
+
+/// [`build`] for measures that are at hand.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_measured(measures: &Measures) -> Result<Vec<Part>, PartError> {
+    let makers: [fn(&Measures) -> Result<Blueprint, PartError>; 4] =
+        [upper::blueprint, lower::blueprint, mould::cavity, mould::base];
+    makers.par_iter().map(|make| make(measures)?.build()).collect::<Vec<_>>().into_iter().collect()
+}

@@ -1,0 +1,214 @@
+//! The dimensions that the parts are made from, taken from the design once.
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use super::view::ViewCone;
+use super::{PartError, upper};
+use crate::design::Design;
+use crate::design::sections::{
+    CameraBodySection, LedsSection, MagnetPocketsSection, MagnetsSection, MouldSection, PlatformsSection,
+    ProcessSection, SheetSection, SpringEnds,
+};
+use crate::mesh::{Chord, Fit, Profile, Shape};
+use crate::numeric::Rigid;
+
+/// Dimensions of a design as the parts need them. Heights are in the sensor
+/// frame at rest.
+#[derive(Debug, Clone)]
+pub struct Measures {
+    /// The platforms.
+    pub platforms: PlatformsSection,
+    /// The LEDs and their boards.
+    pub leds: LedsSection,
+    /// The magnets.
+    pub magnets: MagnetsSection,
+    /// Their pockets.
+    pub pockets: MagnetPocketsSection,
+    /// The sheet's outline.
+    pub sheet: SheetSection,
+    /// The mould.
+    pub mould: MouldSection,
+    /// The camera's housing.
+    pub camera_body: CameraBodySection,
+    /// Limits of the process.
+    pub process: ProcessSection,
+    /// Linear shrinkage of the elastomer, as a fraction.
+    pub shrinkage: f64,
+    /// Outer sides of the platforms, mm.
+    pub outer_mm: DVec2,
+    /// Sides of the sheet, mm.
+    pub sheet_size_mm: DVec2,
+    /// Thickness of all flat layers but the dome, mm.
+    pub sheet_thickness_mm: f64,
+    /// Radius of the elastomer, mm.
+    pub dome_radius_mm: f64,
+    /// Top of the lower platform, mm.
+    pub lower_top_z_mm: f64,
+    /// Where the springs stand.
+    pub spring_axes_mm: Vec<DVec2>,
+    /// Camera frame to sensor frame at rest.
+    pub sensor_from_camera: DAffine3,
+    /// What the camera must see through the upper platform.
+    pub view: ViewCone,
+    /// Tolerance of ordinary faces.
+    pub chord: Chord,
+    /// Tolerance of the mould's cavity.
+    pub optical_chord: Chord,
+    /// How far a cutting tool reaches beyond the face that it opens, mm.
+    pub overcut_mm: f64,
+}
+
+/// A point in the plane from radius and azimuth.
+pub(super) fn polar(radius_mm: f64, azimuth_deg: f64) -> DVec2 {
+    radius_mm * DVec2::from_angle(azimuth_deg.to_radians())
+}
+
+/// What must be seen through the platform's window: the dome's base and the
+/// white markers, as discs on the sheet's top face.
+fn view_targets_mm(design: &Design) -> Vec<(DVec2, f64)> {
+    let marker_radius_mm = 0.5 * design.sections().white_markers.diameter_mm;
+    let markers = design.white_markers_mm().into_iter().map(|p| (p.truncate(), marker_radius_mm));
+    std::iter::once((DVec2::ZERO, design.sections().dome.radius_mm)).chain(markers).collect()
+}
+
+/// How far the upper platform can go straight down: until the springs are
+/// solid, the stop is met, or the sheet is on the camera.
+fn axial_travel_mm(design: &Design) -> f64 {
+    let springs = &design.sections().springs;
+    // Coils in the solid height beside the active ones (Shigley, Mechanical
+    // Engineering Design, table of compression-spring ends).
+    let dead_coils = match springs.ends {
+        SpringEnds::Open | SpringEnds::OpenGround => 1.0,
+        SpringEnds::Closed => 3.0,
+        SpringEnds::ClosedGround => 2.0,
+    };
+    let solid_mm = (springs.active_coils + dead_coils) * springs.wire_diameter_mm;
+    let clear_mm = springs.stop_clearance_mm.unwrap_or(springs.free_length_mm);
+    let camera_front_mm = design.sensor_from_camera().translation_mm.z
+        + design.sections().camera_body.front_from_pupil_mm;
+    let above_camera_mm = design.sheet_underside_z_mm() - camera_front_mm;
+    (springs.free_length_mm - solid_mm).min(clear_mm).min(above_camera_mm).max(0.0)
+}
+
+/// Positions of the platform between rest and springs pressed solid (or the
+/// stop, or the sheet on the camera, whichever comes first).
+fn travel_poses(design: &Design) -> Vec<Rigid> {
+    const STEPS: u32 = 8;
+    let travel_mm = axial_travel_mm(design);
+    (0..=STEPS)
+        .map(|i| Rigid::from_translation(DVec3::NEG_Z * (travel_mm * f64::from(i) / f64::from(STEPS))))
+        .collect()
+}
+
+impl Measures {
+    /// Takes the measures of a design.
+    ///
+    /// # Errors
+    /// [`PartError::View`] if the camera's view cannot be computed;
+    /// [`PartError::Mesh`] for a chord tolerance that is none.
+    pub fn of(design: &Design) -> Result<Self, PartError> {
+        let sections = design.sections();
+        let chord = |tolerance_mm: f64| {
+            Chord::new(tolerance_mm).map_err(|error| PartError::Mesh { part: "mesh", error })
+        };
+        let camera = design.sensor_from_camera();
+        let view = ViewCone::over(
+            design.optics(),
+            &view_targets_mm(design),
+            &travel_poses(design),
+            sections.platforms.upper.underside_z_mm,
+            design.sheet_underside_z_mm(),
+            sections.platforms.window_margin_mm,
+        )?;
+        Ok(Self {
+            platforms: sections.platforms.clone(),
+            leds: sections.leds.clone(),
+            magnets: sections.magnets.clone(),
+            pockets: sections.magnet_pockets.clone(),
+            sheet: sections.sheet.clone(),
+            mould: sections.mould.clone(),
+            camera_body: sections.camera_body.clone(),
+            process: sections.process.clone(),
+            shrinkage: 0.01 * sections.elastomer.shrinkage_percent,
+            outer_mm: DVec2::from_array(sections.platforms.outer_mm),
+            sheet_size_mm: DVec2::from_array(sections.sheet.size_mm),
+            sheet_thickness_mm: design.sheet_thickness_mm(),
+            dome_radius_mm: sections.dome.radius_mm,
+            lower_top_z_mm: design.lower_top_z_mm(),
+            spring_axes_mm: design.springs_at_mm(),
+            sensor_from_camera: DAffine3 { matrix3: camera.rotation, translation: camera.translation_mm },
+            view,
+            chord: chord(sections.mesh.chord_tolerance_mm)?,
+            optical_chord: chord(sections.mesh.optical_chord_tolerance_mm)?,
+            // Any length will do that is not small against the part.
+            overcut_mm: 0.05 * sections.platforms.outer_mm[0].max(sections.platforms.outer_mm[1]),
+        })
+    }
+
+    /// Where the sheet lies, mm.
+    pub fn seat_z_mm(&self) -> f64 {
+        -self.sheet_thickness_mm
+    }
+
+    /// Top of the upper platform's rim, mm.
+    pub fn upper_top_z_mm(&self) -> f64 {
+        self.seat_z_mm() + self.platforms.upper.rim_height_mm
+    }
+
+    /// The camera's entrance pupil on the axis, mm.
+    pub fn pupil_mm(&self) -> DVec3 {
+        self.sensor_from_camera.translation
+    }
+
+    /// Radius of the camera's bore, mm.
+    pub fn bore_radius_mm(&self) -> f64 {
+        0.5 * self.camera_body.diameter_mm + self.camera_body.bore_clearance_mm
+    }
+
+    /// Radius of the mould's cavity as printed: the silicone that shrinks to
+    /// the dome, and the sealer round it.
+    pub fn cavity_radius_mm(&self) -> f64 {
+        self.dome_radius_mm / (1.0 - self.shrinkage) + self.mould.sealer_thickness_mm
+    }
+
+    /// Axes of the mould's vents: just inside the rim of the sealed cavity.
+    pub fn vent_axes_mm(&self) -> Vec<DVec2> {
+        let vents = &self.mould.vents;
+        let rim = self.cavity_radius_mm() - self.mould.sealer_thickness_mm;
+        let radius = rim - vents.inset_mm - 0.5 * vents.diameter_mm;
+        (0..vents.count)
+            .map(|i| polar(radius, vents.first_azimuth_deg + 360.0 * f64::from(i) / f64::from(vents.count)))
+            .collect()
+    }
+
+    /// Radius and depth of a magnet's pocket, mm.
+    pub fn pocket_mm(&self) -> (f64, f64) {
+        (
+            0.5 * (self.magnets.diameter_mm + self.pockets.diameter_clearance_mm),
+            self.magnets.thickness_mm + self.pockets.depth_clearance_mm,
+        )
+    }
+
+    /// Pose of LED `i`: origin at the centre of its emitting face, x across
+    /// the board, y up the board, z out of the emitting face.
+    pub fn platform_from_led(&self, i: usize) -> DAffine3 {
+        upper::platform_from_led(self, i)
+    }
+
+    /// Tool for a magnet's pocket that opens at the face `face_z_mm`, with its
+    /// push-out hole up (or down) to `end_z_mm`.
+    pub(super) fn magnet_pocket(&self, face_z_mm: f64, end_z_mm: f64, over_mm: f64) -> Shape {
+        let (radius, depth) = self.pocket_mm();
+        let hole = 0.5 * self.pockets.push_out_diameter_mm;
+        let into = (end_z_mm - face_z_mm).signum();
+        let mut points = vec![(radius, face_z_mm - into * over_mm), (radius, face_z_mm + into * depth)];
+        if hole > 0.0 {
+            points.push((hole, face_z_mm + into * depth));
+            points.push((hole, end_z_mm));
+        }
+        if into < 0.0 {
+            points.reverse();
+        }
+        Shape::Turned { profile: Profile::lines(&points), fit: Fit::Outside }
+    }
+}

@@ -123,8 +123,8 @@ fn load_design(dir: &Path, manifest: &Manifest) -> Result<Design, String> {
 }
 
 fn check_constants(report: &mut CheckReport, dir: &Path, design: &Design, constants: &Constants) {
-    let layout = match super::layout_of(design) {
-        Ok(layout) => layout,
+    let layout = match super::lay_out(design) {
+        Ok((_, layout)) => layout,
         Err(error) => {
             report.add("layout", Err(error.to_string()));
             return;

@@ -14,12 +14,59 @@ pub use manifest::{
 };
 pub use tree::{Tree, WriteError, list_files};
 
-use crate::artwork;
+use std::fmt;
+
+use crate::artwork::{self, FilmLabel, RenderError};
 use crate::constants;
 use crate::design::{Design, DesignError};
-use crate::layout::{Layout, LayoutSpec};
+use crate::layout::{Layout, LayoutError, LayoutSpec};
+use crate::mechanics::{Check, claims_of, suspension_of};
 use crate::numeric::Rigid;
-use crate::parts;
+use crate::parts::{self, PartError};
+
+/// Why a build could not be made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum BuildError {
+    /// The design is at fault.
+    Design(Box<DesignError>),
+    /// A library failed on something that every resolved design should allow: domecast is at fault.
+    Ours(String),
+}
+
+impl From<DesignError> for BuildError {
+    fn from(error: DesignError) -> Self {
+        Self::Design(Box::new(error))
+    }
+}
+
+impl From<LayoutError> for BuildError {
+    fn from(error: LayoutError) -> Self {
+        DesignError::from(error).into()
+    }
+}
+
+impl From<RenderError> for BuildError {
+    fn from(error: RenderError) -> Self {
+        Self::Ours(format!("the artwork could not be drawn: {error}"))
+    }
+}
+
+impl From<PartError> for BuildError {
+    fn from(error: PartError) -> Self {
+        DesignError::from(error).into()
+    }
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Design(error) => error.fmt(f),
+            Self::Ours(what) => f.write_str(what),
+        }
+    }
+}
+
+impl std::error::Error for BuildError {}
 
 /// Everything that a build writes.
 #[derive(Debug)]
@@ -36,7 +83,14 @@ pub struct Build {
 ///
 /// # Errors
 /// The first fault of the design that only shows when it is laid out, loaded or made.
-pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, DesignError> {
+pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
+    make(design, step).map_err(|error| match error {
+        BuildError::Design(error) => with_value(design, *error).into(),
+        ours @ BuildError::Ours(_) => ours,
+    })
+}
+
+fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
     let mut tree = Tree::default();
     let mut warnings: Vec<Warning> = design
         .warnings()
@@ -46,29 +100,31 @@ pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, Desig
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
     let sha256 = sha256_hex(design.text().as_bytes());
 
-    step("laying out the dots");
-    let layout = layout_of(design)?;
     step("trying the claimed loads");
-    sight::markers(design, &Rigid::identity(), "at rest")?;
+    try_claims(design)?;
+    step("laying out the dots");
+    let (spec, layout) = lay_out(design)?;
     step("writing the constants");
     let constants = constants::of(design, &layout)?;
     tree.add("constants/constants.json", constants.to_json().into_bytes());
     step("drawing the artwork");
-    tree.add("artwork/dots.svg", artwork::dots_svg(design, &layout, &sha256)?);
-    tree.add("artwork/camera-view.png", artwork::camera_view_png(design, &layout)?);
+    let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
+    for file in artwork::files(&spec, &layout, &label)? {
+        tree.add(file.path, file.bytes);
+    }
     step("making the parts");
     let mut records = Vec::new();
     for part in parts::build(design)? {
         let file = format!("parts/{}.stl", part.name);
         let mut bytes = Vec::new();
-        part.write_stl(&mut bytes).map_err(|error| DesignError::at("mesh", "", error.to_string(), ""))?;
+        part.write_stl(&mut bytes).map_err(|error| BuildError::Ours(format!("{file}: {error}")))?;
         tree.add(file.clone(), bytes);
         records.push(PartRecord {
             name: part.name.to_owned(),
             file,
             volume_mm3: part.volume_mm3,
             genus: part.genus,
-            bbox_mm: [part.bounds.low_mm.to_array(), part.bounds.high_mm.to_array()],
+            bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
         });
     }
     warnings.extend(layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }));
@@ -82,7 +138,52 @@ pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, Desig
     Ok(Build { tree, manifest, dot_count: layout.dots.len() })
 }
 
-/// The layout of a design's dots.
-fn layout_of(design: &Design) -> Result<Layout, DesignError> {
-    Layout::new(&LayoutSpec::of(design)?).map_err(DesignError::from)
+/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight.
+fn try_claims(design: &Design) -> Result<(), DesignError> {
+    sight::markers(design, &Rigid::identity(), "at rest")?;
+    let suspension = suspension_of(design)?;
+    for (index, (claim, case)) in
+        design.sections().loads.claims.iter().zip(claims_of(design, &suspension)).enumerate()
+    {
+        let field = format!("loads.claims[{index}]");
+        let passed = case.passed().next().map(|check| {
+            let Check { limit, part, value, bound, unit } = check;
+            DesignError::at(
+                field.clone(),
+                serde_json::json!(claim),
+                format!("the load \"{}\" passes a limit: {} at {part}, {value:.3} {unit}", claim.name, limit.as_str()),
+                format!("at most {bound:.3} {unit}"),
+            )
+            .with_help("claim less, or change `springs`, `magnets.grip_force_n` or the heights of the platforms")
+        });
+        if let Some(error) = passed {
+            return Err(error);
+        }
+        let balance = case
+            .equilibrium
+            .map_err(|error| DesignError::at(field, serde_json::json!(claim), error.to_string(), "a load that the springs carry"))?;
+        let pose = balance.displacement.to_pose(suspension.at_mm());
+        sight::markers(design, &pose, &format!("under the load \"{}\"", claim.name))?;
+    }
+    Ok(())
+}
+
+/// The layout of a design's dots, and what it was made from.
+fn lay_out(design: &Design) -> Result<(LayoutSpec, Layout), DesignError> {
+    let spec = LayoutSpec::of_design(design)?;
+    let layout = Layout::new(&spec)?;
+    Ok((spec, layout))
+}
+
+/// Makers report the field at fault; its value stands in the design.
+fn with_value(design: &Design, mut error: DesignError) -> DesignError {
+    if error.value.is_empty() && !error.field.is_empty() {
+        let pointer = format!("/{}", error.field.replace('.', "/").replace('[', "/").replace(']', ""));
+        let tree: serde_json::Value = serde_json::from_str(design.text()).unwrap_or_default();
+        if let Some(value) = tree.pointer(&pointer) {
+            let filled = DesignError::at(error.field.clone(), value, "", "");
+            error.value = filled.value;
+        }
+    }
+    error
 }

@@ -6,14 +6,18 @@ use std::time::Instant;
 use serde_json::json;
 
 use super::output::{Failure, Output};
-use crate::{build, design};
+use crate::build::{self, BuildError};
+use crate::design;
 
 /// Makes everything, then writes it whole.
 pub fn run(output: &Output, design_file: &Path, out: Option<&Path>) -> Result<(), Failure> {
     let began = Instant::now();
     output.step("reading the design");
     let design = design::load(design_file)?;
-    let result = build::build(&design, &mut |doing| output.step(doing)).map_err(|error| error.in_file(design_file))?;
+    let result = build::build(&design, &mut |doing| output.step(doing)).map_err(|error| match error {
+        BuildError::Design(error) => Failure::from(error.in_file(design_file)),
+        BuildError::Ours(what) => Failure::Internal(what),
+    })?;
     let out = out.map_or_else(|| PathBuf::from("output").join(design.name()), Path::to_path_buf);
     output.step("writing");
     result.tree.write(&out).map_err(Failure::Write)?;

@@ -22,7 +22,7 @@ use glam::{DMat2, DVec2, DVec3};
 use nalgebra::{Matrix2x3, Matrix3x2};
 
 use super::LensLimit;
-use super::inverse::RadialInverse;
+use super::inverse::{RadialInverse, Start};
 use super::limit::{Domain, END_ROUNDING};
 use super::perspective::{
     NEAR_RIGHT_ANGLE_RAD, half_view_rad, plane_by_ray, plane_point, ray_by_image, ray_of,
@@ -31,6 +31,9 @@ use crate::numeric::Polynomial;
 
 /// Relative distance that the domain keeps from a pole of the rational form.
 const POLE_MARGIN: f64 = 1e-9;
+
+/// Undamped Newton steps in two dimensions before the damped solve begins.
+const QUICK_PLANE_STEPS: u32 = 5;
 
 /// Newton steps in two dimensions, damped ones included.
 const MAX_PLANE_STEPS: u32 = 100;
@@ -48,6 +51,8 @@ pub(super) struct BrownConrady {
     domain: Domain,
     /// Radius of the domain on the plane `z = 1`.
     end: f64,
+    /// Bound on the second derivative of the tangential terms.
+    tangential_bend: f64,
     inverse: RadialInverse,
 }
 
@@ -58,10 +63,10 @@ fn factor(n: &[f64; 3], d: &[f64; 3], u: f64) -> (f64, f64) {
     if *d == [0.0; 3] {
         return (top, top_slope);
     }
-    let bottom = 1.0 + u * (d[0] + u * (d[1] + u * d[2]));
+    let inverse = 1.0 / (1.0 + u * (d[0] + u * (d[1] + u * d[2])));
     let bottom_slope = d[0] + u * (2.0 * d[1] + u * 3.0 * d[2]);
-    let value = top / bottom;
-    (value, (top_slope - value * bottom_slope) / bottom)
+    let value = top * inverse;
+    (value, (top_slope - value * bottom_slope) * inverse)
 }
 
 /// `rho = r L` and its derivative by `r`.
@@ -86,7 +91,8 @@ impl BrownConrady {
             _ => domain.end_rad.tan(),
         };
         let inverse = RadialInverse::new(|r| radius(&numerator, &denominator, r), end)?;
-        Some(Self { numerator, denominator, q, domain, end, inverse })
+        let tangential_bend = 6.0 * q.length();
+        Some(Self { numerator, denominator, q, domain, end, tangential_bend, inverse })
     }
 
     pub fn domain(&self) -> &Domain {
@@ -169,8 +175,50 @@ impl BrownConrady {
         (image + (x - rim), slope * across + (DMat2::IDENTITY - across))
     }
 
+    /// Newton's method without damping, from the radial inverse corrected for
+    /// the tangential terms to first order. It gives up (and leaves the work
+    /// to the damped solve) unless the steps shrink as they should.
+    fn quick_plane_of(&self, image: DVec2, distance: f64) -> Option<DVec2> {
+        let Start { x: start, slope, bend } = self.inverse.start(distance);
+        // Second derivative of f: rho'' along the radius, 2 r L' across, both
+        // bounded by the bend; 6 |q| from the tangential terms.
+        let bend = 3.0 * bend + self.tangential_bend;
+        let e = image * (1.0 / distance);
+        let mut x = e * start;
+        // Along e the inverse of the Jacobian is the table's slope, across it
+        // r / rho.
+        let offset = self.q * (start * start) + x * (2.0 * self.q.dot(x));
+        let along = e.dot(offset);
+        let across = offset - e * along;
+        x -= e * (along * slope) + across * (start / distance);
+        for _ in 0..QUICK_PLANE_STEPS {
+            let (value, j) = self.image_with_slope(x);
+            let error = value - image;
+            let (a, b, c) = (j.x_axis.x, j.x_axis.y, j.y_axis.y);
+            let determinant = a * c - b * b;
+            let scale = 1.0 / determinant;
+            let step = DVec2::new(c * error.x - b * error.y, a * error.y - b * error.x) * scale;
+            x -= step;
+            // What Newton's method leaves is at most |f''| step^2 / (2 s), with
+            // the smaller eigenvalue s > determinant / trace.
+            let left = step.length_squared() * bend * (a + c);
+            let size = x.length_squared();
+            if left * left <= 4e-34 * determinant * determinant * size {
+                let inside = size <= self.end * self.end && determinant > 0.0;
+                return inside.then_some(x);
+            }
+        }
+        None
+    }
+
     fn plane_of_tangential(&self, image: DVec2, distance: f64) -> Result<DVec2, LensLimit> {
-        let start = self.inverse.start(distance.min(self.inverse.end_image()));
+        if distance > 0.0
+            && distance <= self.inverse.end_image()
+            && let Some(x) = self.quick_plane_of(image, distance)
+        {
+            return Ok(x);
+        }
+        let start = self.inverse.start(distance.min(self.inverse.end_image())).x;
         let mut x = if distance > 0.0 { image * (start / distance) } else { image };
         let (mut value, mut slope) = self.continued(x);
         let mut error = (value - image).length();

@@ -12,17 +12,68 @@ const QUICK_STEPS: u32 = 6;
 
 /// The inverse of `image = f(x)`, `f(0) = 0`, `f' > 0` inside `[0, end]`.
 ///
-/// A cubic table over `s = sqrt(1 - image / f(end))` gives the start. At a
+/// A cubic table over `s`, about `sqrt(1 - image / f(end))`, gives the start. At a
 /// fold `x` behaves like a square root of the distance to `f(end)`; in `s` it
 /// is smooth there, so the table serves the whole domain.
 #[derive(Debug, Clone)]
 pub(super) struct RadialInverse {
     end: f64,
     end_image: f64,
-    /// Largest |f''| on a fine grid, for the estimate of Newton's error.
-    bend: f64,
-    /// Value and (slope times step) at each node.
-    nodes: Vec<[f64; 2]>,
+    spread: Spread,
+    /// Each piece as a cubic in the way through it, 0 to 1.
+    pieces: Vec<[f64; 4]>,
+    /// Largest |f''| over each piece and its neighbours, for the estimate of
+    /// what a Newton step leaves.
+    bends: Vec<f64>,
+}
+
+/// How the table is laid over the image radius: `s^2` is 1 at the centre and 0
+/// at the end.
+#[derive(Debug, Clone, Copy)]
+struct Spread {
+    end: f64,
+    per_end: f64,
+    /// Radius up to which the pieces are fine; zero for even pieces.
+    knee: f64,
+}
+
+impl Spread {
+    /// A model that runs off to large radii (a pincushion, or coefficients
+    /// beyond their fit) spends its pieces on the inner part: `s^2 =
+    /// knee (end - image) / (end (knee + image))` instead of `1 - image / end`.
+    fn new(end: f64, knee: f64) -> Self {
+        let knee = if end > 3.0 * knee && knee > 0.0 { knee } else { 0.0 };
+        Self { end, per_end: 1.0 / end, knee }
+    }
+
+    /// `s^2` and its derivative by the image radius.
+    fn square(&self, image: f64) -> (f64, f64) {
+        if self.knee == 0.0 {
+            return (1.0 - image * self.per_end, -self.per_end);
+        }
+        let inverse = 1.0 / (self.knee + image);
+        let scale = self.knee * self.per_end * inverse;
+        ((self.end - image) * scale, -scale * inverse * (self.knee + self.end))
+    }
+
+    /// The image radius for a value of `s^2`.
+    fn image(&self, square: f64) -> f64 {
+        if self.knee == 0.0 {
+            return self.end * (1.0 - square);
+        }
+        self.end * (self.knee * (1.0 - square) / (self.knee + square * self.end))
+    }
+}
+
+/// A first guess.
+pub(super) struct Start {
+    /// The guess.
+    pub x: f64,
+    /// Its derivative by the image radius, infinite or far off only at the
+    /// domain's very end.
+    pub slope: f64,
+    /// Largest |f''| around.
+    pub bend: f64,
 }
 
 impl RadialInverse {
@@ -33,12 +84,13 @@ impl RadialInverse {
         if !(end > 0.0 && end.is_finite() && end_image > 0.0 && end_image.is_finite()) {
             return None;
         }
+        let spread = Spread::new(end_image, f(end.min(1.0)).0);
         let step = 1.0 / PIECES as f64;
         let mut nodes = Vec::with_capacity(PIECES + 1);
         nodes.push([end, 0.0]);
         for i in 1..PIECES {
             let s = i as f64 * step;
-            let image = end_image * (1.0 - s * s);
+            let image = spread.image(s * s);
             let start = nodes[i - 1][0];
             let x = bracketed_newton(
                 |x| {
@@ -51,26 +103,33 @@ impl RadialInverse {
             )
             .ok()?
             .value;
-            let slope = -2.0 * s * end_image / f(x).1;
+            let slope = 2.0 * s / (spread.square(image).1 * f(x).1);
             nodes.push([x, slope * step]);
         }
-        nodes.push([0.0, -2.0 * end_image / f(0.0).1 * step]);
+        nodes.push([0.0, 2.0 / (spread.square(0.0).1 * f(0.0).1) * step]);
         // At s = 0 the slope is 0/0 for a fold: take it from the neighbours.
         nodes[0][1] = -1.5 * nodes[0][0] + 2.0 * nodes[1][0] - 0.5 * nodes[2][0];
-        let mut bend: f64 = 0.0;
-        let grid = 4 * PIECES;
-        let mut before = f(0.0).1;
-        for i in 1..=grid {
-            let slope = f(end * i as f64 / grid as f64).1;
-            bend = bend.max((slope - before).abs() * grid as f64 / end);
-            before = slope;
-        }
-        (bend.is_finite() && nodes.iter().flatten().all(|v| v.is_finite())).then_some(Self {
-            end,
-            end_image,
-            bend,
-            nodes,
-        })
+        let pieces: Vec<[f64; 4]> = nodes
+            .windows(2)
+            .map(|pair| {
+                let ([x0, d0], [x1, d1]) = (pair[0], pair[1]);
+                let rise = x1 - x0;
+                [x0, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise]
+            })
+            .collect();
+        let bend_of = |pair: &[[f64; 2]]| {
+            let (low, high) = (pair[1][0], pair[0][0]);
+            let slopes = (0..=8).map(|k| f(low + (high - low) * f64::from(k) / 8.0).1);
+            let slopes: Vec<f64> = slopes.collect();
+            let rise = slopes.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+            rise * 8.0 / (high - low)
+        };
+        let bends: Vec<f64> = nodes.windows(2).map(bend_of).collect();
+        let near =
+            |i: usize| bends[i.saturating_sub(1)..(i + 2).min(PIECES)].iter().copied().fold(0.0, f64::max);
+        let bends: Vec<f64> = (0..PIECES).map(near).collect();
+        let finite = pieces.iter().flatten().chain(&bends).all(|v| v.is_finite());
+        finite.then_some(Self { end, end_image, spread, pieces, bends })
     }
 
     /// `f(end)`.
@@ -79,16 +138,18 @@ impl RadialInverse {
     }
 
     /// A first guess for `image` in `[0, f(end)]`.
-    pub fn start(&self, image: f64) -> f64 {
-        let s = (1.0 - image / self.end_image).max(0.0).sqrt() * PIECES as f64;
+    pub fn start(&self, image: f64) -> Start {
+        let (square, square_slope) = self.spread.square(image);
+        let s = square.max(0.0).sqrt() * PIECES as f64;
         let i = (s as usize).min(PIECES - 1);
         let t = s - i as f64;
-        let [x0, d0] = self.nodes[i];
-        let [x1, d1] = self.nodes[i + 1];
-        let rise = x1 - x0;
-        let c2 = 3.0 * rise - 2.0 * d0 - d1;
-        let c3 = d0 + d1 - 2.0 * rise;
-        x0 + t * (d0 + t * (c2 + t * c3))
+        let [x0, c1, c2, c3] = self.pieces[i];
+        let by_t = c1 + t * (2.0 * c2 + t * (3.0 * c3));
+        Start {
+            x: x0 + t * (c1 + t * (c2 + t * c3)),
+            slope: by_t * (0.5 * (PIECES * PIECES) as f64) * square_slope / s,
+            bend: self.bends[i],
+        }
     }
 
     /// The `x` in `[0, end]` with `f(x) = image`; `f` as in [`Self::new`].
@@ -99,7 +160,7 @@ impl RadialInverse {
             let rounding = self.end_image * super::limit::END_ROUNDING;
             return (image - self.end_image <= rounding).then_some(self.end);
         }
-        let mut x = self.start(image);
+        let Start { mut x, bend, .. } = self.start(image);
         for _ in 0..QUICK_STEPS {
             let (value, slope) = f(x);
             let step = (value - image) / slope;
@@ -108,7 +169,7 @@ impl RadialInverse {
                 break;
             }
             // Newton's next error is f'' step^2 / (2 f').
-            if step * step * self.bend <= 1e-17 * slope * x {
+            if step * step * bend <= 1e-17 * slope * x {
                 return Some(x);
             }
         }
@@ -116,6 +177,6 @@ impl RadialInverse {
             let (value, slope) = f(x);
             (value - image, slope)
         };
-        bracketed_newton(shifted, 0.0, self.end, self.start(image)).ok().map(|root| root.value)
+        bracketed_newton(shifted, 0.0, self.end, self.start(image).x).ok().map(|root| root.value)
     }
 }

@@ -9,6 +9,8 @@ use super::limit::Domain;
 use super::pinhole::Pinhole;
 use super::pupil::PupilShift;
 use super::{LensError, LensLimit, LensSpec, Model};
+use crate::numeric::LengthMismatch;
+use crate::numeric::batch::fill;
 
 /// A lens with its domain.
 ///
@@ -159,6 +161,31 @@ impl Lens {
         jacobian.column_mut(0).scale_mut(1.0 / fx);
         jacobian.column_mut(1).scale_mut(1.0 / fy);
         Ok((ray, jacobian))
+    }
+
+    /// [`Lens::unproject`] for each pixel, written to the place of the same
+    /// number; see [`crate::numeric::batch::fill`].
+    ///
+    /// # Errors
+    /// Slices of different length. The limits stand in the outputs.
+    pub fn unproject_all(
+        &self,
+        pixels: &[DVec2],
+        rays: &mut [Result<DVec3, LensLimit>],
+    ) -> Result<(), LengthMismatch> {
+        fill(pixels, rays, |&pixel| self.unproject(pixel))
+    }
+
+    /// [`Lens::project`] for each ray.
+    ///
+    /// # Errors
+    /// Slices of different length. The limits stand in the outputs.
+    pub fn project_all(
+        &self,
+        rays: &[DVec3],
+        pixels: &mut [Result<DVec2, LensLimit>],
+    ) -> Result<(), LengthMismatch> {
+        fill(rays, pixels, |&ray| self.project(ray))
     }
 
     /// Angle of a direction to the camera's axis, in radians.

@@ -201,7 +201,7 @@ fn rounded_outline(
         let (before, here, after) = (outline_mm[(i + n - 1) % n], outline_mm[i], outline_mm[(i + 1) % n]);
         let (arriving, leaving) = (here - before, after - here);
         let turn: f64 = arriving.angle_to(leaving);
-        if !here.is_finite() || !(turn > 0.0) || arriving.length() == 0.0 {
+        if !here.is_finite() || turn.is_nan() || turn <= 0.0 || arriving.length() == 0.0 {
             return Err(bad(name, "turn at a corner", turn, "to the left (convex, counter-clockwise)"));
         }
         if corner_radius_mm == 0.0 {

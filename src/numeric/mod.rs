@@ -6,11 +6,13 @@
 //! [`RootError`] that names what went wrong. No function returns NaN for a
 //! finite input.
 
+pub mod batch;
 mod polynomial;
 mod rigid;
 mod roots;
 mod rotation;
 
+pub use batch::LengthMismatch;
 pub use polynomial::Polynomial;
 pub use rigid::{ROTATION_TOLERANCE, Rigid, RigidError};
 pub use roots::{MAX_ITERATIONS, Root, RootError, bracketed_newton};

@@ -7,7 +7,8 @@ use glam::{DVec2, DVec3};
 use super::stack::{Path, Plate, travel};
 use super::{Channel, Layer, Limit, OpticsError, OpticsSpec};
 use crate::camera::Lens;
-use crate::numeric::{Rigid, RootError, bracketed_newton};
+use crate::numeric::batch::fill;
+use crate::numeric::{LengthMismatch, Rigid, RootError, bracketed_newton};
 
 /// Rounding slack at the dome's rim, relative to its radius: a ray that meets
 /// the sheet's top this little outside the base circle still meets the rim.
@@ -249,6 +250,31 @@ impl SensorOptics {
     /// The limit that the point is past.
     pub fn project(&self, point_mm: DVec3) -> Result<DVec2, Limit> {
         Ok(self.lens.project(self.chief_ray(point_mm)?)?)
+    }
+
+    /// [`SensorOptics::trace`] for each pixel, written to the place of the same
+    /// number; see [`crate::numeric::batch::fill`].
+    ///
+    /// # Errors
+    /// Slices of different length. The limits stand in the outputs.
+    pub fn trace_all(
+        &self,
+        pixels: &[DVec2],
+        hits: &mut [Result<SurfacePoint, Limit>],
+    ) -> Result<(), LengthMismatch> {
+        fill(pixels, hits, |&pixel| self.trace(pixel))
+    }
+
+    /// [`SensorOptics::project`] for each point.
+    ///
+    /// # Errors
+    /// Slices of different length. The limits stand in the outputs.
+    pub fn project_all(
+        &self,
+        points_mm: &[DVec3],
+        pixels: &mut [Result<DVec2, Limit>],
+    ) -> Result<(), LengthMismatch> {
+        fill(points_mm, pixels, |&point| self.project(point))
     }
 
     /// Direction in air, camera frame, of the ray through a point.

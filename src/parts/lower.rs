@@ -28,9 +28,10 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     genus += 1;
 
     for (i, &azimuth_deg) in lower.clamp.azimuth_deg.iter().enumerate() {
-        let along_x = DAffine3::from_translation(DVec3::new(m.pupil_mm().x, m.pupil_mm().y, lower.clamp.z_mm))
-            * DAffine3::from_rotation_z(azimuth_deg.to_radians())
-            * DAffine3::from_rotation_y(std::f64::consts::FRAC_PI_2);
+        let along_x =
+            DAffine3::from_translation(DVec3::new(m.pupil_mm().x, m.pupil_mm().y, lower.clamp.z_mm))
+                * DAffine3::from_rotation_z(azimuth_deg.to_radians())
+                * DAffine3::from_rotation_y(std::f64::consts::FRAC_PI_2);
         let hole = Shape::cylinder(0.5 * lower.clamp.hole_diameter_mm, 0.0, reach, Fit::Outside);
         c.cut.push(Piece::new(format!("clamp hole {i}"), hole).placed(along_x));
         genus += 1;
@@ -59,7 +60,8 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     if lower.wire_hole_diameter_mm > 0.0 {
         for (i, led) in m.leds.list.iter().enumerate() {
             let at = polar(lower.wire_hole_ring_radius_mm, led.azimuth_deg);
-            let hole = Shape::cylinder(0.5 * lower.wire_hole_diameter_mm, bottom - over, top + over, Fit::Area);
+            let hole =
+                Shape::cylinder(0.5 * lower.wire_hole_diameter_mm, bottom - over, top + over, Fit::Area);
             c.cut.push(Piece::new(format!("wire hole {i}"), hole).at(at.x, at.y));
             genus += 1;
         }

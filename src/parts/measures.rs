@@ -84,8 +84,8 @@ fn axial_travel_mm(design: &Design) -> f64 {
     };
     let solid_mm = (springs.active_coils + dead_coils) * springs.wire_diameter_mm;
     let clear_mm = springs.stop_clearance_mm.unwrap_or(springs.free_length_mm);
-    let camera_front_mm = design.sensor_from_camera().translation_mm.z
-        + design.sections().camera_body.front_from_pupil_mm;
+    let camera_front_mm =
+        design.sensor_from_camera().translation_mm.z + design.sections().camera_body.front_from_pupil_mm;
     let above_camera_mm = design.sheet_underside_z_mm() - camera_front_mm;
     (springs.free_length_mm - solid_mm).min(clear_mm).min(above_camera_mm).max(0.0)
 }

@@ -64,6 +64,8 @@ pub(crate) struct Blueprint {
     pub chord: Chord,
 }
 
+type Maker = fn(&Measures) -> Result<Blueprint, PartError>;
+
 impl Blueprint {
     fn build(self) -> Result<Part, PartError> {
         let Self { name, summary, construction, genus, chord } = self;
@@ -103,7 +105,10 @@ impl Part {
         let problem = found.problem().or_else(|| {
             let genus = found.genus()?;
             (genus != self.genus).then(|| {
-                format!("its mesh has {genus} handles, its features make {}: features touch or miss", self.genus)
+                format!(
+                    "its mesh has {genus} handles, its features make {}: features touch or miss",
+                    self.genus
+                )
             })
         });
         match problem {
@@ -134,7 +139,6 @@ pub fn build(design: &Design) -> Result<Vec<Part>, PartError> {
 /// # Errors
 /// As [`build`].
 pub fn build_measured(measures: &Measures) -> Result<Vec<Part>, PartError> {
-    let makers: [fn(&Measures) -> Result<Blueprint, PartError>; 4] =
-        [upper::blueprint, lower::blueprint, mould::cavity, mould::base];
+    let makers: [Maker; 4] = [upper::blueprint, lower::blueprint, mould::cavity, mould::base];
     makers.par_iter().map(|make| make(measures)?.build()).collect::<Vec<_>>().into_iter().collect()
 }

@@ -37,10 +37,8 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
 
     let recess = 0.5 * m.sheet_size_mm + glam::DVec2::splat(m.sheet.clearance_mm);
     if upper.rim_height_mm > 0.0 {
-        let pocket = Shape::cuboid(
-            DVec3::new(-recess.x, -recess.y, seat),
-            DVec3::new(recess.x, recess.y, top + over),
-        );
+        let pocket =
+            Shape::cuboid(DVec3::new(-recess.x, -recess.y, seat), DVec3::new(recess.x, recess.y, top + over));
         c.cut.push(Piece::new("sheet recess", pocket));
     }
 
@@ -101,6 +99,9 @@ fn led_seat(m: &Measures, i: usize, c: &mut Construction) -> i64 {
         DVec3::new(half_width, out, front),
     );
     c.cut.push(Piece::new(format!("LED pit {i}"), pit).placed(platform_from_led));
+    if let Some(notch) = rim_notch(m, &platform_from_led, half_width, back, i) {
+        c.cut.push(notch);
+    }
 
     // From the window over the lip into the pit, open above.
     let azimuth = DAffine3::from_rotation_z(leds.list[i].azimuth_deg.to_radians());
@@ -132,6 +133,39 @@ fn led_seat(m: &Measures, i: usize, c: &mut Construction) -> i64 {
     };
     c.cut.push(Piece::new(format!("LED wire hole {i}"), hole).at(foot.x, foot.y));
     1
+}
+
+/// Where the pit would leave less of the rim than can be printed, the rim is
+/// opened over the board instead, from the seat upwards.
+fn rim_notch(
+    m: &Measures,
+    platform_from_led: &DAffine3,
+    half_width_mm: f64,
+    back_mm: f64,
+    i: usize,
+) -> Option<Piece> {
+    if m.platforms.upper.rim_height_mm <= 0.0 {
+        return None;
+    }
+    let (top, seat, over) = (m.upper_top_z_mm(), m.seat_z_mm(), m.overcut_mm);
+    // The pit's back edge at the height of the rim's top.
+    let across = platform_from_led.matrix3.x_axis;
+    let back = platform_from_led.transform_point3(DVec3::NEG_Z * back_mm);
+    let up = platform_from_led.matrix3.y_axis;
+    let edge = back + up * ((top - back.z) / up.z.max(0.1));
+    let half_outer = 0.5 * m.outer_mm;
+    let corners = [-1.0, 1.0].map(|side| (edge + across * (side * half_width_mm)).truncate());
+    let wall = corners.iter().map(|p| (half_outer - p.abs()).min_element()).fold(f64::INFINITY, f64::min);
+    if wall >= m.process.min_wall_mm {
+        return None;
+    }
+    let half = half_width_mm + CHANNEL_STEP_MM;
+    let box_out = Shape::cuboid(
+        DVec3::new(m.leds.center_radius_mm, -half, seat),
+        DVec3::new(2.0 * m.outer_mm.length(), half, top + over),
+    );
+    let turn = DAffine3::from_rotation_z(m.leds.list.get(i)?.azimuth_deg.to_radians());
+    Some(Piece::new(format!("rim notch {i}"), box_out).placed(turn))
 }
 
 /// Pose of LED `i`: origin at the centre of its emitting face, x across the

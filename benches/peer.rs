@@ -1,0 +1,109 @@
+//! The Rust side of `scripts/compare_opencv.py`: reads lenses and pixels,
+//! writes what domecast makes of them and how long it took, one thread.
+//!
+//! `cargo bench --bench peer -- IN.json OUT.json`
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use domecast::camera::{Lens, LensSpec, Model};
+use domecast::numeric::Rigid;
+use domecast::optics::{Layer, OpticsSpec, SensorOptics};
+use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
+
+#[derive(Deserialize)]
+struct Case {
+    name: String,
+    model: String,
+    width: u32,
+    height: u32,
+    matrix: [[f64; 3]; 3],
+    distortion: Vec<f64>,
+    field_of_view_deg: f64,
+    pixels: Vec<[f64; 2]>,
+}
+
+#[derive(Serialize)]
+struct Answer {
+    name: String,
+    max_field_angle_deg: f64,
+    fold_angle_deg: Option<f64>,
+    lens_ns: f64,
+    trace_ns: f64,
+    project_ns: f64,
+    traced: usize,
+    rays: Vec<Option<[f64; 3]>>,
+}
+
+/// Rounds of which the fastest counts.
+const ROUNDS: usize = 15;
+
+fn best_ns<T>(points: usize, mut run: impl FnMut() -> T) -> f64 {
+    let mut best = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let start = Instant::now();
+        black_box(run());
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    best * 1e9 / points.max(1) as f64
+}
+
+fn answer(case: Case) -> Answer {
+    let spec = LensSpec {
+        model: Model::parse(&case.model).expect("a known model"),
+        width: case.width,
+        height: case.height,
+        matrix: case.matrix,
+        distortion: case.distortion,
+        field_of_view_rad: case.field_of_view_deg.to_radians(),
+        pupil_shift_mm: Vec::new(),
+    };
+    let lens = Lens::new(spec.clone()).expect("a usable lens");
+    let layer = |name: &str, index: f64, thickness_mm| Layer {
+        name: name.to_owned(),
+        index: [index; 3],
+        thickness_mm,
+    };
+    let optics = SensorOptics::new(&OpticsSpec {
+        lens: spec,
+        sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0)),
+        layers: vec![layer("acrylic", 1.491, Some(1.0)), layer("silicone", 1.41, None)],
+        // Large enough that every ray ends on the dome: the whole way is timed.
+        dome_radius_mm: 1000.0,
+    })
+    .expect("usable optics");
+    let pixels: Vec<DVec2> = case.pixels.into_iter().map(DVec2::from_array).collect();
+    let mut rays = vec![Ok(DVec3::Z); pixels.len()];
+    let mut hits: Vec<_> = pixels.iter().map(|&p| optics.trace(p)).collect();
+    let lens_ns = best_ns(pixels.len(), || lens.unproject_all(&pixels, &mut rays).is_ok());
+    let trace_ns = best_ns(pixels.len(), || optics.trace_all(&pixels, &mut hits).is_ok());
+    let points: Vec<DVec3> = hits.iter().flatten().map(|hit| hit.surface_mm).collect();
+    let mut back = vec![Ok(DVec2::ZERO); points.len()];
+    let project_ns = best_ns(points.len(), || optics.project_all(&points, &mut back).is_ok());
+    Answer {
+        name: case.name,
+        max_field_angle_deg: lens.max_field_angle_rad().to_degrees(),
+        fold_angle_deg: lens.fold_angle_rad().map(f64::to_degrees),
+        lens_ns,
+        trace_ns,
+        project_ns,
+        traced: points.len(),
+        rays: rays.iter().map(|r| r.ok().map(|r| r.to_array())).collect(),
+    }
+}
+
+fn main() {
+    let files: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let [input, output] = files.as_slice() else {
+        // `cargo test --benches` runs this without arguments.
+        println!("usage: cargo bench --bench peer -- IN.json OUT.json");
+        return;
+    };
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("one thread");
+    let text = std::fs::read_to_string(input).expect("the input file");
+    let cases: Vec<Case> = serde_json::from_str(&text).expect("a list of cases");
+    let answers: Vec<Answer> = cases.into_iter().map(answer).collect();
+    let text = serde_json::to_string(&answers).expect("finite numbers");
+    std::fs::write(output, text).expect("the output file");
+}

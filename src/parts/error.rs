@@ -70,15 +70,24 @@ impl From<PartError> for DesignError {
                 format!("{part}: {place}: {value_mm:.4} mm"),
                 format!("a limit of {limit_mm:.4} mm"),
             ),
-            PartError::View { problem, field } => {
-                Self::at(field, "", format!("the camera's view: {problem}"), "a view that the platform leaves open")
-            }
-            PartError::Mesh { part, error } => {
-                Self::at("mesh.chord_tolerance_mm", "", format!("{part}: {error}"), "a tolerance that suits the size")
-            }
-            PartError::Broken { part, problem } => {
-                Self::at("platforms", "", format!("{part}: {problem}"), "features that neither touch nor overlap")
-            }
+            PartError::View { problem, field } => Self::at(
+                field,
+                "",
+                format!("the camera's view: {problem}"),
+                "a view that the platform leaves open",
+            ),
+            PartError::Mesh { part, error } => Self::at(
+                "mesh.chord_tolerance_mm",
+                "",
+                format!("{part}: {error}"),
+                "a tolerance that suits the size",
+            ),
+            PartError::Broken { part, problem } => Self::at(
+                "platforms",
+                "",
+                format!("{part}: {problem}"),
+                "features that neither touch nor overlap",
+            ),
         }
     }
 }

@@ -191,7 +191,7 @@ fn lay_out(design: &Design) -> Result<(LayoutSpec, Layout), DesignError> {
 /// Makers report the field at fault; its value stands in the design.
 fn with_value(design: &Design, mut error: DesignError) -> DesignError {
     if error.value.is_empty() && !error.field.is_empty() {
-        let pointer = format!("/{}", error.field.replace('.', "/").replace('[', "/").replace(']', ""));
+        let pointer = format!("/{}", error.field.replace(['.', '['], "/").replace(']', ""));
         let tree: serde_json::Value = serde_json::from_str(design.text()).unwrap_or_default();
         if let Some(value) = tree.pointer(&pointer) {
             let filled = DesignError::at(error.field.clone(), value, "", "");

@@ -68,6 +68,12 @@ impl From<drawing::NotFinite> for RenderError {
     }
 }
 
+/// Path of the film of a hit in a build, for a kind of file (`svg`): `artwork/dots.svg` for the first hit,
+/// `artwork/dots-2.svg` for the second.
+pub fn film_path(hit: usize, kind: &str) -> String {
+    if hit == 0 { format!("artwork/dots.{kind}") } else { format!("artwork/dots-{}.{kind}", hit + 1) }
+}
+
 /// All artwork of a layout, in a fixed order.
 ///
 /// # Errors
@@ -75,21 +81,24 @@ impl From<drawing::NotFinite> for RenderError {
 pub fn files(spec: &LayoutSpec, layout: &Layout, label: &FilmLabel) -> Result<Vec<ArtworkFile>, RenderError> {
     let mut files = Vec::new();
     for hit in 0..layout.hits.len() {
-        let stem = if hit == 0 { "dots".to_owned() } else { format!("dots-{}", hit + 1) };
         let drawing = film(layout, hit, spec.print.pad_over_image, label)?;
-        files.extend(film_files(&drawing, &stem, spec)?);
+        files.extend(film_files(&drawing, |kind| film_path(hit, kind), spec)?);
     }
     let target = print_target(&layout.transfer, &spec.print);
     let drawing = target_film(&target, &layout.transfer, spec.print.pad_over_image, label)?;
-    files.extend(film_files(&drawing, "print-target", spec)?);
+    files.extend(film_files(&drawing, |kind| format!("artwork/print-target.{kind}"), spec)?);
     files.push(ArtworkFile { path: "artwork/camera-view.png".into(), bytes: camera_view(spec, layout)? });
     files.push(ArtworkFile { path: "artwork/outside-view.png".into(), bytes: outside_view(layout)? });
     Ok(files)
 }
 
 /// One film in every format.
-fn film_files(drawing: &Drawing, stem: &str, spec: &LayoutSpec) -> Result<[ArtworkFile; 4], RenderError> {
-    let file = |kind: &str, bytes: Vec<u8>| ArtworkFile { path: format!("artwork/{stem}.{kind}"), bytes };
+fn film_files(
+    drawing: &Drawing,
+    path: impl Fn(&str) -> String,
+    spec: &LayoutSpec,
+) -> Result<[ArtworkFile; 4], RenderError> {
+    let file = |kind: &str, bytes: Vec<u8>| ArtworkFile { path: path(kind), bytes };
     Ok([
         file("svg", to_svg(drawing)),
         file("pdf", to_pdf(drawing)?),

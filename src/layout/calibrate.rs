@@ -128,15 +128,16 @@ pub fn calibrate(
         })
         .collect();
     let radius_mm = transfer.dome_radius_mm();
-    let fit = fit::fit(radius_mm, &samples, table.measured_in).map_err(|error| {
-        let lines = match &error {
-            FitError::TooManyOutliers { samples, .. } => samples.clone(),
-            FitError::NotFinite { sample } => vec![*sample],
-            _ => Vec::new(),
-        };
-        let lines = lines.iter().filter_map(|i| table.rows.get(*i)).map(|row| row.line).collect();
-        CalibrateError::Fit { error, lines }
-    })?;
+    let fit = fit::fit(radius_mm, &samples, table.measured_in, spec.print.wrap_limit_deg.to_radians())
+        .map_err(|error| {
+            let lines = match &error {
+                FitError::TooManyOutliers { samples, .. } => samples.clone(),
+                FitError::NotFinite { sample } => vec![*sample],
+                _ => Vec::new(),
+            };
+            let lines = lines.iter().filter_map(|i| table.rows.get(*i)).map(|row| row.line).collect();
+            CalibrateError::Fit { error, lines }
+        })?;
     let fitted = TransferMap::new(radius_mm, fit.nominal, Some(fit.correction.clone()))
         .map_err(|error| CalibrateError::Fit { error: FitError::Folds(error), lines: Vec::new() })?;
     let error_mm = |map: &TransferMap| {

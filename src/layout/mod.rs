@@ -8,7 +8,10 @@
 pub mod boundary;
 pub mod calibrate;
 mod carry;
+mod chance;
+pub mod coverage;
 pub mod dot;
+pub mod evenness;
 pub mod fill;
 pub mod frame;
 mod gaps;
@@ -18,6 +21,7 @@ pub mod neighbors;
 pub mod outline;
 pub mod pattern;
 pub mod region;
+pub mod report;
 mod spec;
 pub mod target;
 #[cfg(test)]

@@ -61,6 +61,8 @@ pub struct Fit {
     pub rejected: Vec<usize>,
     /// Number of free numbers of the model.
     pub parameters: usize,
+    /// Polar angle of the outermost sample used, rad; beyond it the map is carried on by its formula.
+    pub measured_to_rad: f64,
 }
 
 /// A measurement to which no map can be fitted.
@@ -155,11 +157,17 @@ struct Problem<'a> {
     measured_in: MeasuredIn,
 }
 
-/// Fits a measured map.
+/// Fits a measured map. It is carried on to `reach_rad` (the pad's wrap limit), even if the marks landed less far,
+/// as long as it does not fold there; a soft pad draws a target together, and its next print reaches further.
 ///
 /// # Errors
 /// See [`FitError`].
-pub fn fit(dome_radius_mm: f64, samples: &[Sample], measured_in: MeasuredIn) -> Result<Fit, FitError> {
+pub fn fit(
+    dome_radius_mm: f64,
+    samples: &[Sample],
+    measured_in: MeasuredIn,
+    reach_rad: f64,
+) -> Result<Fit, FitError> {
     if samples.len() < FEWEST_SAMPLES {
         return Err(FitError::TooFew { have: samples.len(), need: FEWEST_SAMPLES });
     }
@@ -186,7 +194,12 @@ pub fn fit(dome_radius_mm: f64, samples: &[Sample], measured_in: MeasuredIn) -> 
         if count < model.parameters() {
             continue;
         }
-        let Ok(correction) = problem.solve(model, &weights) else { continue };
+        let Ok(mut correction) = problem.solve(model, &weights) else { continue };
+        let measured_rad = correction.max_polar_rad;
+        correction.max_polar_rad = measured_rad.max(reach_rad.min(FURTHEST_RAD));
+        if TransferMap::new(dome_radius_mm, model.nominal, Some(correction.clone())).is_err() {
+            correction.max_polar_rad = measured_rad;
+        }
         if let Err(error) = TransferMap::new(dome_radius_mm, model.nominal, Some(correction.clone())) {
             folded.get_or_insert(error);
             continue;
@@ -380,6 +393,10 @@ impl Problem<'_> {
             lack_of_fit_mm,
             rejected,
             parameters: model.parameters(),
+            measured_to_rad: (self.polar.iter().zip(used))
+                .filter(|(_, used)| **used)
+                .map(|(at, _)| at.polar_rad)
+                .fold(0.0, f64::max),
         }
     }
 }

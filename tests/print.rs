@@ -246,3 +246,67 @@ fn a_table_at_fault_is_refused_with_its_line() {
     let message = String::from_utf8(run.stderr).expect("UTF-8");
     assert_eq!(run.status.code(), Some(1), "{message}");
 }
+
+/// Designs that differ from the paper's in what the films hold.
+#[test]
+fn films_read_by_others_hold_every_dot() {
+    let Some(python) = std::env::var_os("DOMECAST_PYTHON") else {
+        println!("DOMECAST_PYTHON names no Python with the readers of scripts/requirements.txt: passed over");
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let measured = serde_json::json!({
+        "radial": [0.02, -0.03, 0.01], "two_fold": [0.01, 0.004], "two_fold_sideways": [0.004, -0.01],
+        "rotation_deg": 0.7, "offset_mm": [0.1, -0.06], "max_polar_deg": 66.0,
+    });
+    let variants = [
+        (
+            "split",
+            serde_json::json!({
+                "pattern": {"kind": "fill", "polar_angle_deg": 70.0},
+                "print": {"hits": "split", "wrap_limit_deg": 40.0, "wrap_warn_deg": 40.0, "min_dot_mm": 0.2},
+            }),
+        ),
+        (
+            "measured",
+            serde_json::json!({
+                "pattern": {"kind": "hexagonal", "even_in": "undistorted", "dot_diameter_px": 5.0, "pitch_px": 12.0},
+                "print": {"transfer": "equidistant", "measured": measured, "dpi": 1200},
+            }),
+        ),
+        (
+            "rings",
+            serde_json::json!({
+                "pattern": {"kind": "rings", "dot_diameter_px": null, "dot_diameter_mm": 0.6, "pitch_px": null,
+                            "count": 90, "polar_angle_deg": 50.0},
+                "print": {"transfer": "equal_area"},
+            }),
+        ),
+    ];
+    let mut builds = Vec::new();
+    for (name, changes) in variants {
+        let mut design: Value =
+            serde_json::from_str(&fs::read_to_string(DESIGN).expect("read")).expect("JSON");
+        design["name"] = Value::from(name);
+        for (section, fields) in changes.as_object().expect("an object") {
+            for (field, value) in fields.as_object().expect("an object") {
+                let section = design[section].as_object_mut().expect("an object");
+                if value.is_null() {
+                    section.remove(field)
+                } else {
+                    section.insert(field.clone(), value.clone())
+                };
+            }
+        }
+        fs::write(at.join("variant.json"), design.to_string()).expect("written");
+        let run = domecast(&["build", "variant.json", "--out", name], at);
+        assert!(run.status.success(), "{name}: {}", String::from_utf8_lossy(&run.stderr));
+        assert!(domecast(&["check", name], at).status.success(), "{name}");
+        builds.push(at.join(name));
+    }
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/check_artwork");
+    let run = Command::new(python).arg(script).args(&builds).output().expect("it runs");
+    let said = String::from_utf8_lossy(&run.stdout).into_owned() + &String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{said}");
+}

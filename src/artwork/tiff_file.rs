@@ -1,6 +1,6 @@
 //! Drawings as 1-bit TIFF at a chosen resolution.
 //!
-//! A pixel is black where its centre lies in the ink. Rows are packed one by one with PackBits, which every
+//! A pixel is black where at least half of it lies in the ink. Rows are packed one by one with PackBits, which every
 //! reader of baseline TIFF knows. Only a band of rows is held as a picture at a time.
 
 use std::io::Cursor;
@@ -64,7 +64,7 @@ pub fn to_tiff(drawing: &Drawing, dpi: u32) -> Result<Vec<u8>, RenderError> {
         let mut mask = Mask::new(width, rows).ok_or(RenderError::Size)?;
         for i in &active {
             let shift = Transform::from_translate(0.0, -(top as f32));
-            mask.fill_path(&inked[*i].path, FillRule::Winding, false, shift);
+            mask.fill_path(&inked[*i].path, FillRule::Winding, true, shift);
         }
         let packed = pack(mask.data(), width as usize)?;
         counts.push(u32::try_from(packed.len()).map_err(|_| RenderError::Size)?);

@@ -48,7 +48,16 @@ impl From<LayoutError> for BuildError {
 
 impl From<RenderError> for BuildError {
     fn from(error: RenderError) -> Self {
-        Self::Ours(format!("the artwork could not be drawn: {error}"))
+        match error {
+            RenderError::Size => DesignError::at(
+                "print.dpi",
+                "",
+                "the film would be wider or higher than 60000 px at this resolution",
+                "a lower resolution, or a smaller dome",
+            )
+            .into(),
+            error => Self::Ours(format!("the artwork could not be drawn: {error}")),
+        }
     }
 }
 

@@ -12,7 +12,7 @@ mod chance;
 pub mod coverage;
 pub mod dot;
 pub mod evenness;
-pub mod fill;
+mod fill;
 pub mod frame;
 mod gaps;
 mod hits;

@@ -449,3 +449,35 @@ fn coverage_shrinks_as_the_camera_comes_closer() {
     assert!(under.seen_by_lens < 0.9 && under.whole_to_deg < 80.0, "{under:?}");
     assert!(under.in_mask <= under.on_raster && under.on_raster <= under.seen_by_lens);
 }
+
+#[test]
+fn outlines_measure_themselves_exactly() {
+    // An ellipse, traced; its area and centroid are known.
+    let (half, center) = (DVec2::new(3.0, 1.5), DVec2::new(10.0, -7.0));
+    let curve = |angle: f64| -> Result<outline::CurvePoint, ()> {
+        let (sin, cos) = angle.sin_cos();
+        let at = center + DVec2::new(half.x * cos, half.y * sin);
+        Ok(outline::CurvePoint { at, slope: DVec2::new(-half.x * sin, half.y * cos) })
+    };
+    for tolerance in [1e-2, 1e-4, 1e-6] {
+        let (outline, fit) = outline::Outline::of_curve(curve, tolerance).unwrap();
+        assert!(fit.reached && fit.error <= tolerance);
+        let area = std::f64::consts::PI * half.x * half.y;
+        assert!((outline.signed_area() / area - 1.0).abs() < tolerance);
+        assert!((outline.centroid() - center).length() < 1e-12);
+        // Against a fine polygon of the cubics themselves.
+        let polygon = outline.polygon(2000);
+        let next = polygon.iter().cycle().skip(1);
+        let flat =
+            0.5 * polygon.iter().zip(next).map(|(a, b)| (*a - center).perp_dot(*b - center)).sum::<f64>();
+        assert!((outline.signed_area() / flat - 1.0).abs() < 1e-6);
+        let (narrow, wide) = outline.widths();
+        assert!((narrow - 3.0).abs() < 0.01 && (wide - 6.0).abs() < 0.01, "{narrow} {wide}");
+        for corner in outline.polygon_within(tolerance) {
+            let on = ((corner - center) / half).length();
+            assert!((on - 1.0).abs() < tolerance);
+        }
+    }
+    // A failure of the curve is the failure of the outline.
+    assert_eq!(outline::Outline::of_curve(|_| Err("no"), 1.0), Err("no"));
+}

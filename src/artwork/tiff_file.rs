@@ -88,7 +88,6 @@ pub fn to_tiff(drawing: &Drawing, dpi: u32) -> Result<Vec<u8>, RenderError> {
     let description: String = drawing.description.chars().filter(char::is_ascii).collect();
     directory.write_tag(Tag::ImageDescription, description.as_str()).map_err(fault)?;
     directory.finish().map_err(fault)?;
-    drop(encoder);
     Ok(bytes.into_inner())
 }
 

@@ -218,7 +218,10 @@ impl BrownConrady {
         {
             return Ok(x);
         }
-        let start = self.inverse.start(distance.min(self.inverse.end_image())).x;
+        let start = self
+            .inverse
+            .solve(distance.min(self.inverse.end_image()), |r| radius(&self.numerator, &self.denominator, r))
+            .ok_or(self.domain.limit)?;
         let mut x = if distance > 0.0 { image * (start / distance) } else { image };
         let (mut value, mut slope) = self.continued(x);
         let mut error = (value - image).length();

@@ -1,8 +1,8 @@
 //! Lenses and refraction never lie: golden values, an independent reference in
 //! double-double arithmetic, and the fuzz run.
 //!
-//! Tests whose names begin with `long_` are ignored by default; run them with
-//! `cargo nextest run --release --run-ignored all -E 'test(/long_/)'`.
+//! Tests whose names begin with `long_` belong to the long suite
+//! (`scripts/test --all`).
 
 mod batch;
 mod cases;

@@ -175,7 +175,7 @@ impl<'a> Lens<'a> {
             }
             a = a - sx;
             b = b - sy;
-            if sx.hi.abs() + sy.hi.abs() < 1e-28 * (a.hi.abs() + b.hi.abs() + 1e-6) {
+            if sx.hi.abs() + sy.hi.abs() < 1e-20 * (a.hi.abs() + b.hi.abs() + 1e-6) {
                 return Some(unit([a, b, dd(1.0)]));
             }
         }

@@ -71,6 +71,8 @@ pub struct PinholeComparison {
 pub struct ToleranceReport {
     /// Sensors drawn.
     pub samples: usize,
+    /// Dots that were followed, with their neighbours: all, or an even choice of a large pattern.
+    pub dots: usize,
     /// Sensors of which a dot could not be seen; they count in no figure.
     pub blind: usize,
     /// Variation of the nearest distances in the image that half of the sensors keep to.
@@ -107,6 +109,10 @@ const TOLERANCES: [&str; 8] = [
     "print_scatter_mm",
 ];
 
+/// Patterns of more dots are judged by an even choice of about this many, so that the time does not grow with
+/// the pattern: the figures are means over dots, and a thousand of them are known to a few percent.
+const MOST_FOLLOWED: usize = 1500;
+
 /// Sensors for each entry of the ranking, at most.
 const RANKING_SAMPLES: u32 = 48;
 
@@ -140,15 +146,30 @@ fn evenness<P: Copy>(
     distance: impl Fn(P, P) -> f64,
     together: impl Fn(usize, usize) -> bool,
 ) -> Option<Evenness> {
+    evenness_of(layout, 0..layout.dots.len(), places, distance, together)
+}
+
+/// [`evenness`] around some of the dots.
+fn evenness_of<P: Copy>(
+    layout: &Layout,
+    chosen: impl Iterator<Item = usize>,
+    places: &[Option<P>],
+    distance: impl Fn(P, P) -> f64,
+    together: impl Fn(usize, usize) -> bool,
+) -> Option<Evenness> {
     let lengths = |i: usize| {
         let near = layout.dots[i].neighbors.iter().map(|j| *j as usize).filter(move |j| *j != i);
         let near = near.filter(|j| together(i, *j));
         near.filter_map(|j| Some((j, distance(places[i]?, places[j]?)))).collect::<Vec<_>>()
     };
-    let all: Vec<Vec<(usize, f64)>> = (0..layout.dots.len()).map(lengths).collect();
-    let nearest = all.iter().filter(|list| !list.is_empty());
-    let nearest = spread(nearest.map(|list| list.iter().map(|(_, d)| *d).fold(f64::INFINITY, f64::min)))?;
-    let edges = all.iter().enumerate().flat_map(|(i, list)| list.iter().filter(move |(j, _)| *j > i));
+    let all: Vec<(usize, Vec<(usize, f64)>)> = chosen.map(|i| (i, lengths(i))).collect();
+    let nearest = all.iter().filter(|(_, list)| !list.is_empty());
+    let nearest =
+        spread(nearest.map(|(_, list)| list.iter().map(|(_, d)| *d).fold(f64::INFINITY, f64::min)))?;
+    // Both ends of an edge tell of it; it counts where the lower one does, or always if only some dots are
+    // chosen and both ends rarely are.
+    let some = all.len() < layout.dots.len();
+    let edges = all.iter().flat_map(|(i, list)| list.iter().filter(move |(j, _)| some || *j > *i));
     Some(Evenness { nearest, edges: spread(edges.map(|(_, d)| *d))? })
 }
 
@@ -211,14 +232,15 @@ pub fn under_tolerances(
     tolerances: &TolerancesSection,
 ) -> Option<ToleranceReport> {
     let image: Vec<_> = layout.dots.iter().map(|dot| Some(dot.image_px)).collect();
-    let own = evenness(layout, &image, in_plane, |_, _| true)?.nearest.variation;
+    let followed = Followed::new(layout);
+    let own = evenness_of(layout, followed.chosen(), &image, in_plane, |_, _| true)?.nearest.variation;
     let draw = |only: Option<usize>, count: u32| -> Vec<Option<(f64, f64)>> {
         let stream = only.map_or(0, |index| index as u64 + 1) << 32;
         (0..count)
             .into_par_iter()
             .map(|sample| {
                 let mut chance = Chance::new(tolerances.seed, stream + u64::from(sample));
-                sensor(spec, layout, tolerances, only, &mut chance)
+                sensor(spec, layout, &followed, tolerances, only, &mut chance)
             })
             .collect()
     };
@@ -247,6 +269,7 @@ pub fn under_tolerances(
     ranking.sort_by(|a, b| b.added_variation.total_cmp(&a.added_variation));
     Some(ToleranceReport {
         samples: drawn.len(),
+        dots: followed.chosen().count(),
         blind: drawn.iter().filter(|sample| sample.is_none()).count(),
         nearest_variation_median: at(0.5)?,
         nearest_variation_p95: at(0.95)?,
@@ -255,11 +278,39 @@ pub fn under_tolerances(
     })
 }
 
+/// The dots that are followed through the drawn sensors.
+struct Followed {
+    step: usize,
+    /// For each dot, whether its place is needed: because it is followed, or because a neighbour is.
+    needed: Vec<bool>,
+}
+
+impl Followed {
+    fn new(layout: &Layout) -> Self {
+        let step = layout.dots.len().div_ceil(MOST_FOLLOWED).max(1);
+        let mut needed = vec![false; layout.dots.len()];
+        for (i, dot) in layout.dots.iter().enumerate().step_by(step) {
+            needed[i] = true;
+            for j in &dot.neighbors {
+                if let Some(needed) = needed.get_mut(*j as usize) {
+                    *needed = true;
+                }
+            }
+        }
+        Self { step, needed }
+    }
+
+    fn chosen(&self) -> impl Iterator<Item = usize> {
+        (0..self.needed.len()).step_by(self.step)
+    }
+}
+
 /// One sensor: variation of the nearest distances in its image, and the mean shift of its dots, px. All
 /// tolerances are drawn in the same order whether they count or not.
 fn sensor(
     spec: &LayoutSpec,
     layout: &Layout,
+    followed: &Followed,
     tolerances: &TolerancesSection,
     only: Option<usize>,
     chance: &mut Chance,
@@ -302,7 +353,11 @@ fn sensor(
     let seen: Option<Vec<Option<DVec2>>> = layout
         .dots
         .iter()
-        .map(|dot| {
+        .zip(&followed.needed)
+        .map(|(dot, needed)| {
+            if !needed {
+                return Some(None);
+            }
             let (shift_mm, turn) = *moved.get(dot.hit)?;
             let scatter_mm = chance.normal_pair() * tolerances.print_scatter_mm * counts(7);
             let plate_mm = turn.rotate(dot.plate_mm) + shift_mm + scatter_mm;
@@ -312,10 +367,10 @@ fn sensor(
         })
         .collect();
     let seen = seen?;
-    let variation = evenness(layout, &seen, in_plane, |_, _| true)?.nearest.variation;
-    let shifts =
-        layout.dots.iter().zip(&seen).filter_map(|(dot, place)| Some(place.as_ref()?.distance(dot.image_px)));
-    Some((variation, shifts.sum::<f64>() / layout.dots.len() as f64))
+    let variation = evenness_of(layout, followed.chosen(), &seen, in_plane, |_, _| true)?.nearest.variation;
+    let shift = |i: usize| Some(seen[i]?.distance(layout.dots[i].image_px));
+    let shifts: Vec<f64> = followed.chosen().filter_map(shift).collect();
+    Some((variation, shifts.iter().sum::<f64>() / shifts.len().max(1) as f64))
 }
 
 /// What a sensor's optics were made from.

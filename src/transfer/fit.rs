@@ -120,12 +120,17 @@ const MOST_OUTLIERS: f64 = 0.3;
 /// A sample is an outlier beyond this multiple of the scatter. Of 1000 good samples in two dimensions, 0.04
 /// lie further out.
 const OUTLIER_SIGMAS: f64 = 4.5;
+/// A sample this close to the map, as a share of the radius, is none: so far a wrong nominal map may miss, and
+/// no print is better.
+const NO_OUTLIER: f64 = 0.002;
 /// Median of the length of a scatter in two dimensions over its standard deviation per axis: sqrt(2 ln 2).
 const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
 /// Scatter below this share of the radius counts as none: residuals are then rounding.
 const LEAST_SIGMA: f64 = 1e-9;
 /// Most radial terms.
 const MOST_RADIAL: usize = 4;
+/// A difference of the information criterion that counts as decisive (R. Kass and A. Raftery, JASA 90, 1995).
+const DECISIVE: f64 = 10.0;
 /// Bounds on iterations.
 const MOST_STEPS: u32 = 40;
 const MOST_ROUNDS: u32 = 12;
@@ -187,9 +192,10 @@ pub fn fit(
     let weights: Vec<f64> = used.iter().map(|u| f64::from(u8::from(*u))).collect();
     let count = samples.len() - rejected.len();
 
-    // The simplest model that the data asks for; models that fold are not in the running.
+    // The simplest model that the data asks for. A model that folds cannot be used; if it explains the data
+    // decisively better than every one that can, the pad itself folds, and to fit it worse would be to lie.
     let mut best: Option<(f64, Model, Correction)> = None;
-    let mut folded = None;
+    let mut folded: Option<(f64, TransferError)> = None;
     for model in models() {
         if count < model.parameters() {
             continue;
@@ -200,10 +206,6 @@ pub fn fit(
         if TransferMap::new(dome_radius_mm, model.nominal, Some(correction.clone())).is_err() {
             correction.max_polar_rad = measured_rad;
         }
-        if let Err(error) = TransferMap::new(dome_radius_mm, model.nominal, Some(correction.clone())) {
-            folded.get_or_insert(error);
-            continue;
-        }
         let squares: f64 = problem
             .residuals(model.nominal, &correction)
             .zip(&weights)
@@ -212,14 +214,25 @@ pub fn fit(
         let n = 2.0 * count as f64;
         let floor = (LEAST_SIGMA * dome_radius_mm).powi(2);
         let criterion = n * (squares / n + floor).ln() + model.parameters() as f64 * n.ln();
+        if let Err(error) = TransferMap::new(dome_radius_mm, model.nominal, Some(correction.clone())) {
+            if folded.as_ref().is_none_or(|(least, _)| criterion < *least) {
+                folded = Some((criterion, error));
+            }
+            continue;
+        }
         if best.as_ref().is_none_or(|(least, ..)| criterion < *least) {
             best = Some((criterion, model, correction));
         }
     }
-    let Some((_, model, correction)) = best else {
-        return Err(folded.map_or(FitError::Degenerate, FitError::Folds));
-    };
-    Ok(problem.report(model, correction, &used, rejected))
+    match (best, folded) {
+        (Some((usable, model, correction)), folded)
+            if folded.as_ref().is_none_or(|(least, _)| least + DECISIVE > usable) =>
+        {
+            Ok(problem.report(model, correction, &used, rejected))
+        }
+        (_, Some((_, error))) => Err(FitError::Folds(error)),
+        (_, None) => Err(FitError::Degenerate),
+    }
 }
 
 fn models() -> impl Iterator<Item = Model> {
@@ -231,11 +244,13 @@ fn models() -> impl Iterator<Item = Model> {
 }
 
 impl Problem<'_> {
-    /// Which samples are no outliers: by the nominal map whose fit leaves the least median residual.
+    /// Which samples are no outliers: by the nominal map that explains seven samples of ten best.
     fn inliers(&self) -> Result<Vec<bool>, FitError> {
         let mut best: Option<(f64, Vec<bool>)> = None;
         for nominal in Nominal::ALL {
-            let model = Model { nominal, radial: 3, two_fold: self.samples.len() >= 24 };
+            let many = self.samples.len() >= 40;
+            let model =
+                Model { nominal, radial: if many { 4 } else { 3 }, two_fold: self.samples.len() >= 24 };
             let Ok(found) = self.inliers_of(model) else { continue };
             if best.as_ref().is_none_or(|(least, _)| found.0 < *least) {
                 best = Some(found);
@@ -255,11 +270,11 @@ impl Problem<'_> {
             weights = lengths.iter().map(|r| small / r.max(small)).collect();
         }
         let mut used = vec![true; self.samples.len()];
-        let mut sigma = 0.0;
         for _ in 0..MOST_ROUNDS {
             let kept: Vec<f64> = lengths.iter().zip(&used).filter(|(_, u)| **u).map(|(r, _)| *r).collect();
-            sigma = (median(&kept) / MEDIAN_LENGTH).max(LEAST_SIGMA * self.radius_mm);
-            let next: Vec<bool> = lengths.iter().map(|r| *r <= OUTLIER_SIGMAS * sigma).collect();
+            let sigma = median(&kept) / MEDIAN_LENGTH;
+            let limit = (OUTLIER_SIGMAS * sigma).max(NO_OUTLIER * self.radius_mm);
+            let next: Vec<bool> = lengths.iter().map(|r| *r <= limit).collect();
             let same = next == used;
             used = next;
             let weights: Vec<f64> = used.iter().map(|u| f64::from(u8::from(*u))).collect();
@@ -269,7 +284,8 @@ impl Problem<'_> {
                 break;
             }
         }
-        Ok((sigma, used))
+        // Over all samples: a wrong nominal map can fit a few rings exactly and disown the rest.
+        Ok((quantile(&lengths, 1.0 - MOST_OUTLIERS), used))
     }
 
     /// The correction that leaves the least weighted squares.
@@ -445,7 +461,11 @@ fn solve_scaled(mut matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVecto
 }
 
 fn median(values: &[f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+    sorted.get((sorted.len() as f64 * share) as usize).copied().unwrap_or(0.0)
 }

@@ -3,6 +3,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
+use super::fit::{FitError, MeasuredIn, Sample, fit};
 use super::{Correction, Nominal, TransferLimit, TransferMap};
 
 const RADIUS_MM: f64 = 10.0;
@@ -141,6 +142,82 @@ fn a_pure_stretch_is_linear_at_the_pole() {
         let expected = DVec2::new(at.x * 1.02 + at.y * 0.01, at.x * 0.01 + at.y * 0.98);
         assert!((map.plate_from_dome(at).unwrap() - expected).length() < 1e-12);
     }
+}
+
+/// Marks on rings and spokes, landed where they are listed, printed from where `plate` says.
+fn printed(rings: u32, plate: impl Fn(DVec3) -> DVec2) -> Vec<Sample> {
+    let mut samples = Vec::new();
+    for ring in 1..=rings {
+        for spoke in 0..6 * ring {
+            let landed = on_dome(
+                f64::from(ring) * 1.1 / f64::from(rings),
+                TAU * f64::from(spoke) / f64::from(6 * ring),
+            );
+            let mark = samples.len() as u32;
+            samples.push(Sample { plate_mm: plate(landed), landed, mark, print: 0 });
+        }
+    }
+    samples
+}
+
+#[test]
+fn fit_finds_the_map_that_printed() {
+    for nominal in Nominal::ALL {
+        let truth = TransferMap::new(RADIUS_MM, nominal, Some(correction())).unwrap();
+        let samples = printed(6, |at| truth.plate_from_dome(at).unwrap());
+        for measured_in in [MeasuredIn::View, MeasuredIn::Dome] {
+            let found = fit(RADIUS_MM, &samples, measured_in, 1.1).unwrap();
+            assert_eq!(found.nominal, nominal);
+            assert!(found.residual_max_mm < 1e-8, "{found:?}");
+            assert!(found.rejected.is_empty() && found.scatter_mm.is_none());
+            assert!((found.correction.rotation_rad - 0.02).abs() < 1e-8);
+            assert!((found.correction.offset_mm - correction().offset_mm).length() < 1e-7);
+            for (a, b) in found.correction.radial.iter().zip(&correction().radial) {
+                assert!((a - b).abs() < 1e-5, "{found:?}");
+            }
+            assert!((found.measured_to_rad - 1.1).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn fit_rejects_what_does_not_fit() {
+    let truth = TransferMap::new(RADIUS_MM, Nominal::EqualArea, None).unwrap();
+    let mut samples = printed(6, |at| truth.plate_from_dome(at).unwrap());
+    for index in [3, 40, 77, 101] {
+        samples[index].plate_mm += DVec2::new(0.4, -0.2);
+    }
+    let found = fit(RADIUS_MM, &samples, MeasuredIn::Dome, 1.1).unwrap();
+    assert_eq!(found.rejected, [3, 40, 77, 101]);
+    assert!(found.residual_max_mm < 1e-8);
+}
+
+#[test]
+fn measurements_without_a_map_are_refused_by_name() {
+    let round = TransferMap::new(RADIUS_MM, Nominal::Orthographic, None).unwrap();
+    let plate = |at: DVec3| round.plate_from_dome(at).unwrap();
+    let few = &printed(2, plate)[..9];
+    assert!(matches!(fit(RADIUS_MM, few, MeasuredIn::View, 1.0), Err(FitError::TooFew { have: 9, .. })));
+    let mut broken = printed(4, plate);
+    broken[5].plate_mm.x = f64::NAN;
+    assert_eq!(fit(RADIUS_MM, &broken, MeasuredIn::View, 1.0), Err(FitError::NotFinite { sample: 5 }));
+    let same: Vec<Sample> = (0..20).map(|_| few[3].clone()).collect();
+    assert_eq!(fit(RADIUS_MM, &same, MeasuredIn::View, 1.0), Err(FitError::Degenerate));
+    // A pad that slides back: beyond 45 degrees its ink comes from nearer to the centre again.
+    let folding = printed(6, |at| {
+        let out = at.truncate();
+        let polar_rad = out.length().atan2(at.z);
+        out.normalize_or(DVec2::X) * RADIUS_MM * (2.0 * polar_rad).sin()
+    });
+    let refused = fit(RADIUS_MM, &folding, MeasuredIn::Dome, 1.1);
+    assert!(matches!(refused, Err(FitError::Folds(_))), "{refused:?}");
+    // Two marks of five mistaken.
+    let mut mistaken = printed(4, plate);
+    for (index, sample) in mistaken.iter_mut().enumerate().filter(|(index, _)| index % 5 < 2) {
+        sample.plate_mm += DVec2::from_angle(index as f64) * (0.5 + 0.1 * index as f64);
+    }
+    let refused = fit(RADIUS_MM, &mistaken, MeasuredIn::Dome, 1.1);
+    assert!(matches!(refused, Err(FitError::TooManyOutliers { .. })), "{refused:?}");
 }
 
 proptest! {

@@ -277,6 +277,10 @@ impl Problem<'_> {
             let next: Vec<bool> = lengths.iter().map(|r| *r <= limit).collect();
             let same = next == used;
             used = next;
+            // So few that agree cannot carry a map; the caller names the rest.
+            if used.iter().filter(|used| **used).count() as f64 <= (1.0 - MOST_OUTLIERS) * used.len() as f64 {
+                break;
+            }
             let weights: Vec<f64> = used.iter().map(|u| f64::from(u8::from(*u))).collect();
             let correction = self.solve(model, &weights)?;
             lengths = self.residuals(model.nominal, &correction).map(DVec2::length).collect();

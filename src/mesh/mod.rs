@@ -20,6 +20,7 @@
 
 mod check;
 mod chord;
+mod distance;
 mod error;
 mod primitives;
 mod shape;

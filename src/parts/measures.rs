@@ -3,13 +3,13 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::view::ViewCone;
-use super::{PartError, upper};
+use super::{Blueprint, Feature, PartError, upper};
 use crate::design::Design;
 use crate::design::sections::{
     CameraBodySection, LedsSection, MagnetPocketsSection, MagnetsSection, MouldSection, PlatformsSection,
     ProcessSection, SheetSection, SpringEnds,
 };
-use crate::mesh::{Chord, Fit, Profile, Shape};
+use crate::mesh::{Chord, Fit, Shape};
 use crate::numeric::Rigid;
 
 /// Dimensions of a design as the parts need them. Heights are in the sensor
@@ -195,20 +195,27 @@ impl Measures {
         upper::platform_from_led(self, i)
     }
 
-    /// Tool for a magnet's pocket that opens at the face `face_z_mm`, with its
-    /// push-out hole up (or down) to `end_z_mm`.
-    pub(super) fn magnet_pocket(&self, face_z_mm: f64, end_z_mm: f64, over_mm: f64) -> Shape {
+    /// Cuts a pocket for a magnet at every spring into the face at
+    /// `face_z_mm`, each with its push-out hole as far as `end_z_mm`, beyond
+    /// the part.
+    pub(super) fn cut_magnet_pockets(&self, b: &mut Blueprint, face_z_mm: f64, end_z_mm: f64) {
         let (radius, depth) = self.pocket_mm();
-        let hole = 0.5 * self.pockets.push_out_diameter_mm;
         let into = (end_z_mm - face_z_mm).signum();
-        let mut points = vec![(radius, face_z_mm - into * over_mm), (radius, face_z_mm + into * depth)];
-        if hole > 0.0 {
-            points.push((hole, face_z_mm + into * depth));
-            points.push((hole, end_z_mm));
+        let cylinder = |radius: f64, from: f64, to: f64| {
+            Shape::cylinder(radius, from.min(to), from.max(to), Fit::Outside)
+        };
+        for (i, axis) in self.spring_axes_mm.iter().enumerate() {
+            let pocket = cylinder(radius, face_z_mm - into * self.overcut_mm, face_z_mm + into * depth);
+            let feature = Feature::new("magnet pocket", "springs.places", pocket);
+            b.cut.push(feature.numbered(i).at(axis.x, axis.y));
+            let hole = 0.5 * self.pockets.push_out_diameter_mm;
+            if hole > 0.0 {
+                // From the middle of the pocket, so that no faces coincide.
+                let shape = cylinder(hole, face_z_mm + into * 0.5 * depth, end_z_mm);
+                let feature = Feature::new("push-out hole", "magnet_pockets.push_out_diameter_mm", shape);
+                b.cut.push(feature.numbered(i).at(axis.x, axis.y));
+                b.genus += 1;
+            }
         }
-        if into < 0.0 {
-            points.reverse();
-        }
-        Shape::Turned { profile: Profile::lines(&points), fit: Fit::Outside }
     }
 }

@@ -11,11 +11,13 @@
 //! with the parting plane at z = 0 and the cavity below.
 
 mod error;
+mod feature;
 mod lower;
 mod measures;
 mod mould;
 mod upper;
 mod view;
+mod walls;
 
 #[cfg(test)]
 mod tests;
@@ -25,11 +27,12 @@ use std::io::{self, Write};
 use rayon::prelude::*;
 
 pub use error::PartError;
+use feature::{Blueprint, Feature};
 pub use measures::Measures;
 pub use view::ViewCone;
 
 use crate::design::Design;
-use crate::mesh::{BoundingBox, Chord, Construction, Inspection, TriMesh, inspect, write_stl};
+use crate::mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, write_stl};
 
 /// One part, ready to be written.
 #[derive(Debug, Clone)]
@@ -55,33 +58,26 @@ pub struct Part {
     pub bounds: BoundingBox,
 }
 
-/// A part before it is meshed.
-pub(crate) struct Blueprint {
-    pub name: &'static str,
-    pub summary: &'static str,
-    pub construction: Construction,
-    pub genus: i64,
-    pub chord: Chord,
-}
-
 type Maker = fn(&Measures) -> Result<Blueprint, PartError>;
 
 impl Blueprint {
-    fn build(self) -> Result<Part, PartError> {
-        let Self { name, summary, construction, genus, chord } = self;
-        let solid = construction.solid(chord).map_err(|error| PartError::Mesh { part: name, error })?;
-        let exact_vertices = solid.to_mesh();
-        let mesh = exact_vertices.welded_f32();
-        let broken = |problem: String| PartError::Broken { part: name, problem };
+    /// Meshes the part and looks at what came out.
+    fn build(&self) -> Result<Part, PartError> {
+        let construction = self.construction();
+        let solid =
+            construction.solid(self.chord).map_err(|error| PartError::Mesh { part: self.name, error })?;
+        let in_f64 = solid.to_mesh();
+        let mesh = in_f64.welded_f32();
+        let broken = |problem: String| PartError::Broken { part: self.name, problem };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
         let part = Part {
-            name,
-            summary,
+            name: self.name,
+            summary: self.summary,
             construction,
-            chord_tolerance_mm: chord.tolerance_mm(),
-            volume_mm3: exact_vertices.volume_mm3(),
-            area_mm2: exact_vertices.area_mm2(),
-            genus,
+            chord_tolerance_mm: self.chord.tolerance_mm(),
+            volume_mm3: in_f64.volume_mm3(),
+            area_mm2: in_f64.area_mm2(),
+            genus: self.genus,
             bounds,
             mesh,
         };
@@ -140,5 +136,10 @@ pub fn build(design: &Design) -> Result<Vec<Part>, PartError> {
 /// As [`build`].
 pub fn build_measured(measures: &Measures) -> Result<Vec<Part>, PartError> {
     let makers: [Maker; 4] = [upper::blueprint, lower::blueprint, mould::cavity, mould::base];
-    makers.par_iter().map(|make| make(measures)?.build()).collect::<Vec<_>>().into_iter().collect()
+    let make = |make: &Maker| {
+        let blueprint = make(measures)?;
+        walls::check(&blueprint, measures)?;
+        blueprint.build()
+    };
+    makers.par_iter().map(make).collect::<Vec<_>>().into_iter().collect()
 }

@@ -121,7 +121,7 @@ fn mould_casts_the_dome() {
     assert!((radius - expected).abs() < 1e-12);
     // The cavity's lowest point, measured on the mesh by a ray down the axis.
     let depth = -expected - m.mould.sealer_thickness_mm;
-    let hit = solid(cavity).first_hit(DVec3::new(0.01, 0.02, 1.0), DVec3::new(0.01, 0.02, -20.0)).unwrap();
+    let hit = solid(cavity).first_hit(DVec3::new(0.01, 0.02, 1.0), DVec3::new(0.01, 0.02, -20.0)).unwrap().0;
     assert!((1.0 - hit * 21.0 - depth).abs() < m.optical_chord.tolerance_mm(), "{hit}");
 }
 

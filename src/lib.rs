@@ -1,8 +1,8 @@
 //! domecast: from a parameter file to a dome-shaped camera tactile sensor.
 pub mod artwork;
 pub mod camera;
-//pub mod cli;
 pub mod build;
+pub mod cli;
 pub mod constants;
 pub mod design;
 pub mod layout;

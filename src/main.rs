@@ -1,3 +1,5 @@
 //! The command line of domecast.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    domecast::cli::run()
+}

@@ -1,9 +1,189 @@
-//! The build of a design.
+//! The main job: from a design to the folder with everything that is needed to make the sensor.
+//!
+//! [`build`] makes all files in memory, [`Tree::write`] puts them in place whole, and [`check::check`]
+//! reads them again. The only things shared between artwork, parts and constants are the resolved design
+//! and its layout; that is why they agree.
 
+pub mod check;
 mod manifest;
+pub mod sight;
 mod tree;
 
 pub use manifest::{
     DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning, sha256_hex,
 };
 pub use tree::{Tree, WriteError, list_files};
+
+use std::fmt;
+
+use crate::artwork::{self, FilmLabel, RenderError};
+use crate::constants;
+use crate::design::{Design, DesignError};
+use crate::layout::{Layout, LayoutError, LayoutSpec};
+use crate::mechanics::{Check, claims_of, suspension_of};
+use crate::numeric::Rigid;
+use crate::parts::{self, PartError};
+
+/// Why a build could not be made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum BuildError {
+    /// The design is at fault.
+    Design(Box<DesignError>),
+    /// A library failed on something that every resolved design should allow: domecast is at fault.
+    Ours(String),
+}
+
+impl From<DesignError> for BuildError {
+    fn from(error: DesignError) -> Self {
+        Self::Design(Box::new(error))
+    }
+}
+
+impl From<LayoutError> for BuildError {
+    fn from(error: LayoutError) -> Self {
+        DesignError::from(error).into()
+    }
+}
+
+impl From<RenderError> for BuildError {
+    fn from(error: RenderError) -> Self {
+        Self::Ours(format!("the artwork could not be drawn: {error}"))
+    }
+}
+
+impl From<PartError> for BuildError {
+    fn from(error: PartError) -> Self {
+        DesignError::from(error).into()
+    }
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Design(error) => error.fmt(f),
+            Self::Ours(what) => f.write_str(what),
+        }
+    }
+}
+
+impl std::error::Error for BuildError {}
+
+/// Everything that a build writes.
+#[derive(Debug)]
+pub struct Build {
+    /// The files, the manifest among them.
+    pub tree: Tree,
+    /// The manifest.
+    pub manifest: Manifest,
+    /// Number of dots.
+    pub dot_count: usize,
+}
+
+/// Makes everything; `step` is told what is being made. Nothing is written to the disk.
+///
+/// # Errors
+/// The first fault of the design that only shows when it is laid out, loaded or made.
+pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
+    make(design, step).map_err(|error| match error {
+        BuildError::Design(error) => with_value(design, *error).into(),
+        ours @ BuildError::Ours(_) => ours,
+    })
+}
+
+fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
+    let mut tree = Tree::default();
+    let mut warnings: Vec<Warning> = design
+        .warnings()
+        .iter()
+        .map(|warning| Warning { field: warning.field.clone(), message: warning.message.clone() })
+        .collect();
+    tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
+    let sha256 = sha256_hex(design.text().as_bytes());
+
+    step("trying the claimed loads");
+    try_claims(design)?;
+    step("laying out the dots");
+    let (spec, layout) = lay_out(design)?;
+    step("writing the constants");
+    let constants = constants::of(design, &layout)?;
+    tree.add("constants/constants.json", constants.to_json().into_bytes());
+    step("drawing the artwork");
+    let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
+    for file in artwork::files(&spec, &layout, &label)? {
+        tree.add(file.path, file.bytes);
+    }
+    step("making the parts");
+    let mut records = Vec::new();
+    for part in parts::build(design)? {
+        let file = format!("parts/{}.stl", part.name);
+        let mut bytes = Vec::new();
+        part.write_stl(&mut bytes).map_err(|error| BuildError::Ours(format!("{file}: {error}")))?;
+        tree.add(file.clone(), bytes);
+        records.push(PartRecord {
+            name: part.name.to_owned(),
+            file,
+            volume_mm3: part.volume_mm3,
+            genus: part.genus,
+            bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
+        });
+    }
+    warnings.extend(layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }));
+
+    let record = DesignRecord { name: design.name().to_owned(), sha256 };
+    let manifest = Manifest::new(record, records, warnings, &tree);
+    // numbers, strings and lists only: nothing here can fail to be written
+    let mut text = serde_json::to_string_pretty(&manifest).unwrap_or_default();
+    text.push('\n');
+    tree.add(MANIFEST_NAME, text.into_bytes());
+    Ok(Build { tree, manifest, dot_count: layout.dots.len() })
+}
+
+/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight.
+fn try_claims(design: &Design) -> Result<(), DesignError> {
+    sight::markers(design, &Rigid::identity(), "at rest")?;
+    let suspension = suspension_of(design)?;
+    for (index, (claim, case)) in
+        design.sections().loads.claims.iter().zip(claims_of(design, &suspension)).enumerate()
+    {
+        let field = format!("loads.claims[{index}]");
+        let passed = case.passed().next().map(|check| {
+            let Check { limit, part, value, bound, unit } = check;
+            DesignError::at(
+                field.clone(),
+                serde_json::json!(claim),
+                format!("the load \"{}\" passes a limit: {} at {part}, {value:.3} {unit}", claim.name, limit.as_str()),
+                format!("at most {bound:.3} {unit}"),
+            )
+            .with_help("claim less, or change `springs`, `magnets.grip_force_n` or the heights of the platforms")
+        });
+        if let Some(error) = passed {
+            return Err(error);
+        }
+        let balance = case
+            .equilibrium
+            .map_err(|error| DesignError::at(field, serde_json::json!(claim), error.to_string(), "a load that the springs carry"))?;
+        let pose = balance.displacement.to_pose(suspension.at_mm());
+        sight::markers(design, &pose, &format!("under the load \"{}\"", claim.name))?;
+    }
+    Ok(())
+}
+
+/// The layout of a design's dots, and what it was made from.
+fn lay_out(design: &Design) -> Result<(LayoutSpec, Layout), DesignError> {
+    let spec = LayoutSpec::of_design(design)?;
+    let layout = Layout::new(&spec)?;
+    Ok((spec, layout))
+}
+
+/// Makers report the field at fault; its value stands in the design.
+fn with_value(design: &Design, mut error: DesignError) -> DesignError {
+    if error.value.is_empty() && !error.field.is_empty() {
+        let pointer = format!("/{}", error.field.replace('.', "/").replace('[', "/").replace(']', ""));
+        let tree: serde_json::Value = serde_json::from_str(design.text()).unwrap_or_default();
+        if let Some(value) = tree.pointer(&pointer) {
+            let filled = DesignError::at(error.field.clone(), value, "", "");
+            error.value = filled.value;
+        }
+    }
+    error
+}

@@ -83,18 +83,24 @@ pub fn run() -> ExitCode {
         }
     };
     let output = Output::new(arguments.json, arguments.quiet);
-    let done = match &arguments.command {
-        Command::Build { design, out } => build::run(&output, design, out.as_deref()),
-        Command::Check { dir } => check::run(&output, dir),
-        Command::Trace { design, pixels, pose } => points::trace(&output, design, pixels, pose.as_deref()),
-        Command::Project { design, points, pose } => points::project(&output, design, points, pose.as_deref()),
-        Command::Schema => schema::run(&output),
-    };
+    // no input should lead to a panic; if one does, it is our fault and has its own exit code
+    let ran = std::panic::catch_unwind(|| dispatch(&output, &arguments.command));
+    let done = ran.unwrap_or_else(|_| Err(Failure::Internal("it stopped at the place named above".into())));
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             output.failure(&failure);
             ExitCode::from(failure.exit_code())
         }
+    }
+}
+
+fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
+    match command {
+        Command::Build { design, out } => build::run(output, design, out.as_deref()),
+        Command::Check { dir } => check::run(output, dir),
+        Command::Trace { design, pixels, pose } => points::trace(output, design, pixels, pose.as_deref()),
+        Command::Project { design, points, pose } => points::project(output, design, points, pose.as_deref()),
+        Command::Schema => schema::run(output),
     }
 }

@@ -106,6 +106,11 @@ impl Output {
         }
     }
 
+    /// A fault, for people, whatever the mode.
+    pub fn error(&self, line: &str) {
+        let _ = writeln!(io::stderr(), "error: {line}");
+    }
+
     /// The result, for programs only.
     pub fn result(&self, value: &Value) -> Result<(), Failure> {
         if self.json {
@@ -133,7 +138,7 @@ impl Output {
             };
             let _ = writeln!(io::stdout(), "{:#}", json!({ "error": error }));
         } else {
-            let _ = writeln!(io::stderr(), "error: {message}");
+            self.error(&message);
         }
     }
 }

@@ -1,3 +1,122 @@
-//! Constants.
+//! What the runtime needs to know of one sensor, and the files that carry it.
+//!
+//! Everything here comes from the resolved design and its layout, so that a runtime which sees nothing
+//! but the constants works with the same numbers that the artwork and the parts were made from.
 
-pub mod model;
+mod model;
+
+use serde_json::json;
+
+pub use model::{
+    BlackDot, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants, Matrix4, OpticsConstants, PlainRuntime,
+    SpringConstants, StiffnessAt, VERSION, WhiteMarker,
+};
+
+use crate::design::{Design, DesignError};
+use crate::layout::Layout;
+use crate::optics::Channel;
+
+/// The constants of a design with its dots.
+///
+/// # Errors
+/// A white marker whose centre the lens cannot see at rest.
+pub fn of(design: &Design, layout: &Layout) -> Result<Constants, DesignError> {
+    let sections = design.sections();
+    let optics = design.optics();
+    let spec = optics.lens().spec();
+    let undistorted_matrix = design.undistorted_matrix();
+    let [[_, _, cx], [_, _, cy], _] = undistorted_matrix;
+    Ok(Constants {
+        format: FORMAT.into(),
+        version: VERSION,
+        design: design.name().into(),
+        camera: CameraConstants {
+            model: spec.model.as_str().into(),
+            width: spec.width,
+            height: spec.height,
+            matrix: spec.matrix,
+            distortion: spec.distortion.clone(),
+            pupil_shift_mm: spec.pupil_shift_mm.clone(),
+            undistorted_matrix,
+            max_field_angle_rad: optics.lens().max_field_angle_rad(),
+            camera_from_sensor: optics.sensor_from_camera().inverse().to_rows_4x4(),
+        },
+        optics: OpticsConstants {
+            dome_radius_mm: optics.dome_radius_mm(),
+            layers: optics
+                .layers()
+                .iter()
+                .map(|layer| LayerConstants {
+                    name: layer.name.clone(),
+                    index: layer.index_for(Channel::Green),
+                    index_rgb: (layer.index != [layer.index_for(Channel::Green); 3]).then_some(layer.index),
+                    thickness_mm: layer.thickness_mm,
+                })
+                .collect(),
+        },
+        mask: MaskConstants { center_px: [cx, cy], radius_px: sections.runtime.mask_radius_px },
+        white_markers: white_markers(design)?,
+        black_dots: layout
+            .dots
+            .iter()
+            .map(|dot| BlackDot {
+                id: dot.id as usize,
+                image_px: dot.image_px.to_array(),
+                surface_mm: dot.surface_mm.to_array(),
+                normal: dot.normal.to_array(),
+                plate_mm: dot.plate_mm.to_array(),
+                diameter_mm: dot.diameter_mm,
+                neighbors: dot.neighbors.iter().map(|id| *id as usize).collect(),
+            })
+            .collect(),
+        springs: None,
+    })
+}
+
+fn white_markers(design: &Design) -> Result<Vec<WhiteMarker>, DesignError> {
+    let diameter_mm = design.sections().white_markers.diameter_mm;
+    let marker = |(id, position): (usize, glam::DVec3)| {
+        let image = design.optics().project(position).map_err(|limit| {
+            DesignError::at(
+                format!("white_markers.positions_mm[{id}]"),
+                json!([position.x, position.y]),
+                format!("the lens cannot see the marker at rest ({limit})"),
+                "a place inside the field of view, nearer to the axis, or a deeper camera",
+            )
+        })?;
+        Ok(WhiteMarker {
+            id,
+            position_mm: position.to_array(),
+            diameter_mm,
+            apparent_position_mm: None,
+            image_px: image.to_array(),
+        })
+    };
+    design.white_markers_mm().into_iter().enumerate().map(marker).collect()
+}
+
+impl Constants {
+    /// The file's text.
+    pub fn to_json(&self) -> String {
+        // numbers, strings and lists only: nothing here can fail to be written
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// Reads the file's text.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong with it.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let constants: Self =
+            serde_json::from_str(text).map_err(|error| format!("is not a constants file: {error}"))?;
+        if constants.format != FORMAT || constants.version != VERSION {
+            return Err(format!(
+                "has format \"{}\" version {}; this release reads \"{FORMAT}\" version {VERSION}",
+                constants.format, constants.version
+            ));
+        }
+        Ok(constants)
+    }
+}

@@ -8,6 +8,7 @@ mod dual;
 mod limits;
 mod load;
 mod magnet;
+mod of_design;
 mod spring;
 mod suspension;
 
@@ -15,6 +16,7 @@ pub use column::{Column, EndStiffness};
 pub use limits::{Check, Limit, Limits, LoadCase, Stop, StopShape, checks_at, sort_worst_first, try_load};
 pub use load::Wrench;
 pub use magnet::MagnetPair;
+pub use of_design::{claims_of, limits_of, suspension_of};
 pub use spring::{EndType, SpecError, Spring, SpringSpec};
 pub use suspension::{
     Displacement, Equilibrium, MOST_SPRINGS, MechanicsError, SpringState, Suspension, SuspensionSpec,

@@ -36,5 +36,5 @@ pub use chord::{Chord, Fit};
 pub use error::MeshError;
 pub use shape::{Construction, Piece, Profile, ProfileEdge, Shape};
 pub use solid::Solid;
-pub use stl::write_stl;
+pub use stl::{read_stl, write_stl};
 pub use triangles::{BoundingBox, TriMesh};

@@ -1,6 +1,6 @@
 //! Binary STL.
 
-use std::io::{self, Write};
+use std::io::{self, Cursor, Write};
 
 use glam::DVec3;
 
@@ -33,4 +33,26 @@ pub fn write_stl(mesh: &TriMesh, writer: &mut impl Write) -> io::Result<()> {
 
 fn vector(v: DVec3) -> stl_io::Vector<f32> {
     stl_io::Vector::new(v.as_vec3().to_array())
+}
+
+/// Reads an STL, binary or text, and welds equal vertices, as every reader of the format must.
+///
+/// # Errors
+/// Those of the format: a file that is cut short, or is no STL; coordinates that are not finite.
+pub fn read_stl(bytes: &[u8]) -> io::Result<TriMesh> {
+    let mut cursor = Cursor::new(bytes);
+    let mut mesh = TriMesh::default();
+    for triangle in stl_io::create_stl_reader(&mut cursor)? {
+        let corners = triangle?.vertices;
+        let first = mesh.vertices_mm.len() as u32;
+        for corner in corners {
+            let vertex = glam::Vec3::new(corner[0], corner[1], corner[2]);
+            if !vertex.is_finite() {
+                return Err(io::Error::new(io::ErrorKind::InvalidData, "a coordinate is not finite"));
+            }
+            mesh.vertices_mm.push(vertex.as_dvec3());
+        }
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    Ok(mesh.welded_f32())
 }

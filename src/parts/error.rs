@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::design::DesignError;
 use crate::mesh::MeshError;
 
 /// A part that cannot be made, and what to change.
@@ -59,3 +60,25 @@ impl fmt::Display for PartError {
 }
 
 impl std::error::Error for PartError {}
+
+impl From<PartError> for DesignError {
+    fn from(error: PartError) -> Self {
+        match error {
+            PartError::Infeasible { part, place, value_mm, limit_mm, field } => Self::at(
+                field,
+                "",
+                format!("{part}: {place}: {value_mm:.4} mm"),
+                format!("a limit of {limit_mm:.4} mm"),
+            ),
+            PartError::View { problem, field } => {
+                Self::at(field, "", format!("the camera's view: {problem}"), "a view that the platform leaves open")
+            }
+            PartError::Mesh { part, error } => {
+                Self::at("mesh.chord_tolerance_mm", "", format!("{part}: {error}"), "a tolerance that suits the size")
+            }
+            PartError::Broken { part, problem } => {
+                Self::at("platforms", "", format!("{part}: {problem}"), "features that neither touch nor overlap")
+            }
+        }
+    }
+}

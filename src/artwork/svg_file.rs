@@ -1,0 +1,122 @@
+//! Drawings as SVG: true millimetres, one Inkscape layer for each layer.
+//!
+//! One user unit is one millimetre. SVG's y runs down, the drawing's up: a point (x, y) of the drawing is
+//! written as (x, -y), and nothing else is changed, so that a reader gets the drawing's coordinates back by
+//! turning one sign.
+
+use std::fmt::Write;
+
+use svg::Document;
+use svg::node::element::{Description, Group, Path as SvgPath, Text as SvgText, Title};
+use svg::node::{Node, Value};
+
+use super::drawing::{Anchor, Drawing, Ink, Item, Layer, Path, Segment, Shape, Text};
+
+/// Height of the capitals as a share of the font size, of the common sans-serif fonts.
+const CAPITALS: f64 = 0.716;
+
+/// The drawing as an SVG file.
+pub fn to_svg(drawing: &Drawing) -> Vec<u8> {
+    let (low, _) = drawing.page_mm;
+    let size = drawing.size_mm();
+    let mut document = Document::new()
+        .set("xmlns:inkscape", "http://www.inkscape.org/namespaces/inkscape")
+        .set("width", format!("{}mm", number(size.x)))
+        .set("height", format!("{}mm", number(size.y)))
+        .set(
+            "viewBox",
+            format!(
+                "{} {} {} {}",
+                number(low.x),
+                number(-drawing.page_mm.1.y),
+                number(size.x),
+                number(size.y)
+            ),
+        );
+    for (name, value) in &drawing.facts {
+        document.assign(format!("data-{name}"), value.as_str());
+    }
+    document.append(Title::new(drawing.title.as_str()));
+    document.append(Description::new().add(svg::node::Text::new(drawing.description.as_str())));
+    for layer in &drawing.layers {
+        document.append(group(layer));
+    }
+    let mut bytes = b"<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n".to_vec();
+    bytes.extend_from_slice(document.to_string().as_bytes());
+    bytes.push(b'\n');
+    bytes
+}
+
+fn group(layer: &Layer) -> Group {
+    let mut group = Group::new()
+        .set("id", layer.name.as_str())
+        .set("inkscape:groupmode", "layer")
+        .set("inkscape:label", layer.name.as_str());
+    for item in &layer.items {
+        match item {
+            Item::Shape(shape) => group.append(path(shape)),
+            Item::Text(line) => group.append(text(line)),
+        }
+    }
+    group
+}
+
+fn path(shape: &Shape) -> SvgPath {
+    let mut path = SvgPath::new().set("d", path_data(&shape.path));
+    if !shape.id.is_empty() {
+        path.assign("id", shape.id.as_str());
+    }
+    for (name, value) in &shape.facts {
+        path.assign(format!("data-{name}"), value.as_str());
+    }
+    match shape.ink {
+        Ink::Fill => path.assign("fill", "#000000"),
+        Ink::Line(width_mm) => {
+            path.assign("fill", "none");
+            path.assign("stroke", "#000000");
+            path.assign("stroke-width", number(width_mm));
+        }
+    }
+    path
+}
+
+fn text(line: &Text) -> SvgText {
+    let mut text = SvgText::new(line.words.as_str())
+        .set("x", number(line.at.x))
+        .set("y", number(-line.at.y))
+        .set("font-family", "Liberation Sans, Arial, Helvetica, sans-serif")
+        .set("font-size", number(line.height_mm / CAPITALS))
+        .set("fill", "#000000");
+    if line.anchor == Anchor::Middle {
+        text.assign("text-anchor", "middle");
+    }
+    text
+}
+
+fn path_data(path: &Path) -> Value {
+    let mut data = String::new();
+    let mut put = |command: char, points: &[glam::DVec2]| {
+        let _ = write!(data, "{command}");
+        for (i, point) in points.iter().enumerate() {
+            let _ = write!(data, "{}{},{}", if i == 0 { "" } else { " " }, number(point.x), number(-point.y));
+        }
+    };
+    put('M', &[path.start()]);
+    for segment in path.segments() {
+        match segment {
+            Segment::Line(to) => put('L', &[*to]),
+            Segment::Cubic(a, b, to) => put('C', &[*a, *b, *to]),
+        }
+    }
+    if path.is_closed() {
+        put('Z', &[]);
+    }
+    Value::from(data)
+}
+
+/// A number with as many digits as a nanometre needs, and no more.
+fn number(x: f64) -> String {
+    let rounded = (x * 1e6).round() / 1e6;
+    // No "-0".
+    format!("{}", rounded + 0.0)
+}

@@ -1,0 +1,237 @@
+//! A build of every design, as a user runs it: the numbers in its files agree with each other.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+const DESIGNS: [&str; 3] = ["thumb24", "thumb24-fisheye", "thumb24-pinhole"];
+
+fn design_path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("designs").join(format!("{name}.json"))
+}
+
+fn domecast(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_domecast")).args(arguments).current_dir(folder).output().expect("it runs")
+}
+
+fn build(name: &str, folder: &Path) -> PathBuf {
+    let design = design_path(name);
+    let output = domecast(&["build", design.to_str().expect("UTF-8"), "--out", name], folder);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    folder.join(name)
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).expect("the file is there")).expect("it is JSON")
+}
+
+fn numbers<const N: usize>(value: &Value) -> [f64; N] {
+    std::array::from_fn(|index| value[index].as_f64().expect("a number"))
+}
+
+fn distance<const N: usize>(a: [f64; N], b: [f64; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+#[test]
+fn dots_lie_on_the_dome_and_project_to_their_pixels() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in DESIGNS {
+        let constants = json(&build(name, folder.path()).join("constants/constants.json"));
+        let dots = constants["black_dots"].as_array().expect("dots");
+        assert!(dots.len() > 100, "{name} has {} dots", dots.len());
+        let radius_mm = constants["optics"]["dome_radius_mm"].as_f64().expect("a radius");
+        let mut points = String::new();
+        for dot in dots {
+            let [x, y, z] = numbers(&dot["surface_mm"]);
+            assert!(((x * x + y * y + z * z).sqrt() - radius_mm).abs() < 1e-9, "{name}: {dot}");
+            assert!(distance(numbers(&dot["normal"]), [x / radius_mm, y / radius_mm, z / radius_mm]) < 1e-9);
+            points += &format!("{x:?},{y:?},{z:?}\n");
+        }
+        // through the command line, as another program would ask
+        fs::write(folder.path().join("points.csv"), points).expect("written");
+        let design = design_path(name);
+        let output =
+            domecast(&["project", design.to_str().expect("UTF-8"), "--points", "points.csv"], folder.path());
+        assert!(output.status.success());
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        let answers: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+        assert_eq!(answers.len(), dots.len());
+        for (answer, dot) in answers.iter().zip(dots) {
+            assert_eq!(answer["status"], "ok");
+            assert!(distance::<2>(numbers(&answer["image_px"]), numbers(&dot["image_px"])) < 1e-9, "{name}: {dot}");
+        }
+    }
+}
+
+#[test]
+fn a_lattice_is_even_in_the_image() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in DESIGNS {
+        let constants = json(&build(name, folder.path()).join("constants/constants.json"));
+        let places: Vec<[f64; 2]> =
+            constants["black_dots"].as_array().expect("dots").iter().map(|dot| numbers(&dot["image_px"])).collect();
+        let nearest = |at: usize| {
+            let others = places.iter().enumerate().filter(|(other, _)| *other != at);
+            others.map(|(_, other)| distance(places[at], *other)).fold(f64::INFINITY, f64::min)
+        };
+        let spacings: Vec<f64> = (0..places.len()).map(nearest).collect();
+        let (least, most) =
+            spacings.iter().fold((f64::INFINITY, 0.0_f64), |(least, most), s| (least.min(*s), most.max(*s)));
+        let pitch_px = json(&design_path(name))["pattern"]["pitch_px"].as_f64().expect("a pitch");
+        assert!((most - least) / least < 1e-6, "{name}: {least} to {most} px");
+        assert!((least - pitch_px).abs() < 1e-6 * pitch_px, "{name}: {least} px instead of {pitch_px}");
+    }
+}
+
+/// An orthographic pad puts the plate's point (X, Y) at (X, Y, sqrt(R^2 - X^2 - Y^2)) on the dome: written
+/// out here, so that the map is checked against its definition and not against itself.
+#[test]
+fn the_artwork_lands_on_the_dots() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in DESIGNS {
+        let out = build(name, folder.path());
+        let constants = json(&out.join("constants/constants.json"));
+        let dots = constants["black_dots"].as_array().expect("dots");
+        let radius_mm = constants["optics"]["dome_radius_mm"].as_f64().expect("a radius");
+        let drawing = fs::read_to_string(out.join("artwork/dots.svg")).expect("the drawing");
+        let attribute = |element: &str, name: &str| -> f64 {
+            let from = element.find(&format!(" {name}=\"")).expect("the attribute") + name.len() + 3;
+            let to = from + element[from..].find('"').expect("its end");
+            element[from..to].parse().expect("a number")
+        };
+        let elements: Vec<&str> = drawing.split('<').filter(|element| element.contains(" data-id=")).collect();
+        assert_eq!(elements.len(), dots.len(), "{name}: every dot is drawn once");
+        for element in elements {
+            let dot = &dots[attribute(element, "data-id") as usize];
+            let (x, y) = (attribute(element, "data-x-mm"), attribute(element, "data-y-mm"));
+            let landed = [x, y, (radius_mm * radius_mm - x * x - y * y).sqrt()];
+            assert!(distance(landed, numbers(&dot["surface_mm"])) < 1e-4, "{name}: {element}");
+            assert!(distance([x, y], numbers(&dot["plate_mm"])) < 1e-9, "{name}: {element}");
+        }
+        for layer in ["dots", "registration", "notes"] {
+            assert!(drawing.contains(&format!("inkscape:label=\"{layer}\"")), "{name}: layer {layer}");
+        }
+        assert!(drawing.contains("width=\"") && drawing.contains("mm\""), "{name}: true millimetres");
+    }
+}
+
+#[test]
+fn the_whole_sensor_fits_its_envelope() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in DESIGNS {
+        let manifest = json(&build(name, folder.path()).join("manifest.json"));
+        let design = json(&design_path(name));
+        let corner = |part: &str, end: usize| -> [f64; 3] {
+            let parts = manifest["parts"].as_array().expect("parts");
+            let part = parts.iter().find(|entry| entry["name"] == part).expect("the part");
+            numbers(&part["bbox_mm"][end])
+        };
+        let (upper, lower) = (corner("upper_platform", 1), corner("lower_platform", 0));
+        let pole_mm = design["dome"]["radius_mm"].as_f64().expect("a radius")
+            + design["elastomer"]["membrane_thickness_mm"].as_f64().expect("a thickness");
+        let size = [
+            corner("lower_platform", 1)[0].max(upper[0]) - lower[0].min(corner("upper_platform", 0)[0]),
+            corner("lower_platform", 1)[1].max(upper[1]) - lower[1].min(corner("upper_platform", 0)[1]),
+            pole_mm - lower[2],
+        ];
+        let allowed: [f64; 3] = numbers(&design["envelope"]["size_mm"]);
+        assert_eq!(allowed, [24.0, 24.0, 26.0]);
+        for axis in 0..3 {
+            // float32 of a 24 mm part
+            assert!(size[axis] <= allowed[axis] + 2e-6, "{name}: {size:?}");
+            assert!(size[axis] > allowed[axis] - 0.01, "{name} uses its envelope: {size:?}");
+        }
+    }
+}
+
+#[test]
+fn the_same_design_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (first, design) = (build("thumb24", folder.path()), design_path("thumb24"));
+    let again = Command::new(env!("CARGO_BIN_EXE_domecast"))
+        .args(["build", design.to_str().expect("UTF-8"), "--out", "again", "--quiet"])
+        .current_dir(folder.path())
+        .env("RAYON_NUM_THREADS", "1")
+        .output()
+        .expect("it runs");
+    assert!(again.status.success());
+    assert!(again.stdout.is_empty() && again.stderr.is_empty(), "--quiet says nothing");
+    let read = |out: &Path, path: &str| fs::read(out.join(path)).expect("the file");
+    let files = domecast::build::list_files(&first).expect("a list");
+    assert!(files.contains(&"manifest.json".to_owned()));
+    for file in files {
+        assert!(read(&first, &file) == read(&folder.path().join("again"), &file), "{file} differs");
+    }
+}
+
+#[test]
+fn a_result_is_replaced_whole_and_checked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = build("thumb24", folder.path());
+    assert_eq!(build("thumb24", folder.path()), out, "a second build replaces the first");
+    let check = || domecast(&["check", "thumb24"], folder.path());
+    assert!(check().status.success());
+
+    // one wrong dot in the constants, with its hash put right: the numbers themselves must give it away
+    let path = out.join("constants/constants.json");
+    let mut constants = json(&path);
+    let moved = constants["black_dots"][7]["image_px"][0].as_f64().expect("a number") + 1e-6;
+    constants["black_dots"][7]["image_px"][0] = moved.into();
+    let text = constants.to_string();
+    fs::write(&path, &text).expect("written");
+    let told = check();
+    assert_eq!(told.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&told.stderr).contains("constants.json: changed since the build"));
+    let mut manifest = json(&out.join("manifest.json"));
+    for file in manifest["files"].as_array_mut().expect("files") {
+        if file["path"] == "constants/constants.json" {
+            file["sha256"] = domecast::build::sha256_hex(text.as_bytes()).into();
+            file["bytes"] = text.len().into();
+        }
+    }
+    fs::write(out.join("manifest.json"), manifest.to_string()).expect("written");
+    let told = check();
+    assert_eq!(told.status.code(), Some(1));
+    let message = String::from_utf8_lossy(&told.stderr).into_owned();
+    assert!(message.contains("dot 7 is imaged 1.0"), "{message}");
+    assert_eq!(message.lines().count(), 1, "nothing else is at fault: {message}");
+}
+
+#[test]
+fn a_mesh_that_is_cut_short_is_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = build("thumb24", folder.path());
+    let path = out.join("parts/upper_platform.stl");
+    let bytes = fs::read(&path).expect("the mesh");
+    fs::write(&path, &bytes[..bytes.len() - 50]).expect("written");
+    let told = domecast(&["check", "thumb24", "--json"], folder.path());
+    assert_eq!(told.status.code(), Some(1));
+    let report: Value = serde_json::from_slice(&told.stdout).expect("JSON");
+    assert_eq!(report["ok"], false);
+    let failed: Vec<&Value> =
+        report["checks"].as_array().expect("checks").iter().filter(|check| check["holds"] == false).collect();
+    assert!(failed.iter().any(|check| check["subject"] == "files"));
+    assert!(failed.iter().any(|check| check["subject"] == "parts/upper_platform.stl"));
+}
+
+#[test]
+fn results_are_told_as_json_on_request() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let design = design_path("thumb24");
+    let output = domecast(&["build", design.to_str().expect("UTF-8"), "--json"], folder.path());
+    assert!(output.status.success());
+    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(told["ok"], true);
+    let default = if cfg!(windows) { "output\\thumb24" } else { "output/thumb24" };
+    assert_eq!(told["out"], default);
+    assert_eq!(told["manifest"]["design"]["name"], "thumb24");
+    let warnings = told["manifest"]["warnings"].as_array().expect("warnings");
+    let fold = warnings.iter().find(|warning| warning["field"] == "camera.distortion").expect("the fold is told");
+    assert!(fold["message"].as_str().expect("text").contains("folds at 61.0"));
+    let constants = json(&folder.path().join("output/thumb24/constants/constants.json"));
+    let reach = constants["camera"]["max_field_angle_rad"].as_f64().expect("a number");
+    assert!((reach.to_degrees() - 61.08).abs() < 0.01, "{}", reach.to_degrees());
+}

@@ -1,7 +1,7 @@
 //! domecast: from a parameter file to a dome-shaped camera tactile sensor.
 pub mod artwork;
-pub mod camera;
 pub mod build;
+pub mod camera;
 pub mod cli;
 pub mod constants;
 pub mod design;

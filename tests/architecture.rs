@@ -38,7 +38,9 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
 
 /// The names that follow `crate::` in a source text, braces included: `crate::{a, b::c}` imports a and b.
 fn imported(text: &str) -> Vec<String> {
-    let name = |text: &str| text.trim().split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next().map(str::to_owned);
+    let name = |text: &str| {
+        text.trim().split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next().map(str::to_owned)
+    };
     let mut names = Vec::new();
     for (at, _) in text.match_indices("crate::") {
         let rest = &text[at + "crate::".len()..];

@@ -13,7 +13,11 @@ fn design_path(name: &str) -> PathBuf {
 }
 
 fn domecast(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_domecast")).args(arguments).current_dir(folder).output().expect("it runs")
+    Command::new(env!("CARGO_BIN_EXE_domecast"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("it runs")
 }
 
 fn build(name: &str, folder: &Path) -> PathBuf {
@@ -57,11 +61,15 @@ fn dots_lie_on_the_dome_and_project_to_their_pixels() {
             domecast(&["project", design.to_str().expect("UTF-8"), "--points", "points.csv"], folder.path());
         assert!(output.status.success());
         let text = String::from_utf8(output.stdout).expect("UTF-8");
-        let answers: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+        let answers: Vec<Value> =
+            text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
         assert_eq!(answers.len(), dots.len());
         for (answer, dot) in answers.iter().zip(dots) {
             assert_eq!(answer["status"], "ok");
-            assert!(distance::<2>(numbers(&answer["image_px"]), numbers(&dot["image_px"])) < 1e-9, "{name}: {dot}");
+            assert!(
+                distance::<2>(numbers(&answer["image_px"]), numbers(&dot["image_px"])) < 1e-9,
+                "{name}: {dot}"
+            );
         }
     }
 }
@@ -71,8 +79,12 @@ fn a_lattice_is_even_in_the_image() {
     let folder = tempfile::tempdir().expect("a folder");
     for name in DESIGNS {
         let constants = json(&build(name, folder.path()).join("constants/constants.json"));
-        let places: Vec<[f64; 2]> =
-            constants["black_dots"].as_array().expect("dots").iter().map(|dot| numbers(&dot["image_px"])).collect();
+        let places: Vec<[f64; 2]> = constants["black_dots"]
+            .as_array()
+            .expect("dots")
+            .iter()
+            .map(|dot| numbers(&dot["image_px"]))
+            .collect();
         let nearest = |at: usize| {
             let others = places.iter().enumerate().filter(|(other, _)| *other != at);
             others.map(|(_, other)| distance(places[at], *other)).fold(f64::INFINITY, f64::min)
@@ -102,7 +114,8 @@ fn the_artwork_lands_on_the_dots() {
             let to = from + element[from..].find('"').expect("its end");
             element[from..to].parse().expect("a number")
         };
-        let elements: Vec<&str> = drawing.split('<').filter(|element| element.contains(" data-id=")).collect();
+        let elements: Vec<&str> =
+            drawing.split('<').filter(|element| element.contains(" data-id=")).collect();
         assert_eq!(elements.len(), dots.len(), "{name}: every dot is drawn once");
         for element in elements {
             let dot = &dots[attribute(element, "data-id") as usize];
@@ -229,7 +242,8 @@ fn results_are_told_as_json_on_request() {
     assert_eq!(told["out"], default);
     assert_eq!(told["manifest"]["design"]["name"], "thumb24");
     let warnings = told["manifest"]["warnings"].as_array().expect("warnings");
-    let fold = warnings.iter().find(|warning| warning["field"] == "camera.distortion").expect("the fold is told");
+    let fold =
+        warnings.iter().find(|warning| warning["field"] == "camera.distortion").expect("the fold is told");
     assert!(fold["message"].as_str().expect("text").contains("folds at 61.0"));
     let constants = json(&folder.path().join("output/thumb24/constants/constants.json"));
     let reach = constants["camera"]["max_field_angle_rad"].as_f64().expect("a number");

@@ -179,7 +179,10 @@ fn geometry_that_cannot_be_is_refused() {
 
 #[test]
 fn dots_that_cannot_be_are_refused() {
-    assert_names(&refused_with("/pattern/dot_diameter_px", json!(18)), &["pattern.dot_diameter_px", "18", "pitch"]);
+    assert_names(
+        &refused_with("/pattern/dot_diameter_px", json!(18)),
+        &["pattern.dot_diameter_px", "18", "pitch"],
+    );
     // under the rim and beyond: the rays of such pixels miss the dome
     let mut design = design();
     design["pattern"].as_object_mut().expect("an object").remove("polar_angle_deg");
@@ -189,16 +192,28 @@ fn dots_that_cannot_be_are_refused() {
     design = self::design();
     design["camera"]["rotation_deg"] = json!([40, 0, 0]);
     design["loads"]["claims"] = json!([]);
-    assert_names(&refused(&design.to_string()), &["pattern.polar_angle_deg", "beyond_fold", "allowed: up to 35.8"]);
+    assert_names(
+        &refused(&design.to_string()),
+        &["pattern.polar_angle_deg", "beyond_fold", "allowed: up to 35.8"],
+    );
     assert_names(&refused_with("/print/min_dot_mm", json!(0.5)), &["unprintable", "0.5 mm", "drop"]);
 }
 
 #[test]
 fn markers_and_loads_that_cannot_be_seen_are_refused() {
     let message = refused_with("/camera/position_mm", json!([0, 0, -6.5]));
-    assert_names(&message, &["white_markers.positions_mm[0]", "the lens cannot see the marker", "beyond_fold"]);
-    assert_names(&refused_with("/white_markers/positions_mm/2", json!([-6, -6])), &["positions_mm[2]", "under the dome"]);
-    assert_names(&refused_with("/white_markers/positions_mm/1", json!([-11, 7.5])), &["positions_mm[1]", "edge"]);
+    assert_names(
+        &message,
+        &["white_markers.positions_mm[0]", "the lens cannot see the marker", "beyond_fold"],
+    );
+    assert_names(
+        &refused_with("/white_markers/positions_mm/2", json!([-6, -6])),
+        &["positions_mm[2]", "under the dome"],
+    );
+    assert_names(
+        &refused_with("/white_markers/positions_mm/1", json!([-11, 7.5])),
+        &["positions_mm[1]", "edge"],
+    );
     assert_names(
         &refused_with("/loads/claims/0/force_n", json!([0, 0, -40])),
         &["loads.claims[0]", "\"press\"", "coil_bind", "allowed: at most 3.5"],
@@ -215,7 +230,8 @@ fn a_disk_that_is_full_leaves_the_earlier_result() {
     // a limit on the size of files (in blocks of 512 bytes or 1 KiB) fails writes as a full disk does, without one
     let program = env!("CARGO_BIN_EXE_domecast");
     let script = format!("trap '' XFSZ; ulimit -f 40; exec '{program}' build '{DESIGN}' --out out");
-    let output = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().expect("it runs");
+    let output =
+        Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().expect("it runs");
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert_names(&message, &["out", "cannot write the file", "room on the disk"]);

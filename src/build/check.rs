@@ -57,7 +57,12 @@ impl CheckReport {
 pub fn check(dir: &Path, step: &mut dyn FnMut(&str)) -> Result<CheckReport, DesignError> {
     let path = dir.join(MANIFEST_NAME);
     let fault = |problem: String| {
-        DesignError::at("", "", problem, format!("a folder that `domecast build` wrote, with its {MANIFEST_NAME}"))
+        DesignError::at(
+            "",
+            "",
+            problem,
+            format!("a folder that `domecast build` wrote, with its {MANIFEST_NAME}"),
+        )
     };
     let text = fs::read_to_string(&path)
         .map_err(|error| fault(format!("no build can be read here ({error})")).in_file(&path))?;
@@ -68,7 +73,10 @@ pub fn check(dir: &Path, step: &mut dyn FnMut(&str)) -> Result<CheckReport, Desi
     report.add("files", check_files(dir, &manifest));
     step("checking the design");
     let design = load_design(dir, &manifest);
-    report.add(DESIGN_NAME, design.as_ref().map(|_| "resolves, its hash agrees".to_owned()).map_err(Clone::clone));
+    report.add(
+        DESIGN_NAME,
+        design.as_ref().map(|_| "resolves, its hash agrees".to_owned()).map_err(Clone::clone),
+    );
     step("checking the dots");
     let constants = read(dir, "constants/constants.json").and_then(|text| Constants::parse(&text));
     match (&design, &constants) {
@@ -101,7 +109,8 @@ fn check_files(dir: &Path, manifest: &Manifest) -> Result<String, String> {
             return Err(format!("{}: changed since the build (its hash differs)", file.path));
         }
     }
-    let listed = |path: &String| path == MANIFEST_NAME || manifest.files.iter().any(|file| file.path == *path);
+    let listed =
+        |path: &String| path == MANIFEST_NAME || manifest.files.iter().any(|file| file.path == *path);
     let found = list_files(dir).map_err(|error| error.to_string())?;
     match found.iter().find(|path| !listed(path)) {
         Some(path) => Err(format!("{path}: not in the manifest")),
@@ -136,13 +145,20 @@ fn check_constants(report: &mut CheckReport, dir: &Path, design: &Design, consta
             && expected.optics == constants.optics
             && expected.mask == constants.mask
             && expected.design == constants.design;
-        if same { Ok("camera, layers and mask are the design's".to_owned()) } else { Err("differ from the design".into()) }
+        if same {
+            Ok("camera, layers and mask are the design's".to_owned())
+        } else {
+            Err("differ from the design".into())
+        }
     });
     report.add("constants: camera and optics", camera);
     report.add("constants: dots on the dome", dots_on_dome(design, constants));
     report.add("constants: dots and markers in the image", dots_in_image(design, constants));
     report.add("constants: neighbours", neighbors(constants));
-    report.add("artwork/dots.svg", read(dir, "artwork/dots.svg").and_then(|text| check_svg(&text, &layout, constants)));
+    report.add(
+        "artwork/dots.svg",
+        read(dir, "artwork/dots.svg").and_then(|text| check_svg(&text, &layout, constants)),
+    );
 }
 
 fn dots_on_dome(design: &Design, constants: &Constants) -> Result<String, String> {
@@ -150,7 +166,9 @@ fn dots_on_dome(design: &Design, constants: &Constants) -> Result<String, String
     let mut worst_mm = 0.0_f64;
     for dot in &constants.black_dots {
         let surface = DVec3::from_array(dot.surface_mm);
-        let off_mm = (surface.length() - radius_mm).abs().max((surface / radius_mm - DVec3::from_array(dot.normal)).length());
+        let off_mm = (surface.length() - radius_mm)
+            .abs()
+            .max((surface / radius_mm - DVec3::from_array(dot.normal)).length());
         if off_mm.is_nan() || off_mm > DOME_TOLERANCE_MM || surface.z < 0.0 {
             return Err(format!("dot {} is {off_mm:.3e} mm off the dome of {radius_mm} mm", dot.id));
         }
@@ -161,7 +179,10 @@ fn dots_on_dome(design: &Design, constants: &Constants) -> Result<String, String
 
 fn dots_in_image(design: &Design, constants: &Constants) -> Result<String, String> {
     let dots = constants.black_dots.iter().map(|dot| ("dot", dot.id, dot.surface_mm, dot.image_px));
-    let markers = constants.white_markers.iter().map(|marker| ("marker", marker.id, marker.position_mm, marker.image_px));
+    let markers = constants
+        .white_markers
+        .iter()
+        .map(|marker| ("marker", marker.id, marker.position_mm, marker.image_px));
     let mut worst_px = 0.0_f64;
     for (kind, id, place_mm, image_px) in dots.chain(markers) {
         let image = design

@@ -114,7 +114,7 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     }
     step("making the parts");
     let mut records = Vec::new();
-    for part in parts::build(design)? {
+    for part in parts::build(design, &layout.hits)? {
         let file = format!("parts/{}.stl", part.name);
         let mut bytes = Vec::new();
         part.write_stl(&mut bytes).map_err(|error| BuildError::Ours(format!("{file}: {error}")))?;
@@ -127,7 +127,9 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
             bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
         });
     }
-    warnings.extend(layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }));
+    warnings.extend(
+        layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
+    );
 
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
     let manifest = Manifest::new(record, records, warnings, &tree);
@@ -151,17 +153,28 @@ fn try_claims(design: &Design) -> Result<(), DesignError> {
             DesignError::at(
                 field.clone(),
                 serde_json::json!(claim),
-                format!("the load \"{}\" passes a limit: {} at {part}, {value:.3} {unit}", claim.name, limit.as_str()),
+                format!(
+                    "the load \"{}\" passes a limit: {} at {part}, {value:.3} {unit}",
+                    claim.name,
+                    limit.as_str()
+                ),
                 format!("at most {bound:.3} {unit}"),
             )
-            .with_help("claim less, or change `springs`, `magnets.grip_force_n` or the heights of the platforms")
+            .with_help(
+                "claim less, or change `springs`, `magnets.grip_force_n` or the heights of the platforms",
+            )
         });
         if let Some(error) = passed {
             return Err(error);
         }
-        let balance = case
-            .equilibrium
-            .map_err(|error| DesignError::at(field, serde_json::json!(claim), error.to_string(), "a load that the springs carry"))?;
+        let balance = case.equilibrium.map_err(|error| {
+            DesignError::at(
+                field,
+                serde_json::json!(claim),
+                error.to_string(),
+                "a load that the springs carry",
+            )
+        })?;
         let pose = balance.displacement.to_pose(suspension.at_mm());
         sight::markers(design, &pose, &format!("under the load \"{}\"", claim.name))?;
     }

@@ -27,7 +27,12 @@ pub struct Sight {
 /// The first point that leaves the lens, the frame or the mask; `field` names the load (or "at rest").
 pub fn markers(design: &Design, rest_from_platform: &Rigid, when: &str) -> Result<Sight, DesignError> {
     let optics = design.optics().at_pose(rest_from_platform).map_err(|error| {
-        DesignError::at("camera.position_mm", error.value.clone(), format!("{when}, the sheet meets the camera"), error.allowed)
+        DesignError::at(
+            "camera.position_mm",
+            error.value.clone(),
+            format!("{when}, the sheet meets the camera"),
+            error.allowed,
+        )
     })?;
     let radius_mm = design.sections().white_markers.diameter_mm / 2.0;
     let mask_radius_px = design.sections().runtime.mask_radius_px;
@@ -43,7 +48,9 @@ pub fn markers(design: &Design, rest_from_platform: &Rigid, when: &str) -> Resul
                     format!("{when}, {problem}"),
                     allowed,
                 )
-                .with_help("move the markers inwards, the camera deeper, stiffen the springs, or claim less load")
+                .with_help(
+                    "move the markers inwards, the camera deeper, stiffen the springs, or claim less load",
+                )
             };
             let seen = see(design, &optics, point).map_err(|problem| {
                 fault(problem, "markers inside lens and frame under every claimed load".into())
@@ -63,13 +70,18 @@ pub fn markers(design: &Design, rest_from_platform: &Rigid, when: &str) -> Resul
 
 /// Where one point of a marker is seen, or why it is not.
 fn see(design: &Design, optics: &SensorOptics, point: DVec3) -> Result<Sight, String> {
-    let pixel = optics.project(point).map_err(|limit| format!("the lens cannot see the marker's edge ({limit})"))?;
+    let pixel =
+        optics.project(point).map_err(|limit| format!("the lens cannot see the marker's edge ({limit})"))?;
     let lens = optics.lens();
     let (width, height) = (f64::from(lens.spec().width), f64::from(lens.spec().height));
     if pixel.x < -0.5 || pixel.y < -0.5 || pixel.x > width - 0.5 || pixel.y > height - 0.5 {
-        return Err(format!("the marker's edge is at pixel ({:.1}, {:.1}), outside the frame", pixel.x, pixel.y));
+        return Err(format!(
+            "the marker's edge is at pixel ({:.1}, {:.1}), outside the frame",
+            pixel.x, pixel.y
+        ));
     }
-    let ray = lens.unproject(pixel).map_err(|limit| format!("the lens cannot see the marker's edge ({limit})"))?;
+    let ray =
+        lens.unproject(pixel).map_err(|limit| format!("the lens cannot see the marker's edge ({limit})"))?;
     if ray.z <= 0.0 {
         return Err("the marker's edge is at 90 degrees or more, where an undistorted frame ends".into());
     }

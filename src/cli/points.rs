@@ -141,7 +141,12 @@ fn json_rows<const N: usize>(text: &str, names: [&str; N]) -> Result<Vec<Row<N>>
     let text = text.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
     let value = parse_json(&text)?;
     let Value::Array(items) = &value else {
-        return Err(DesignError::at("", &value, "not a list of points", format!("a list of [{}]", names.join(","))));
+        return Err(DesignError::at(
+            "",
+            &value,
+            "not a list of points",
+            format!("a list of [{}]", names.join(",")),
+        ));
     };
     let coordinate = |value: Option<&Value>| match value {
         Some(Value::Null) => Ok(f64::NAN),
@@ -183,8 +188,12 @@ fn csv_rows<const N: usize>(text: &str, names: [&str; N]) -> Result<Vec<Row<N>>,
                 let mut at = [0; N];
                 for (slot, name) in at.iter_mut().zip(names) {
                     *slot = cells.iter().position(|cell| cell == &name).ok_or_else(|| {
-                        let mut fault =
-                            DesignError::at("", "", format!("the header has no column \"{name}\""), names.join(","));
+                        let mut fault = DesignError::at(
+                            "",
+                            "",
+                            format!("the header has no column \"{name}\""),
+                            names.join(","),
+                        );
                         fault.place = Some((index + 1, 1));
                         fault
                     })?;

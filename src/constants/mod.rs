@@ -8,8 +8,8 @@ mod model;
 use serde_json::json;
 
 pub use model::{
-    BlackDot, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants, Matrix4, OpticsConstants, PlainRuntime,
-    SpringConstants, StiffnessAt, VERSION, WhiteMarker,
+    BlackDot, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants, Matrix4, OpticsConstants,
+    PlainRuntime, SpringConstants, StiffnessAt, VERSION, WhiteMarker,
 };
 
 use crate::design::{Design, DesignError};

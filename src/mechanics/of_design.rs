@@ -14,7 +14,12 @@ use crate::design::{Design, DesignError};
 const N_PER_G_MPS2: f64 = 1e-3;
 
 fn fault(section: &str, error: &SpecError) -> DesignError {
-    DesignError::at(format!("{section}.{}", error.field), error.value, "the springs cannot be", error.allowed.clone())
+    DesignError::at(
+        format!("{section}.{}", error.field),
+        error.value,
+        "the springs cannot be",
+        error.allowed.clone(),
+    )
 }
 
 /// The platform on its springs.
@@ -45,10 +50,14 @@ pub fn suspension_of(design: &Design) -> Result<Suspension, DesignError> {
             .map_err(|error| fault("magnets", &error))
     };
     let underside_z_mm = sections.platforms.upper.underside_z_mm;
-    let (weight_n, center_of_mass_mm) = sections.gravity.as_ref().map_or((DVec3::ZERO, DVec3::ZERO), |gravity| {
-        let acceleration = DVec3::from_array(gravity.acceleration_mps2);
-        (acceleration * gravity.moving_mass_g * N_PER_G_MPS2, DVec3::from_array(gravity.center_of_mass_mm))
-    });
+    let (weight_n, center_of_mass_mm) =
+        sections.gravity.as_ref().map_or((DVec3::ZERO, DVec3::ZERO), |gravity| {
+            let acceleration = DVec3::from_array(gravity.acceleration_mps2);
+            (
+                acceleration * gravity.moving_mass_g * N_PER_G_MPS2,
+                DVec3::from_array(gravity.center_of_mass_mm),
+            )
+        });
     Suspension::new(SuspensionSpec {
         spring,
         upper_ends_mm: design.springs_at_mm().into_iter().map(|at| at.extend(underside_z_mm)).collect(),

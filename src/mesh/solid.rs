@@ -1,7 +1,7 @@
 //! Booleans. The only file that knows the kernel behind them.
 
-use glam::DVec3;
-use manifold_rust::linalg::Vec3;
+use glam::{DAffine3, DVec3};
+use manifold_rust::linalg::{Mat3x4, Vec3};
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{BooleanEngine, Error as KernelError, MeshGL64, OpType};
 
@@ -71,6 +71,22 @@ impl Solid {
 
     fn boolean(&self, other: &Self, op: OpType, operation: &'static str) -> Result<Self, MeshError> {
         guarded(operation, || self.inner.boolean_with_engine(&other.inner, op, BooleanEngine::Exact))
+    }
+
+    /// The solid moved by a rigid (or other affine, not mirroring) map.
+    ///
+    /// # Errors
+    /// [`MeshError::Kernel`] if the map is not finite.
+    pub fn moved(&self, target_from_source: &DAffine3) -> Result<Self, MeshError> {
+        let column = |v: DVec3| Vec3::new(v.x, v.y, v.z);
+        let m = &target_from_source.matrix3;
+        let map = Mat3x4::from_cols(
+            column(m.x_axis),
+            column(m.y_axis),
+            column(m.z_axis),
+            column(target_from_source.translation),
+        );
+        guarded("move", || self.inner.transform(&map))
     }
 
     /// Volume, mm^3.

@@ -11,7 +11,7 @@ pub enum PartError {
     /// Dimensions of the design contradict each other.
     Infeasible {
         /// The part.
-        part: &'static str,
+        part: String,
         /// Where in it, and what is wrong.
         place: String,
         /// What was found, mm.
@@ -25,7 +25,7 @@ pub enum PartError {
     /// A shape or a boolean failed.
     Mesh {
         /// The part.
-        part: &'static str,
+        part: String,
         /// Why.
         error: MeshError,
     },
@@ -33,7 +33,7 @@ pub enum PartError {
     /// should be.
     Broken {
         /// The part.
-        part: &'static str,
+        part: String,
         /// What is wrong with it.
         problem: String,
     },
@@ -70,15 +70,24 @@ impl From<PartError> for DesignError {
                 format!("{part}: {place}: {value_mm:.4} mm"),
                 format!("a limit of {limit_mm:.4} mm"),
             ),
-            PartError::View { problem, field } => {
-                Self::at(field, "", format!("the camera's view: {problem}"), "a view that the platform leaves open")
-            }
-            PartError::Mesh { part, error } => {
-                Self::at("mesh.chord_tolerance_mm", "", format!("{part}: {error}"), "a tolerance that suits the size")
-            }
-            PartError::Broken { part, problem } => {
-                Self::at("platforms", "", format!("{part}: {problem}"), "features that neither touch nor overlap")
-            }
+            PartError::View { problem, field } => Self::at(
+                field,
+                "",
+                format!("the camera's view: {problem}"),
+                "a view that the platform leaves open",
+            ),
+            PartError::Mesh { part, error } => Self::at(
+                "mesh.chord_tolerance_mm",
+                "",
+                format!("{part}: {error}"),
+                "a tolerance that suits the size",
+            ),
+            PartError::Broken { part, problem } => Self::at(
+                "platforms",
+                "",
+                format!("{part}: {problem}"),
+                "features that neither touch nor overlap",
+            ),
         }
     }
 }

@@ -46,7 +46,7 @@ impl Feature {
 /// A part before it is meshed.
 pub(crate) struct Blueprint {
     /// Name of the part and of its files.
-    pub name: &'static str,
+    pub name: String,
     /// One line on what it is.
     pub summary: &'static str,
     /// Material.
@@ -64,9 +64,9 @@ pub(crate) struct Blueprint {
 }
 
 impl Blueprint {
-    pub(crate) fn new(name: &'static str, summary: &'static str, chord: Chord) -> Self {
+    pub(crate) fn new(name: impl Into<String>, summary: &'static str, chord: Chord) -> Self {
         Self {
-            name,
+            name: name.into(),
             summary,
             added: Vec::new(),
             cut: Vec::new(),
@@ -92,7 +92,7 @@ impl Blueprint {
         field: impl Into<String>,
     ) -> PartError {
         PartError::Infeasible {
-            part: self.name,
+            part: self.name.clone(),
             place: place.into(),
             value_mm,
             limit_mm,

@@ -47,7 +47,8 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
             * DAffine3::from_rotation_z(azimuth_deg.to_radians())
             * DAffine3::from_rotation_y(std::f64::consts::FRAC_PI_2);
         // From inside the bore, but not so far in that two of them meet there.
-        let hole = Shape::cylinder(0.5 * clamp.hole_diameter_mm, 0.5 * m.bore_radius_mm(), reach, Fit::Outside);
+        let hole =
+            Shape::cylinder(0.5 * clamp.hole_diameter_mm, 0.5 * m.bore_radius_mm(), reach, Fit::Outside);
         let feature = Feature::new("clamp hole", "platforms.lower.clamp", hole);
         b.cut.push(feature.numbered(i).placed(outwards));
         b.genus += 1;

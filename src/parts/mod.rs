@@ -10,6 +10,10 @@
 //! Frames: the platforms are in the sensor frame at rest, the mould has its own
 //! with the parting plane at z = 0 and the cavity below.
 
+mod accessories;
+mod assembly;
+mod bought;
+mod checks;
 mod error;
 mod feature;
 mod lower;
@@ -26,19 +30,22 @@ use std::io::{self, Write};
 
 use rayon::prelude::*;
 
+pub use assembly::{Assembly, Item};
+pub use checks::check_assembly;
 pub use error::PartError;
 use feature::{Blueprint, Feature};
 pub use measures::Measures;
 pub use view::ViewCone;
 
 use crate::design::Design;
+use crate::layout::Hit;
 use crate::mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, write_stl};
 
 /// One part, ready to be written.
 #[derive(Debug, Clone)]
 pub struct Part {
     /// Name, also of its files: `upper_platform`.
-    pub name: &'static str,
+    pub name: String,
     /// One line on what it is and what it is made of.
     pub summary: &'static str,
     /// The exact shapes that it is made of.
@@ -64,14 +71,15 @@ impl Blueprint {
     /// Meshes the part and looks at what came out.
     fn build(&self) -> Result<Part, PartError> {
         let construction = self.construction();
-        let solid =
-            construction.solid(self.chord).map_err(|error| PartError::Mesh { part: self.name, error })?;
+        let solid = construction
+            .solid(self.chord)
+            .map_err(|error| PartError::Mesh { part: self.name.clone(), error })?;
         let in_f64 = solid.to_mesh();
         let mesh = in_f64.welded_f32();
-        let broken = |problem: String| PartError::Broken { part: self.name, problem };
+        let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
         let part = Part {
-            name: self.name,
+            name: self.name.clone(),
             summary: self.summary,
             construction,
             chord_tolerance_mm: self.chord.tolerance_mm(),
@@ -109,7 +117,7 @@ impl Part {
         });
         match problem {
             None => Ok(()),
-            Some(problem) => Err(PartError::Broken { part: self.name, problem }),
+            Some(problem) => Err(PartError::Broken { part: self.name.clone(), problem }),
         }
     }
 
@@ -122,24 +130,42 @@ impl Part {
     }
 }
 
-/// Makes all parts of a design, in a fixed order.
+/// Makes all parts of a design, in a fixed order, and checks each against the
+/// process. One pad-printing jig is made for each hit.
 ///
 /// # Errors
 /// The first part, in that order, that cannot be made.
-pub fn build(design: &Design) -> Result<Vec<Part>, PartError> {
-    build_measured(&Measures::of(design)?)
+pub fn build(design: &Design, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
+    build_measured(&Measures::of(design)?, hits)
 }
 
 /// [`build`] for measures that are at hand.
 ///
 /// # Errors
 /// As [`build`].
-pub fn build_measured(measures: &Measures) -> Result<Vec<Part>, PartError> {
-    let makers: [Maker; 4] = [upper::blueprint, lower::blueprint, mould::cavity, mould::base];
-    let make = |make: &Maker| {
-        let blueprint = make(measures)?;
-        walls::check(&blueprint, measures)?;
-        blueprint.build()
+pub fn build_measured(m: &Measures, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
+    let makers: [Maker; 7] = [
+        upper::blueprint,
+        lower::blueprint,
+        mould::cavity,
+        mould::base,
+        accessories::sheet,
+        accessories::stencil,
+        accessories::coupon,
+    ];
+    let jig = |i: usize| {
+        let name = if hits.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") };
+        hits.get(i).map(|hit| accessories::jig(m, &name, hit))
     };
-    makers.par_iter().map(make).collect::<Vec<_>>().into_iter().collect()
+    (0..makers.len() + hits.len())
+        .into_par_iter()
+        .filter_map(|i| makers.get(i).map(|make| make(m)).or_else(|| jig(i - makers.len())))
+        .map(|blueprint| {
+            let blueprint = blueprint?;
+            walls::check(&blueprint, m)?;
+            blueprint.build()
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
 }

@@ -27,6 +27,12 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
         ("sheet recess", "LED pit"),
         ("sheet recess", "light channel"),
         ("sheet recess", "rim notch"),
+        ("sheet recess", "marker window"),
+        ("window", "marker window"),
+        ("marker window", "marker window"),
+        ("marker window", "push-out hole"),
+        ("marker window", "LED pit"),
+        ("marker window", "light channel"),
         ("window", "push-out hole"),
         ("window", "LED pit"),
         ("window", "light channel"),
@@ -61,19 +67,22 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
         b.cut.push(Feature::new("sheet recess", "sheet.size_mm", pocket));
     }
 
-    let window = m.view.profile(bottom, seat, top, over);
-    let opening = window.max_radius_mm();
-    let within = if upper.rim_height_mm > 0.0 { recess.min_element() } else { h.min_element() };
-    if opening >= within {
+    let need = m.view.half_extent_mm();
+    let within = if upper.rim_height_mm > 0.0 { recess } else { h };
+    if need.cmpge(within).any() {
         return Err(b.infeasible(
-            "radius of the window where it meets the sheet, less than the recess's half width",
-            opening,
-            within,
+            "half width of the window where it meets the sheet, less than the recess's",
+            need.max_element(),
+            within.min_element(),
             "sheet.size_mm",
         ));
     }
-    let window = Shape::Turned { profile: window, fit: Fit::Outside };
-    b.cut.push(Feature::new("window", "platforms.window_margin_mm", window));
+    let cone = Feature::new("window", "platforms.window_margin_mm", m.view.cone(over, top + over));
+    b.cut.push(cone);
+    for (i, (shape, placed)) in m.view.beams(over, top + over).into_iter().enumerate() {
+        let beam = Feature::new("marker window", "platforms.window_margin_mm", shape);
+        b.cut.push(beam.numbered(i).placed(placed));
+    }
     b.genus += 1;
 
     // Their push-out holes lead up into window, recess or rim: open above.

@@ -27,7 +27,7 @@ pub(super) fn check(b: &Blueprint, m: &Measures) -> Result<(), PartError> {
     if !b.printed || limit <= 0.0 {
         return Ok(());
     }
-    let failed = |error: MeshError| PartError::Mesh { part: b.name, error };
+    let failed = |error: MeshError| PartError::Mesh { part: b.name.clone(), error };
     let chord = Chord::new((CHORD_SHARE * limit).max(b.chord.tolerance_mm())).map_err(failed)?;
     distances(b, chord, limit, &failed)?;
     thicknesses(b, chord, limit, &failed)
@@ -136,7 +136,7 @@ fn thicknesses(
     Err(b.infeasible(place, thickness, limit, fields(one, two)))
 }
 
-/// Points inside a triangle about half the limit apart, at most a few hundred;
+/// Points inside a triangle about as far apart as the limit, at most some hundred;
 /// a sliver gets a single row of them.
 fn samples(corners: [DVec3; 3], twice_area: f64, limit: f64) -> Vec<DVec3> {
     let [p, q, r] = corners;
@@ -144,7 +144,7 @@ fn samples(corners: [DVec3; 3], twice_area: f64, limit: f64) -> Vec<DVec3> {
     let length = |&(a, b, _): &(DVec3, DVec3, DVec3)| (b - a).length();
     let longest = edges.iter().map(length).fold(0.0, f64::max);
     let short = twice_area / longest.max(f64::MIN_POSITIVE);
-    let n = ((2.0 * longest / limit).ceil() as u32).clamp(1, 24);
+    let n = ((longest / limit).ceil() as u32).clamp(1, 24);
     let at = |i: u32, n: u32| (f64::from(i) + 1.0 / 3.0) / f64::from(n);
     if short < 0.5 * limit {
         let shortest = edges.iter().min_by(|x, y| length(x).total_cmp(&length(y)));

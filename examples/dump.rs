@@ -1,0 +1,46 @@
+use domecast::{design, parts};
+fn main() {
+    let a: Vec<String> = std::env::args().collect();
+    let d = match design::load(std::path::Path::new(&a[1])) {
+        Ok(d) => d,
+        Err(e) => {
+            eprintln!("{e}");
+            std::process::exit(1)
+        }
+    };
+    let t = std::time::Instant::now();
+    let m = parts::Measures::of(&d).unwrap_or_else(|e| panic!("{e}"));
+    println!("measures {:?} {:?}", t.elapsed(), m.view);
+    let t = std::time::Instant::now();
+    match parts::build_measured(&m, &[domecast::layout::Hit::new(0.0, 0.0)]) {
+        Ok(ps) => {
+            let mut rows = vec![];
+            let t = std::time::Instant::now();
+            let asm = parts::Assembly::of(&m, &ps).unwrap();
+            println!("assembly {:?} {:?}", t.elapsed(), asm.items.len());
+            let t = std::time::Instant::now();
+            match parts::check_assembly(&m, &ps, &asm) {
+                Ok(()) => println!("checks ok"),
+                Err(e) => println!("CHECK {e}"),
+            }
+            println!("checks {:?}", t.elapsed());
+            println!("built in {:?}", t.elapsed());
+            for p in ps {
+                println!(
+                    "{} V={:.3} genus={} tris={} {:?}",
+                    p.name,
+                    p.volume_mm3,
+                    p.genus,
+                    p.mesh.triangles.len(),
+                    p.bounds
+                );
+                let mut f = std::fs::File::create(format!("{}/{}.stl", a[2], p.name)).unwrap();
+                p.write_stl(&mut f).unwrap();
+                rows.push(serde_json::json!({"name": p.name, "file": format!("{}.stl", p.name), "volume_mm3": p.volume_mm3, "genus": p.genus, "bbox_mm": [p.bounds.min_mm.to_array(), p.bounds.max_mm.to_array()]}));
+            }
+            std::fs::write(format!("{}/manifest.json", a[2]), serde_json::json!({"parts": rows}).to_string())
+                .unwrap();
+        }
+        Err(e) => println!("ERROR {e}"),
+    }
+}

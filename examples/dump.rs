@@ -18,6 +18,9 @@ fn main() {
             let t = std::time::Instant::now();
             let asm = parts::Assembly::of(&m, &ps).unwrap();
             println!("assembly {:?} {:?}", t.elapsed(), asm.items.len());
+            let items: Vec<_> = asm.items.iter().map(|i| domecast::mesh::GlbItem{name:&i.name,color:i.color,mesh:&i.mesh}).collect();
+            let mut f = std::fs::File::create(format!("{}/assembly.glb", a[2])).unwrap();
+            domecast::mesh::write_glb(&items, &[domecast::mesh::GlbScene{name:"closed".into(),shift_mm:vec![]},domecast::mesh::GlbScene{name:"exploded".into(),shift_mm:asm.items.iter().map(|i|i.explode_mm).collect()}], &mut f).unwrap();
             let t = std::time::Instant::now();
             match parts::check_assembly(&m, &ps, &asm) {
                 Ok(()) => println!("checks ok"),
@@ -36,6 +39,12 @@ fn main() {
                 );
                 let mut f = std::fs::File::create(format!("{}/{}.stl", a[2], p.name)).unwrap();
                 p.write_stl(&mut f).unwrap();
+                let exact = domecast::mesh::Brep::exact(&p.construction);
+                println!("  step {} exact {}", p.name, exact.is_some());
+                let brep = exact.unwrap_or_else(|| domecast::mesh::Brep::faceted(&p.mesh));
+                std::fs::write(format!("{}/{}.step", a[2], p.name), brep.to_step(&p.name)).unwrap();
+                let mut f = std::fs::File::create(format!("{}/{}.3mf", a[2], p.name)).unwrap();
+                domecast::mesh::write_3mf(&[(&p.name, &p.mesh)], &mut f).unwrap();
                 rows.push(serde_json::json!({"name": p.name, "file": format!("{}.stl", p.name), "volume_mm3": p.volume_mm3, "genus": p.genus, "bbox_mm": [p.bounds.min_mm.to_array(), p.bounds.max_mm.to_array()]}));
             }
             std::fs::write(format!("{}/manifest.json", a[2]), serde_json::json!({"parts": rows}).to_string())

@@ -12,10 +12,13 @@
 
 mod accessories;
 mod assembly;
+mod bom;
 mod bought;
 mod checks;
+mod drawing;
 mod error;
 mod feature;
+mod files;
 mod lower;
 mod measures;
 mod mould;
@@ -34,10 +37,10 @@ pub use assembly::{Assembly, Item};
 pub use checks::check_assembly;
 pub use error::PartError;
 use feature::{Blueprint, Feature};
+pub use files::{PartFile, files};
 pub use measures::Measures;
 pub use view::ViewCone;
 
-use crate::design::Design;
 use crate::layout::Hit;
 use crate::mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, write_stl};
 
@@ -130,20 +133,12 @@ impl Part {
     }
 }
 
-/// Makes all parts of a design, in a fixed order, and checks each against the
-/// process. One pad-printing jig is made for each hit.
+/// Makes all parts, in a fixed order, and checks each against the process. One
+/// pad-printing jig is made for each hit.
 ///
 /// # Errors
 /// The first part, in that order, that cannot be made.
-pub fn build(design: &Design, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
-    build_measured(&Measures::of(design)?, hits)
-}
-
-/// [`build`] for measures that are at hand.
-///
-/// # Errors
-/// As [`build`].
-pub fn build_measured(m: &Measures, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
+pub fn build(m: &Measures, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
     let makers: [Maker; 7] = [
         upper::blueprint,
         lower::blueprint,

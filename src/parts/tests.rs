@@ -3,6 +3,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::*;
+use crate::design::Design;
 use crate::mesh::{Fit, Piece, Shape, Solid};
 
 fn thumb24() -> Design {
@@ -22,7 +23,7 @@ fn every_design_gives_sound_parts() {
     for entry in std::fs::read_dir("designs").unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "json") {
-            let parts = build(&crate::design::load(&path).unwrap(), &hits()).unwrap();
+            let parts = build(&Measures::of(&crate::design::load(&path).unwrap()).unwrap(), &hits()).unwrap();
             assert!(parts.len() >= 4);
             for part in &parts {
                 let found = part.inspect();
@@ -39,7 +40,7 @@ fn parts_are_the_same_bytes_on_any_number_of_threads() {
     let measures = Measures::of(&thumb24()).unwrap();
     let bytes = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let parts = pool.install(|| build_measured(&measures, &hits())).unwrap();
+        let parts = pool.install(|| build(&measures, &hits())).unwrap();
         let mut out = Vec::new();
         parts.iter().for_each(|p| p.write_stl(&mut out).unwrap());
         out
@@ -53,7 +54,7 @@ fn parts_are_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn window_lets_the_view_through() {
     let design = thumb24();
-    let parts = build(&design, &hits()).unwrap();
+    let parts = build(&Measures::of(&design).unwrap(), &hits()).unwrap();
     let upper = solid(&parts[0]);
     let optics = design.optics();
     let marker_mm = design.sections().white_markers.diameter_mm;
@@ -84,7 +85,7 @@ fn window_lets_the_view_through() {
 fn bought_parts_fit_their_seats() {
     let design = thumb24();
     let m = Measures::of(&design).unwrap();
-    let parts = build_measured(&m, &hits()).unwrap();
+    let parts = build(&m, &hits()).unwrap();
     let chord = crate::mesh::Chord::new(0.001).unwrap();
     let overlap = |part: &Part, shape: Shape| {
         let tool = Piece::new("stand-in", shape).solid(chord).unwrap();
@@ -119,7 +120,7 @@ fn bought_parts_fit_their_seats() {
 fn mould_casts_the_dome() {
     let design = thumb24();
     let m = Measures::of(&design).unwrap();
-    let cavity = &build_measured(&m, &hits()).unwrap()[2];
+    let cavity = &build(&m, &hits()).unwrap()[2];
     let radius = m.cavity_radius_mm();
     let expected = design.sections().dome.radius_mm / (1.0 - m.shrinkage) + m.mould.sealer_thickness_mm;
     assert!((radius - expected).abs() < 1e-12);
@@ -134,14 +135,14 @@ fn contradictions_name_the_field() {
     let good = Measures::of(&thumb24()).unwrap();
     let mut bad = good.clone();
     bad.sheet_size_mm *= 0.9;
-    let error = build_measured(&bad, &hits()).unwrap_err().to_string();
+    let error = build(&bad, &hits()).unwrap_err().to_string();
     assert!(error.contains("sheet.size_mm"), "{error}");
 
     let mut bad = good.clone();
     bad.platforms.lower.clamp.azimuth_deg = vec![90.0];
-    assert!(build_measured(&bad, &hits()).unwrap_err().to_string().contains("lower_platform"));
+    assert!(build(&bad, &hits()).unwrap_err().to_string().contains("lower_platform"));
 
     let mut bad = good;
     bad.mould.pins.chamfer_mm = 5.0;
-    assert!(build_measured(&bad, &hits()).unwrap_err().to_string().contains("mould.pins.chamfer_mm"));
+    assert!(build(&bad, &hits()).unwrap_err().to_string().contains("mould.pins.chamfer_mm"));
 }

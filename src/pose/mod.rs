@@ -1,1 +1,20 @@
-//! (in the making)
+//! The platform's pose from its white markers, through lens and layers.
+//!
+//! [`Marker`] says where a disc's centroid appears; [`PoseSolver`] inverts that, with covariance, both poses where
+//! two fit, and a named [`PoseError`] where none does. Where the pixels come from is not known here.
+
+mod disc;
+mod estimate;
+mod fault;
+mod refine;
+mod solver;
+mod start;
+mod view;
+
+pub use disc::{DiscImage, Marker};
+pub use estimate::{PoseEstimate, PoseOptions, Sighting, displacement_from_motion};
+pub use fault::PoseError;
+pub use solver::{MOST_MARKERS, PoseSolver};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,224 @@
+//! Levenberg-Marquardt over poses, and the two ways to get residuals.
+
+use glam::{DVec2, DVec3};
+use nalgebra::{Matrix6, Vector6};
+
+use super::disc::{DIRECTIONS, Marker, OUTLINE, centroid_offset};
+use super::view::{Placed, Sheet, Sight};
+use crate::numeric::{Rigid, rotation_from_vector, vector_from_rotation};
+use crate::optics::{Limit, SensorOptics};
+
+const MOST_STEPS: u32 = 40;
+
+/// Why residuals do not exist at a pose: which marker, which limit.
+pub(super) type Hidden = (u32, Limit);
+
+/// Sum of squared residuals (px^2), normal matrix and right side.
+pub(super) struct Normal {
+    pub chi2: f64,
+    pub matrix: Matrix6<f64>,
+    pub right: Vector6<f64>,
+}
+
+/// Residuals of sightings as a function of the pose.
+pub(super) trait Model {
+    /// At a pose. `moved` says how far, in mm, the last step went (infinite at first), so that slow parts can be
+    /// kept while they are sharp enough. The second value says whether everything is exact at this pose.
+    fn at(&mut self, pose: &Rigid, moved: f64) -> Result<(Normal, bool), Hidden>;
+}
+
+/// A refined pose.
+pub(super) struct Fit {
+    pub pose: Rigid,
+    pub chi2: f64,
+    pub normal: Matrix6<f64>,
+    pub steps: u32,
+    pub settled: bool,
+}
+
+impl Normal {
+    fn empty() -> Self {
+        Self { chi2: 0.0, matrix: Matrix6::zeros(), right: Vector6::zeros() }
+    }
+
+    fn add(&mut self, row: [f64; 6], left: f64) {
+        self.chi2 += left * left;
+        for i in 0..6 {
+            self.right[i] += row[i] * left;
+            for j in 0..=i {
+                self.matrix[(i, j)] += row[i] * row[j];
+            }
+        }
+    }
+
+    fn filled(mut self) -> Self {
+        for i in 0..6 {
+            for j in 0..i {
+                self.matrix[(j, i)] = self.matrix[(i, j)];
+            }
+        }
+        self
+    }
+}
+
+/// Residuals through the whole of `optics`, for any lens.
+pub(super) struct Residuals<'a> {
+    pub optics: &'a SensorOptics,
+    pub seen: &'a [(Marker, DVec2)],
+}
+
+impl Model for Residuals<'_> {
+    fn at(&mut self, pose: &Rigid, _moved: f64) -> Result<(Normal, bool), Hidden> {
+        let first = self.seen.first().map_or(0, |(m, _)| m.id);
+        let optics = self.optics.at_pose(pose).map_err(|_| (first, Limit::PupilInsideSheet))?;
+        let mut normal = Normal::empty();
+        for (marker, px) in self.seen {
+            let (centroid, motion) =
+                marker.centroid_with_motion(&optics).map_err(|limit| (marker.id, limit))?;
+            for axis in 0..2 {
+                normal.add(std::array::from_fn(|j| motion[(axis, j)]), (*px - centroid)[axis]);
+            }
+        }
+        Ok((normal.filled(), true))
+    }
+}
+
+/// Residuals in the plane that touches the observed pixel's ray, scaled to pixels by the lens's Jacobian there,
+/// plus an offset: what the exact centroid of the disc's image differs by. The offset changes slowly with the
+/// pose and is renewed when the pose has moved; at the end the residuals are those of raw pixels.
+pub(super) struct Sharp<'a> {
+    sheet: &'a Sheet,
+    seen: &'a [(Marker, DVec2)],
+    sights: Vec<Sight>,
+    offsets: Vec<DVec2>,
+    /// Tangent over reach of each marker's last ray, 1/mm.
+    nears: Vec<f64>,
+    /// How far the pose has moved since the offsets were made, mm; infinite before.
+    age_mm: f64,
+}
+
+/// Offsets change by some hundredths of a pixel per mm. They are made once the steps are shorter than this (mm),
+const FIRST_MM: f64 = 0.05;
+/// again once they are shorter than this,
+const LAST_MM: f64 = 1e-5;
+/// and count as exact where the pose has moved less than this since: below 1e-9 px.
+const FRESH_MM: f64 = 1e-8;
+
+impl<'a> Sharp<'a> {
+    /// `offsets` are a first guess, px.
+    pub fn new(
+        sheet: &'a Sheet,
+        seen: &'a [(Marker, DVec2)],
+        sights: Vec<Sight>,
+        offsets: Vec<DVec2>,
+    ) -> Self {
+        Self { sheet, seen, sights, offsets, nears: vec![0.0; seen.len()], age_mm: f64::INFINITY }
+    }
+
+    /// Makes ready for another start.
+    pub fn restart(&mut self) {
+        self.age_mm = f64::INFINITY;
+        self.nears.fill(0.0);
+    }
+
+    fn renew(&mut self, placed: &Placed) -> Result<(), Hidden> {
+        let parts = self.seen.iter().zip(&self.sights).zip(&mut self.offsets).zip(&self.nears);
+        for ((((marker, px), sight), offset), near) in parts {
+            let radius = 0.5 * marker.diameter_mm;
+            let steps: [DVec2; OUTLINE] = DIRECTIONS.map(|[cos, sin]| DVec2::new(radius * cos, radius * sin));
+            let found = self.sheet.pixels(placed, marker.position_mm, steps, sight, *near);
+            let (center, first_order, outline) = found.ok_or((marker.id, Limit::BeyondFieldOfView))?;
+            // The exact centroid less what the first order says of the centre.
+            *offset = center - *px - first_order;
+            if radius > 0.0 {
+                *offset += centroid_offset(center, &outline);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Model for Sharp<'_> {
+    fn at(&mut self, pose: &Rigid, moved: f64) -> Result<(Normal, bool), Hidden> {
+        let first = self.seen.first().map_or(0, |(m, _)| m.id);
+        let placed = self.sheet.placed(pose).ok_or((first, Limit::PupilInsideSheet))?;
+        if self.age_mm.is_infinite() {
+            let near = self.sheet.near_axis(&placed);
+            self.nears.iter_mut().for_each(|n| *n = if *n > 0.0 { *n } else { near });
+        }
+        self.age_mm += moved;
+        let (first_time, last_time) = (self.age_mm.is_infinite() && moved < FIRST_MM, moved < LAST_MM);
+        if first_time || (last_time && self.age_mm > FRESH_MM) {
+            self.renew(&placed)?;
+            self.age_mm = 0.0;
+        }
+        let mut normal = Normal::empty();
+        let parts = self.seen.iter().zip(&self.sights).zip(&self.offsets).zip(&mut self.nears);
+        for ((((marker, _), sight), offset), near) in parts {
+            let (from_sight, motion) = self
+                .sheet
+                .offset(&placed, marker.position_mm, sight, near)
+                .ok_or((marker.id, Limit::BeyondFieldOfView))?;
+            let left = -(from_sight + *offset);
+            for (axis, [v, w]) in motion.iter().enumerate() {
+                normal.add([v.x, v.y, v.z, w.x, w.y, w.z], left[axis]);
+            }
+        }
+        Ok((normal.filled(), self.age_mm <= FRESH_MM))
+    }
+}
+
+/// Refines a pose; gives up early when after two steps the residual is beyond `far`, or when the pose closes in on
+/// one that is `known`.
+pub(super) fn refine(
+    model: &mut impl Model,
+    start: Rigid,
+    far: f64,
+    known: Option<&Rigid>,
+) -> Result<Fit, Hidden> {
+    let mut pose = start;
+    let (mut now, mut exact) = model.at(&pose, f64::INFINITY)?;
+    let (mut damping, mut steps, mut settled) = (0.0, 0, false);
+    while steps < MOST_STEPS && !settled {
+        if steps >= 2 && now.chi2 > far.max(1.0) {
+            break;
+        }
+        steps += 1;
+        let mut damped = now.matrix;
+        for i in 0..6 {
+            damped[(i, i)] *= 1.0 + damping;
+        }
+        let Some(step) = damped.cholesky().map(|c| c.solve(&now.right)) else {
+            damping = f64::max(10.0 * damping, 1e-6);
+            continue;
+        };
+        let (v, w) = (DVec3::new(step[0], step[1], step[2]), DVec3::new(step[3], step[4], step[5]));
+        let next = Rigid::new(rotation_from_vector(w), v).compose(&pose);
+        if known.is_some_and(|known| near(known, &next)) {
+            break;
+        }
+        // A turn counts by what it moves at a lever of ten millimetres.
+        let moved = v.length().max(10.0 * w.length());
+        if exact && moved <= 1e-7 {
+            // What is left after this step is a hundredth of it (an offset's own motion): no need to look again.
+            (pose, settled) = (next, true);
+            break;
+        }
+        match model.at(&next, moved) {
+            Ok((n, e)) if n.chi2 < now.chi2 || !exact => {
+                (pose, now, exact) = (next, n, e);
+                damping = if damping > 1e-9 { 0.1 * damping } else { 0.0 };
+            }
+            // At the floor of rounding no step goes down; that is where we want to be.
+            Ok((n, e)) if moved <= 1e-6 => (pose, now, exact, settled) = (next, n, e, true),
+            _ => damping = f64::max(10.0 * damping, 1e-4),
+        }
+    }
+    Ok(Fit { pose, chi2: now.chi2, normal: now.matrix, steps, settled })
+}
+
+/// A pose within a hundredth of a millimetre and a thousandth of a radian of a minimum leads to it.
+fn near(a: &Rigid, b: &Rigid) -> bool {
+    let between = a.compose(&b.inverse());
+    between.translation_mm.length() < 1e-2 && vector_from_rotation(&between.rotation).length() < 1e-3
+}

@@ -25,7 +25,7 @@ pub struct View {
 }
 
 /// Each pixel is the mean of this many squared.
-const OVERSAMPLING: usize = 3;
+const OVERSAMPLING: usize = 2;
 const MARGIN: f64 = 0.06;
 
 /// Draws items in parallel projection on white, fitted to the picture; the
@@ -52,11 +52,10 @@ pub fn shade(items: &[PictureItem<'_>], view: View, width: u32, height: u32) -> 
     let size = (high - low).truncate().max(DVec2::splat(1e-9));
     let scale = ((w as f64 / size.x).min(h as f64 / size.y)) * (1.0 - 2.0 * MARGIN);
     let center = 0.5 * (low + high);
-    let mut depth = vec![f64::NEG_INFINITY; w * h];
-    let mut color = vec![[1.0_f32; 3]; w * h];
-    // Which face of which item, by direction: edges are where it changes.
-    let mut face = vec![DVec3::ZERO; w * h];
-
+    // Per pixel the depth and the face (item and triangle) that is seen.
+    let mut depth = vec![f32::NEG_INFINITY; w * h];
+    let mut seen = vec![NOTHING; w * h];
+    let mut faces: Vec<Seen> = Vec::new();
     for (item, points) in items.iter().zip(&projected) {
         for triangle in &item.mesh.triangles {
             let corner = |i: u32| points.get(i as usize).copied().unwrap_or_default();
@@ -67,79 +66,107 @@ pub fn shade(items: &[PictureItem<'_>], view: View, width: u32, height: u32) -> 
             }
             let in_world = right * normal.x + up * normal.y + toward * normal.z;
             let light = (0.38 + 0.62 * in_world.dot(lamp).max(0.0)) as f32;
-            let lit = item.color.map(|c| (c * light).min(1.0));
+            let id = faces.len() as u32;
+            faces.push(Seen { color: item.color.map(|c| (c * light).min(1.0)), normal });
             let pixel = |p: DVec3| {
-                DVec2::new(
+                DVec3::new(
                     0.5 * w as f64 + (p.x - center.x) * scale,
                     0.5 * h as f64 - (p.y - center.y) * scale,
+                    p.z,
                 )
             };
-            let (pa, pb, pc) = (pixel(a), pixel(b), pixel(c));
-            let area = (pb - pa).perp_dot(pc - pa);
-            if area == 0.0 {
-                continue;
-            }
-            let (min, max) = (pa.min(pb).min(pc), pa.max(pb).max(pc));
-            let clamp = |v: f64, n: usize| v.clamp(0.0, n as f64 - 1.0) as usize;
-            for y in clamp(min.y.floor(), h)..=clamp(max.y.ceil(), h) {
-                for x in clamp(min.x.floor(), w)..=clamp(max.x.ceil(), w) {
-                    let p = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-                    let (u, v) = ((pb - p).perp_dot(pc - p) / area, (pc - p).perp_dot(pa - p) / area);
-                    let t = 1.0 - u - v;
-                    if u < 0.0 || v < 0.0 || t < 0.0 {
-                        continue;
-                    }
-                    let z = u * a.z + v * b.z + t * c.z;
-                    let at = y * w + x;
-                    if z > depth[at] {
-                        depth[at] = z;
-                        color[at] = lit;
-                        face[at] = normal;
-                    }
+            fill([pixel(a), pixel(b), pixel(c)], (w, h), |at, z| {
+                if z > depth[at] {
+                    depth[at] = z;
+                    seen[at] = id;
                 }
-            }
-        }
-    }
-    outline(&mut color, &depth, &face, (w, h), scale);
-    downsampled(&color, width as usize, height as usize)
-}
-
-/// Darkens pixels where the surface breaks off or bends sharply.
-fn outline(color: &mut [[f32; 3]], depth: &[f64], face: &[DVec3], (w, h): (usize, usize), scale: f64) {
-    let step = 3.0 / scale;
-    for y in 0..h {
-        for x in 0..w {
-            let at = y * w + x;
-            let neighbors = [(x + 1 < w).then(|| at + 1), (y + 1 < h).then(|| at + w)];
-            let edge = neighbors.into_iter().flatten().any(|n| {
-                let (near, far) = (depth[at].max(depth[n]), depth[at].min(depth[n]));
-                if !near.is_finite() {
-                    return false;
-                }
-                // Slanting faces drop from pixel to pixel without an edge.
-                let slant = face[at].z.max(0.05).recip();
-                !far.is_finite() || near - far > step * slant || face[at].dot(face[n]) < 0.8
             });
-            if edge {
-                color[at] = color[at].map(|c| 0.45 * c);
+        }
+    }
+    resolved(&seen, &depth, &faces, (width as usize, height as usize), scale)
+}
+
+/// No face is seen in this pixel.
+const NOTHING: u32 = u32::MAX;
+
+struct Seen {
+    color: [f32; 3],
+    normal: DVec3,
+}
+
+/// Calls `put` with index and depth of every pixel whose middle is in the
+/// triangle: row by row between its edges.
+fn fill(corners: [DVec3; 3], (w, h): (usize, usize), mut put: impl FnMut(usize, f32)) {
+    let [a, b, c] = corners;
+    let area = (b - a).truncate().perp_dot((c - a).truncate());
+    if area == 0.0 {
+        return;
+    }
+    // Depth is linear in the picture: z = a.z + x slope and y slope.
+    let slope_x = ((b.z - a.z) * (c.y - a.y) - (c.z - a.z) * (b.y - a.y)) / area;
+    let slope_y = ((c.z - a.z) * (b.x - a.x) - (b.z - a.z) * (c.x - a.x)) / area;
+    let top = a.y.min(b.y).min(c.y);
+    let bottom = a.y.max(b.y).max(c.y);
+    let first = (top - 0.5).ceil().max(0.0) as usize;
+    let last = (bottom - 0.5).floor().min(h as f64 - 1.0);
+    for row in first..=(last.max(-1.0) + 1.0) as usize {
+        let y = row as f64 + 0.5;
+        if row >= h || y > bottom {
+            break;
+        }
+        let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            if (p.y <= y) != (q.y <= y) {
+                let x = p.x + (q.x - p.x) * (y - p.y) / (q.y - p.y);
+                from = from.min(x);
+                to = to.max(x);
             }
+        }
+        let left = (from - 0.5).ceil().max(0.0);
+        let right = (to - 0.5).floor().min(w as f64 - 1.0);
+        if left > right {
+            continue;
+        }
+        for column in left as usize..=right as usize {
+            let z = a.z + slope_x * (column as f64 + 0.5 - a.x) + slope_y * (y - a.y);
+            put(row * w + column, z as f32);
         }
     }
 }
 
-fn downsampled(color: &[[f32; 3]], width: usize, height: usize) -> Vec<u8> {
-    let w = width * OVERSAMPLING;
+/// Mean colour of the pixels that make one of the picture; those where the
+/// surface breaks off or bends sharply are darkened.
+fn resolved(
+    seen: &[u32],
+    depth: &[f32],
+    faces: &[Seen],
+    (width, height): (usize, usize),
+    scale: f64,
+) -> Vec<u8> {
+    let (w, h) = (width * OVERSAMPLING, height * OVERSAMPLING);
+    let face = |at: usize| faces.get(seen[at] as usize);
+    let is_edge = |at: usize, next: usize| {
+        if seen[at] == seen[next] {
+            return false;
+        }
+        let (Some(one), Some(two)) = (face(at), face(next)) else { return true };
+        // Slanting faces drop from pixel to pixel without an edge.
+        let slant = one.normal.z.min(two.normal.z).max(0.05).recip();
+        f64::from((depth[at] - depth[next]).abs()) > 2.0 / scale * slant || one.normal.dot(two.normal) < 0.8
+    };
     let share = 255.0 / (OVERSAMPLING * OVERSAMPLING) as f32;
     let mut out = Vec::with_capacity(4 * width * height);
     for y in 0..height {
         for x in 0..width {
             let mut sum = [0.0_f32; 3];
-            for j in 0..OVERSAMPLING {
-                for i in 0..OVERSAMPLING {
-                    let c = color[(y * OVERSAMPLING + j) * w + x * OVERSAMPLING + i];
-                    for k in 0..3 {
-                        sum[k] += c[k];
-                    }
+            for (i, j) in (0..OVERSAMPLING * OVERSAMPLING).map(|k| (k % OVERSAMPLING, k / OVERSAMPLING)) {
+                let (px, py) = (x * OVERSAMPLING + i, y * OVERSAMPLING + j);
+                let at = py * w + px;
+                let edge = (px + 1 < w && is_edge(at, at + 1)) || (py + 1 < h && is_edge(at, at + w));
+                let dark = if edge { 0.4 } else { 1.0 };
+                let color = face(at).map_or([1.0; 3], |f| f.color);
+                for (total, c) in sum.iter_mut().zip(color) {
+                    *total += dark * c;
                 }
             }
             out.extend(sum.map(|s| (s * share).round().clamp(0.0, 255.0) as u8));

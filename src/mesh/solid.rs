@@ -117,16 +117,6 @@ impl Solid {
                 .collect(),
         }
     }
-
-    /// Where the segment from `from_mm` to `to_mm` first meets the surface: the
-    /// fraction along it, and the surface's normal there.
-    pub fn first_hit(&self, from_mm: DVec3, to_mm: DVec3) -> Option<(f64, DVec3)> {
-        let kernel = |v: DVec3| Vec3::new(v.x, v.y, v.z);
-        self.inner
-            .ray_cast(kernel(from_mm), kernel(to_mm))
-            .first()
-            .map(|hit| (hit.distance, DVec3::new(hit.normal.x, hit.normal.y, hit.normal.z)))
-    }
 }
 
 impl std::fmt::Debug for Solid {

@@ -75,7 +75,7 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
     let bore = m.bore_radius_mm();
     let steps = i64::from(c.steps);
     let grow = 0.5 * c.step_mm * steps as f64;
-    let wall = 2.0 * m.process.min_wall_mm.max(0.5);
+    let wall = (2.0 * m.process.min_wall_mm).max(0.5 * pocket);
     if pocket <= grow {
         return Err(b.infeasible("radius of the smallest pocket", pocket - grow, 0.0, "coupon.step_mm"));
     }
@@ -83,7 +83,7 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
     let count = 2 * steps + 1;
     let half_length = 0.5 * pitch * count as f64 + 0.5 * wall;
     let rows = DVec2::new(2.0 * (pocket + grow) + wall, 2.0 * (bore + grow) + wall);
-    let height = depth + 2.0 * m.process.min_wall_mm.max(0.5);
+    let height = depth + wall;
     let over = m.overcut_mm;
     let low_y = -0.5 * (rows.x + rows.y);
     b.added.push(Feature::new(
@@ -133,8 +133,8 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &Hit) -> Result<Blueprint, Part
         Blueprint::new(name, "pad-printing jig: holds sheet and dome under the pad; printed", m.chord);
     b.may_meet = &[("below", "pin hole"), ("sheet recess", "finger slot")];
     let over = m.overcut_mm;
-    let rim = 3.0 * m.process.min_wall_mm.max(0.5);
     let recess = 0.5 * m.sheet_size_mm + DVec2::splat(j.clearance_mm);
+    let rim = (3.0 * m.process.min_wall_mm).max(0.15 * recess.min_element());
     let block = recess + DVec2::splat(rim);
     // The sheet's top stands clear of the grip, so that the pad can wrap.
     let grip = 0.6 * m.sheet_thickness_mm;
@@ -159,7 +159,11 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &Hit) -> Result<Blueprint, Part
         DVec3::new(-reach, -reach, -j.base_thickness_mm - reach),
         DVec3::new(reach, reach, -j.base_thickness_mm),
     );
-    if hit.tilt_rad != 0.0 {
+    let lowest = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)]
+        .map(|(x, y)| jig_from_sensor.transform_point3(DVec3::new(x * block.x, y * block.y, deep)).z)
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    if lowest < -j.base_thickness_mm {
         b.cut.push(Feature::new("below", "jig.base_thickness_mm", below));
     }
     let pocket = Shape::cuboid((-recess).extend(seat), recess.extend(top + over));

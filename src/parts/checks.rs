@@ -9,7 +9,7 @@ use super::assembly::{Body, affine};
 use super::measures::Measures;
 use super::view::sight_lines;
 use super::{Assembly, Part, PartError, bought};
-use crate::mesh::{BoundingBox, Chord, MeshError, Piece, Solid};
+use crate::mesh::{BoundingBox, Chord, MeshError, Piece, RayTarget, Solid, TriMesh};
 use crate::numeric::Rigid;
 
 /// Bodies may share this much before it is called interference, mm^3: faces
@@ -211,8 +211,7 @@ impl Thing {
 
     /// Refuses a shared volume; says where its middle is.
     fn apart_from(&self, other: &Self, when: &str) -> Result<(), PartError> {
-        let gap = (self.bounds.min_mm - other.bounds.max_mm).max(other.bounds.min_mm - self.bounds.max_mm);
-        if gap.max_element() > 0.0 {
+        if self.bounds.is_apart_from(&other.bounds) {
             return Ok(());
         }
         let shared = self.solid.intersection(&other.solid).map_err(|e| mesh_error(&self.name, e))?;
@@ -235,14 +234,15 @@ impl Thing {
 struct Scene {
     fixed: Vec<Thing>,
     moving: Vec<Thing>,
-    /// Everything that moves with the upper platform and could stand in a ray.
-    upper: Solid,
+    /// The upper platform, which could stand in a ray.
+    upper: RayTarget,
 }
 
 impl Scene {
     fn of(m: &Measures, assembly: &Assembly, chord: Chord) -> Result<Self, PartError> {
         let coarse = |piece: &Piece| piece.solid(chord).map_err(|e| mesh_error(&piece.name, e));
-        let mut scene = Self { fixed: Vec::new(), moving: Vec::new(), upper: coarse(&bought::dome(m))? };
+        let mut scene =
+            Self { fixed: Vec::new(), moving: Vec::new(), upper: RayTarget::new(&TriMesh::default()) };
         for item in &assembly.items {
             let solid = match item.name.as_str() {
                 "dome" => coarse(&bought::dome(m))?,
@@ -251,7 +251,7 @@ impl Scene {
                 _ => item.solid().map_err(|e| mesh_error(&item.name, e))?,
             };
             if item.name == "upper_platform" {
-                scene.upper = solid.clone();
+                scene.upper = RayTarget::new(&item.mesh);
             }
             let list = if item.body == Body::Fixed { &mut scene.fixed } else { &mut scene.moving };
             list.extend(Thing::new(&item.name, solid));
@@ -272,14 +272,17 @@ impl Scene {
     }
 
     fn between_bodies(&self, m: &Measures, when: &str, pose: &Rigid, chord: Chord) -> Result<(), PartError> {
-        let mut moved = Vec::with_capacity(self.moving.len());
+        let rest_from_platform = affine(pose);
+        let moved = |thing: &Thing| {
+            let solid = thing.solid.moved(&rest_from_platform).map_err(|e| mesh_error(&thing.name, e))?;
+            Ok(Thing::new(&thing.name, solid))
+        };
+        // Boxes first: most things are far apart, and moving a solid costs.
         for thing in &self.moving {
-            let solid = thing.solid.moved(&affine(pose)).map_err(|e| mesh_error(&thing.name, e))?;
-            moved.extend(Thing::new(&thing.name, solid));
-        }
-        for one in &moved {
-            for other in &self.fixed {
-                one.apart_from(other, when)?;
+            let bounds = thing.bounds.transformed(&rest_from_platform);
+            let near: Vec<&Thing> = self.fixed.iter().filter(|t| !t.bounds.is_apart_from(&bounds)).collect();
+            if let (false, Some(one)) = (near.is_empty(), moved(thing)?) {
+                near.into_iter().try_for_each(|other| one.apart_from(other, when))?;
             }
         }
         for i in 0..m.spring_axes_mm.len() {
@@ -288,9 +291,17 @@ impl Scene {
             let Some(spring) = Thing::new(&tube.name, solid) else { continue };
             // A tilted tube digs into the magnets and platforms that it bears
             // on; what counts is what it may not touch.
-            let bears_on = |name: &str| name.contains("magnet") || name.ends_with("_platform");
-            for other in moved.iter().chain(&self.fixed).filter(|t| !bears_on(&t.name)) {
+            let bears_on = |t: &&Thing| t.name.contains("magnet") || t.name.ends_with("_platform");
+            for other in self.fixed.iter().filter(|t| !bears_on(t)) {
                 spring.apart_from(other, when)?;
+            }
+            for thing in self.moving.iter().filter(|t| !bears_on(t)) {
+                if thing.bounds.transformed(&rest_from_platform).is_apart_from(&spring.bounds) {
+                    continue;
+                }
+                if let Some(other) = moved(thing)? {
+                    spring.apart_from(&other, when)?;
+                }
             }
         }
         Ok(())

@@ -92,6 +92,11 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
 
     let exit = &lower.cable_exit;
     if exit.width_mm > 0.0 && exit.height_mm > 0.0 {
+        let roof = top - bottom - exit.height_mm;
+        if roof <= 0.0 || roof < m.process.min_wall_mm {
+            let field = "platforms.lower.cable_exit.height_mm";
+            return Err(b.infeasible("roof over the cable exit", roof, m.process.min_wall_mm, field));
+        }
         // Open below and joined to the bore: a notch, no handle.
         let w = 0.5 * exit.width_mm;
         let channel =

@@ -6,9 +6,9 @@ use super::measures::{Measures, polar};
 use super::{Blueprint, Feature, PartError};
 use crate::mesh::{Fit, Profile, Shape};
 
-/// The light channel is this much wider than the pit on each side: their side
-/// faces are then clearly apart, not almost in one plane.
-const CHANNEL_STEP_MM: f64 = 0.1;
+/// The light channel is wider than the pit by this share on each side: their
+/// side faces are then clearly apart, not almost in one plane.
+const CHANNEL_STEP: f64 = 0.04;
 
 pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     let upper = &m.platforms.upper;
@@ -123,7 +123,7 @@ fn led_seat(m: &Measures, i: usize, b: &mut Blueprint) {
     let azimuth = DAffine3::from_rotation_z(leds.list[i].azimuth_deg.to_radians());
     let lip = leds.lip_top_z_mm;
     let inside_window = 0.25 * m.view.radius_mm(lip);
-    let half_channel = half_width + CHANNEL_STEP_MM;
+    let half_channel = half_width * (1.0 + CHANNEL_STEP);
     let channel = Shape::cuboid(
         DVec3::new(inside_window, -half_channel, lip),
         DVec3::new(leds.center_radius_mm, half_channel, top + over),
@@ -177,7 +177,7 @@ fn rim_notch(
     if wall >= m.process.min_wall_mm {
         return None;
     }
-    let half = half_width_mm + CHANNEL_STEP_MM;
+    let half = half_width_mm * (1.0 + CHANNEL_STEP);
     let box_out = Shape::cuboid(
         DVec3::new(m.leds.center_radius_mm, -half, seat),
         DVec3::new(2.0 * m.outer_mm.length(), half, top + over),

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{Blueprint, Feature, Measures, PartError};
-use crate::mesh::{Chord, Construction, MeshError, Solid};
+use crate::mesh::{Chord, Construction, MeshError, RayTarget, Solid};
 
 /// Walls are looked for on meshes this coarse, in parts of the limit.
 const CHORD_SHARE: f64 = 0.05;
@@ -106,6 +106,7 @@ fn thicknesses(
     }
     let solid = construction.solid(chord).map_err(failed)?;
     let mesh = solid.to_mesh();
+    let target = RayTarget::new(&mesh);
     let skin = 1e-3 * limit;
     let mut thinnest: Option<(f64, DVec3, DVec3)> = None;
     for corners in mesh.iter_mm() {
@@ -114,7 +115,7 @@ fn thicknesses(
         let Some(normal) = cross.try_normalize() else { continue };
         for point in samples(corners, cross.length(), limit) {
             let from = point - normal * skin;
-            let Some((fraction, other)) = solid.first_hit(from, point - normal * limit) else { continue };
+            let Some((fraction, other)) = target.first_hit(from, point - normal * limit) else { continue };
             if normal.dot(other) > OPPOSITE {
                 continue;
             }
@@ -144,7 +145,7 @@ fn samples(corners: [DVec3; 3], twice_area: f64, limit: f64) -> Vec<DVec3> {
     let length = |&(a, b, _): &(DVec3, DVec3, DVec3)| (b - a).length();
     let longest = edges.iter().map(length).fold(0.0, f64::max);
     let short = twice_area / longest.max(f64::MIN_POSITIVE);
-    let n = ((longest / limit).ceil() as u32).clamp(1, 24);
+    let n = ((longest / limit).ceil() as u32).clamp(1, 10);
     let at = |i: u32, n: u32| (f64::from(i) + 1.0 / 3.0) / f64::from(n);
     if short < 0.5 * limit {
         let shortest = edges.iter().min_by(|x, y| length(x).total_cmp(&length(y)));

@@ -1,6 +1,7 @@
 //! Arguments, progress, messages and exit codes: the only place that prints.
 
 mod build;
+mod calibrate_print;
 mod check;
 mod output;
 mod points;
@@ -66,6 +67,20 @@ enum Command {
     },
     /// Print the JSON schema of the design file.
     Schema,
+    /// Fit the pad's map to a measured test print, and write it into a new design file.
+    CalibratePrint {
+        /// CSV of `id,x_mm,y_mm` (seen from outside, pole at the origin) or `id,phi_deg,theta_deg`, optionally
+        /// `print`.
+        measured: PathBuf,
+        /// The design file from which the test print was made.
+        design: PathBuf,
+        /// The new design file [default: <design>-measured.json beside the design].
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Which artwork was printed [default: the one whose marks fit].
+        #[arg(long, value_enum)]
+        marks: Option<calibrate_print::Marks>,
+    },
 }
 
 /// Runs the program on the process's arguments.
@@ -102,5 +117,8 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::Trace { design, pixels, pose } => points::trace(output, design, pixels, pose.as_deref()),
         Command::Project { design, points, pose } => points::project(output, design, points, pose.as_deref()),
         Command::Schema => schema::run(output),
+        Command::CalibratePrint { measured, design, out, marks } => {
+            calibrate_print::run(output, measured, design, out.as_deref(), *marks)
+        }
     }
 }

@@ -218,7 +218,10 @@ impl BrownConrady {
         {
             return Ok(x);
         }
-        let start = self.inverse.start(distance.min(self.inverse.end_image())).x;
+        let start = self
+            .inverse
+            .solve(distance.min(self.inverse.end_image()), |r| radius(&self.numerator, &self.denominator, r))
+            .ok_or(self.domain.limit)?;
         let mut x = if distance > 0.0 { image * (start / distance) } else { image };
         let (mut value, mut slope) = self.continued(x);
         let mut error = (value - image).length();
@@ -252,11 +255,22 @@ impl BrownConrady {
         self.accept(x, image)
     }
 
+    /// Sum of the sizes of all terms of `f` at radius `r`: its rounding error
+    /// is a few ulp of this.
+    fn size_of_terms(&self, r: f64) -> f64 {
+        let u = r * r;
+        let sum = |k: &[f64; 3]| 1.0 + u * (k[0].abs() + u * (k[1].abs() + u * k[2].abs()));
+        let d = &self.denominator;
+        let bottom = (1.0 + u * (d[0] + u * (d[1] + u * d[2]))).abs();
+        let factor = sum(&self.numerator) / bottom;
+        r * factor * (sum(d) / bottom) + 3.0 * self.q.length() * u
+    }
+
     /// A point is an answer only if it lies in the domain and maps back, to the
     /// rounding of the formula.
     fn accept(&self, x: DVec2, image: DVec2) -> Result<DVec2, LensLimit> {
         let r = x.length();
-        let rounding = 1e-14 * image.length().max(r);
+        let rounding = 8.0 * f64::EPSILON * (self.size_of_terms(r) + image.length());
         let residual = (self.continued(x).0 - image).length();
         if r <= self.end * (1.0 + END_ROUNDING) && residual <= rounding {
             Ok(x)

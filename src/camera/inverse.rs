@@ -84,7 +84,7 @@ impl RadialInverse {
         if !(end > 0.0 && end.is_finite() && end_image > 0.0 && end_image.is_finite()) {
             return None;
         }
-        let spread = Spread::new(end_image, f(end.min(1.0)).0);
+        let spread = Spread::new(end_image, f((0.5 * end).min(1.0)).0);
         let step = 1.0 / PIECES as f64;
         let mut nodes = Vec::with_capacity(PIECES + 1);
         nodes.push([end, 0.0]);

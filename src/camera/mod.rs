@@ -22,6 +22,8 @@
 //! in front of the camera's origin ([`LensSpec::pupil_shift_mm`]): even powers
 //! only, since the lens turns about its axis, and zero on the axis, where the
 //! origin is put. See [`Lens::pupil_shift_mm`].
+//!
+#![doc = include_str!("lenses.md")]
 
 mod brown_conrady;
 mod inverse;
@@ -37,5 +39,7 @@ pub use lens::Lens;
 pub use limit::LensLimit;
 pub use spec::{LensError, LensSpec, Model};
 
+#[cfg(test)]
+mod conformance;
 #[cfg(test)]
 mod tests;

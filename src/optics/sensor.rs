@@ -289,26 +289,38 @@ impl SensorOptics {
         if self.lens.is_central() {
             return Ok(self.sensor_from_camera.translation_mm);
         }
-        // The pupil's shift s must be the one that belongs to the field angle
-        // of the ray from there. S(theta(s)) - s changes sign over the range
-        // of S, and its slope is near -1.
-        let (low, high) = self.lens.pupil_range_mm();
+        // The pupil's shift S(theta) must be the one that belongs to the field
+        // angle of the ray from there: seen(S(theta)) = theta. The left side
+        // starts above the right one at zero and, if the point is inside the
+        // domain, ends below; the difference falls at a slope near -1.
         let end = self.lens.max_field_angle_rad();
-        let mismatch = |shift: f64| {
-            let mut pupil = self.pupil_mm(shift);
-            pupil.z = pupil.z.min(self.bottom_mm);
-            let theta = self.central_ray(point, pupil).map_or(end, Lens::field_angle_rad);
-            (self.lens.pupil_shift_mm(theta).0 - shift, -1.0)
-        };
-        let shift = bracketed_newton(mismatch, low, high, 0.0).map_err(|error| match error {
-            RootError::NotFinite { .. } => Limit::NotFinite,
-            _ => Limit::NotConverged,
-        })?;
-        let pupil = self.pupil_mm(shift.value);
-        if pupil.z > self.bottom_mm {
-            return Err(Limit::PupilInsideSheet);
+        let shift_at = |theta: f64| self.lens.pupil_shift_mm(theta).0;
+        let seen = |theta: f64| self.seen_angle_rad(point, shift_at(theta));
+        let mut theta = end;
+        if seen(end) < end {
+            let mismatch = |theta: f64| (seen(theta) - theta, -1.0);
+            theta = bracketed_newton(mismatch, 0.0, end, seen(0.0).min(end))
+                .map_err(|error| match error {
+                    RootError::NotFinite { .. } => Limit::NotFinite,
+                    _ => Limit::NotConverged,
+                })?
+                .value;
         }
-        Ok(pupil)
+        let pupil = self.pupil_mm(shift_at(theta));
+        if pupil.z > self.bottom_mm { Err(Limit::PupilInsideSheet) } else { Ok(pupil) }
+    }
+
+    /// Field angle at which a point is seen from a shifted pupil. A pupil that
+    /// would be in the sheet counts as touching it; a point past the critical
+    /// angle, or not in front, is seen along the sheet.
+    fn seen_angle_rad(&self, point: DVec3, shift_mm: f64) -> f64 {
+        let mut pupil = self.pupil_mm(shift_mm);
+        pupil.z = pupil.z.min(self.bottom_mm);
+        let ray = self.central_ray(point, pupil).unwrap_or_else(|_| {
+            let along = DVec3::new(point.x - pupil.x, point.y - pupil.y, 0.0);
+            self.sensor_from_camera.rotation.transpose() * along
+        });
+        Lens::field_angle_rad(ray)
     }
 
     pub(super) fn usable_point(&self, point: DVec3) -> Result<DVec3, Limit> {

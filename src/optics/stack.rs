@@ -132,8 +132,7 @@ impl Path<'_> {
     pub fn tangent_per_mm(&self, reach_mm: f64) -> Result<f64, Limit> {
         let n0 = self.lowest_index()?;
         let t = self.climb(n0, reach_mm)?;
-        let per_mm = 1.0 / self.reach_by(n0, t, reach_mm);
-        finite(per_mm * in_air(n0, t)?.0)
+        finite(in_air(n0, t)?.0 / self.reach_by(n0, t, reach_mm))
     }
 
     /// `reach / t`, also on the axis.

@@ -1,0 +1,470 @@
+//! Random lenses, stacks, pixels, rays and points against the reference.
+//!
+//! A fixed seed per lens makes every failure a one-line rerun: the message names
+//! the seed.
+
+use std::f64::consts::PI;
+
+use domecast::camera::{Lens, LensLimit, LensSpec, Model};
+use domecast::numeric::Rigid;
+use domecast::optics::{Channel, Layer, Limit, OpticsSpec, SensorOptics};
+use glam::{DMat3, DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::dd::dd;
+use super::reference::{self, distance, field_angle, unit, v3};
+
+/// Splitmix64 (S. Vigna, public domain): small, good enough, the same anywhere.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn range(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    pub fn one_in(&mut self, n: u64) -> bool {
+        self.bits().is_multiple_of(n)
+    }
+}
+
+pub fn lens_spec(r: &mut Random) -> LensSpec {
+    let (model, distortion, widest) = match r.bits() % 8 {
+        0 => (Model::Pinhole, vec![], 179.9),
+        // Like published ones, then anything.
+        1 | 2 => {
+            let p = if r.one_in(2) { 0.0 } else { 0.005 };
+            let k = vec![
+                r.range(-0.35, 0.1),
+                r.range(-0.05, 0.12),
+                p * r.range(-1.0, 1.0),
+                p * r.range(-1.0, 1.0),
+                r.range(-0.02, 0.02),
+            ];
+            (Model::BrownConrady, k, 179.9)
+        }
+        3 => {
+            let size = 10f64.powf(r.range(-2.0, 2.0));
+            let mut k: Vec<f64> = (0..5).map(|_| size * r.range(-1.0, 1.0)).collect();
+            k[2] *= 0.02;
+            k[3] *= 0.02;
+            (Model::BrownConrady, k, 179.9)
+        }
+        4 => {
+            let mut k: Vec<f64> = (0..8).map(|_| r.range(-1.0, 1.0)).collect();
+            k[2] *= 0.01;
+            k[3] *= 0.01;
+            (Model::BrownConrady, k, 179.9)
+        }
+        5 | 6 => {
+            let k = (0..4).map(|_| r.range(-0.06, 0.06)).collect();
+            (Model::KannalaBrandt, k, 260.0)
+        }
+        _ => {
+            let k = (0..4).map(|_| r.range(-0.5, 0.5)).collect();
+            (Model::KannalaBrandt, k, 360.0)
+        }
+    };
+    let fx = 10f64.powf(r.range(1.7, 3.3));
+    LensSpec {
+        model,
+        width: 640,
+        height: 480,
+        matrix: [
+            [fx, 0.0, r.range(200.0, 400.0)],
+            [0.0, fx * r.range(0.95, 1.05), r.range(100.0, 300.0)],
+            [0.0, 0.0, 1.0],
+        ],
+        distortion,
+        field_of_view_rad: r.range(20.0, widest).to_radians(),
+        pupil_shift_mm: vec![],
+    }
+}
+
+fn optics_spec(r: &mut Random, mut lens: LensSpec) -> OpticsSpec {
+    let radius = 10f64.powf(r.range(-1.0, 3.0));
+    let mut layers = Vec::new();
+    let mut last = 1.0;
+    for _ in 0..r.bits() % 5 {
+        let index = match r.bits() % 8 {
+            0 => last,
+            1 => 1.0,
+            _ => r.range(1.0, 2.5),
+        };
+        last = index;
+        let thickness = if r.one_in(5) { 0.0 } else { radius * r.range(0.0, 0.3) };
+        layers.push(Layer {
+            name: "sheet".into(),
+            index: [index, (index * 1.002).min(2.5), index * 1.005],
+            thickness_mm: Some(thickness),
+        });
+    }
+    let fill = if r.one_in(6) { 1.0 } else { r.range(1.0, 2.0) };
+    layers.push(Layer { name: "fill".into(), index: [fill; 3], thickness_mm: None });
+    let bottom: f64 = layers.iter().filter_map(|l| l.thickness_mm).sum();
+    let gap = match r.bits() % 8 {
+        0 => 0.0,
+        1 => radius * 1e-4,
+        _ => radius * r.range(0.01, 2.0),
+    };
+    let mut rotation = DMat3::IDENTITY;
+    let mut at = DVec3::new(0.0, 0.0, -bottom - gap);
+    if r.one_in(2) {
+        rotation = DMat3::from_rotation_z(r.range(-PI, PI)) * DMat3::from_rotation_x(r.range(-0.5, 0.5));
+        at.x = radius * r.range(-0.5, 0.5);
+        at.y = radius * r.range(-0.5, 0.5);
+    }
+    if r.one_in(4) && gap > 0.0 {
+        // A shift worth up to a fifth of the gap at the domain's end.
+        let half = (0.5 * lens.field_of_view_rad).min(PI);
+        lens.pupil_shift_mm = vec![0.2 * gap * r.range(-1.0, 1.0) / (half * half)];
+    }
+    OpticsSpec { lens, sensor_from_camera: Rigid::new(rotation, at), layers, dome_radius_mm: radius }
+}
+
+const EPS: f64 = f64::EPSILON;
+
+/// What a run has seen.
+#[derive(Default, Clone, Copy)]
+pub struct Seen {
+    pub lenses: u64,
+    pub checks: u64,
+    pub ok: u64,
+    pub limits: u64,
+}
+
+impl Seen {
+    fn plus(self, o: Self) -> Self {
+        Self {
+            lenses: self.lenses + o.lenses,
+            checks: self.checks + o.checks,
+            ok: self.ok + o.ok,
+            limits: self.limits + o.limits,
+        }
+    }
+}
+
+/// One random lens and stack with everything that can be asked of them.
+struct Run<'a> {
+    seed: u64,
+    optics: &'a SensorOptics,
+    reference: reference::Sensor<'a>,
+    end: f64,
+    seen: Seen,
+}
+
+impl Run<'_> {
+    fn lens(&self) -> &Lens {
+        self.optics.lens()
+    }
+
+    fn direction(theta: f64, phi: f64) -> DVec3 {
+        let (s, c) = theta.sin_cos();
+        DVec3::new(s * phi.cos(), s * phi.sin(), c)
+    }
+
+    /// A ray that was found for a pixel is right: within 1e-10 rad of the
+    /// reference, or the reference formula sends it to within 8 ulp of the
+    /// pixel (which is the same as 8 ulp times the condition).
+    fn ray_is_right(&self, pixel: DVec2, ray: DVec3, what: &str) {
+        let seed = self.seed;
+        assert!(ray.is_finite() && (ray.length() - 1.0).abs() < 4.0 * EPS, "seed {seed}: {what} {ray}");
+        let theta = Lens::field_angle_rad(ray);
+        assert!(theta <= self.end * (1.0 + 1e-9), "seed {seed}: {what}: {theta} past {}", self.end);
+        if theta > self.end * (1.0 - 1e-6) {
+            return;
+        }
+        let Some(truth) = self.reference.lens.ray(pixel, self.end, Some(ray)) else {
+            panic!("seed {seed}: {what}: no reference for pixel {pixel}, ray {ray}");
+        };
+        let error = distance(v3(ray), truth);
+        if error <= 1e-10 {
+            return;
+        }
+        let [u, v] = self.reference.lens.pixel(v3(ray));
+        let back = (u - dd(pixel.x)).f64().hypot((v - dd(pixel.y)).f64());
+        let allowed = 8.0 * EPS * pixel.abs().max_element();
+        assert!(back <= allowed, "seed {seed}: {what}: pixel {pixel}, {error:e} rad, {back:e} px");
+    }
+
+    fn random_pixel(&mut self, r: &mut Random) {
+        let [[fx, _, cx], [_, fy, cy], _] = self.lens().spec().matrix;
+        let reach = (1.1 * self.lens().max_radius_px() / fx).min(30.0);
+        let (radius, phi) = (reach * r.unit(), r.range(-PI, PI));
+        let pixel = match r.bits() % 32 {
+            0 => DVec2::new(cx, cy),
+            1 => DVec2::new(cx + 1e-12, cy - 1e-13),
+            _ => DVec2::new(cx + fx * radius * phi.cos(), cy + fy * radius * phi.sin()),
+        };
+        self.pixel(pixel);
+    }
+
+    fn pixel(&mut self, pixel: DVec2) {
+        let seed = self.seed;
+        self.seen.checks += 1;
+        match self.lens().unproject(pixel) {
+            Ok(ray) => self.ray_is_right(pixel, ray, "unproject"),
+            Err(limit) => {
+                assert_eq!(limit, self.lens().end_limit(), "seed {seed}: pixel {pixel}");
+                let spec = self.lens().spec();
+                let q = if spec.model == Model::BrownConrady {
+                    spec.distortion[2].hypot(spec.distortion[3])
+                } else {
+                    0.0
+                };
+                let [x, y] = self.reference.lens.image_of_pixel(pixel);
+                let rho = (x * x + y * y).sqrt().f64();
+                let a = if spec.model == Model::KannalaBrandt { self.end } else { self.end.tan() };
+                let rim = self.reference.lens.radius(dd(a)).f64();
+                // No circle inside the image of the domain is refused.
+                let inside = rim - 3.0 * q * a * a;
+                assert!(rho >= inside * (1.0 - 1e-9), "seed {seed}: pixel {pixel} refused");
+            }
+        }
+        self.traced(pixel);
+    }
+
+    fn traced(&mut self, pixel: DVec2) {
+        let seed = self.seed;
+        let hit = match self.optics.trace_with_jacobian(pixel) {
+            Ok((hit, slope)) => {
+                assert_eq!(self.optics.trace(pixel), Ok(hit), "seed {seed}");
+                (hit, slope.norm())
+            }
+            Err(limit) => {
+                assert_ne!(limit, Limit::NotConverged, "seed {seed}: pixel {pixel}");
+                self.seen.limits += 1;
+                if limit == Limit::MissesDome && self.optics.trace(pixel).is_err() {
+                    let Ok(ray) = self.lens().unproject(pixel) else {
+                        panic!("seed {seed}: {limit}");
+                    };
+                    let (hit, away) = self.reference.surface(v3(ray));
+                    let radius = self.optics.dome_radius_mm();
+                    assert!(
+                        hit.is_none() || away > radius * (1.0 - 1e-9),
+                        "seed {seed}: pixel {pixel} misses"
+                    );
+                }
+                return;
+            }
+        };
+        self.seen.ok += 1;
+        let (hit, slope) = hit;
+        let radius = self.optics.dome_radius_mm();
+        assert!((hit.surface_mm.length() - radius).abs() <= 4.0 * EPS * radius, "seed {seed}");
+        assert!(hit.surface_mm.z >= 0.0 && (hit.normal.length() - 1.0).abs() < 8.0 * EPS, "seed {seed}");
+        if hit.field_angle_rad > self.end * (1.0 - 1e-6) {
+            return;
+        }
+        let Some(ray) = self.reference.lens.ray(pixel, self.end, self.lens().unproject(pixel).ok()) else {
+            panic!("seed {seed}: no reference for pixel {pixel}");
+        };
+        let (truth, away) = self.reference.surface(ray);
+        let allowed = 1e-9 * radius + 64.0 * EPS * slope * (pixel.length() + self.lens().spec().matrix[0][0]);
+        match truth {
+            Some(truth) => {
+                let error = distance(truth, v3(hit.surface_mm));
+                assert!(error <= allowed, "seed {seed}: pixel {pixel}: {error:e} mm, {allowed:e} allowed");
+            }
+            None => assert!(away <= radius * (1.0 + 1e-9), "seed {seed}: pixel {pixel} hits past the rim"),
+        }
+        self.projected(hit.surface_mm, Some(pixel));
+    }
+
+    fn random_ray(&mut self, r: &mut Random) {
+        let seed = self.seed;
+        self.seen.checks += 1;
+        let phi = r.range(-PI, PI);
+        if r.one_in(4) {
+            // Past the end.
+            let past = self.end * (1.0 + 1e-6) + (PI - self.end) * r.unit().powi(4);
+            if past < PI {
+                let found = self.lens().project(Self::direction(past, phi));
+                let wanted = [self.lens().end_limit(), LensLimit::BehindCamera];
+                assert!(found.is_err_and(|l| wanted.contains(&l)), "seed {seed}: {found:?} at {past}");
+                self.seen.limits += 1;
+            }
+            return;
+        }
+        let inside = match r.bits() % 4 {
+            0 => 1.0 - 1e-6 * (1.0 + 100.0 * r.unit()),
+            1 => r.unit() * 1e-6,
+            _ => r.unit() * (1.0 - 1e-6),
+        };
+        let ray = Self::direction(self.end * inside, phi) * 10f64.powf(r.range(-3.0, 3.0));
+        let [u, v] = self.reference.lens.pixel(v3(ray));
+        let truth = DVec2::new(u.f64(), v.f64());
+        let (pixel, slope) = match self.lens().project_with_jacobian(ray) {
+            Ok(found) => found,
+            Err(limit) => panic!("seed {seed}: {limit} at {inside} of the domain"),
+        };
+        assert_eq!(self.lens().project(ray), Ok(pixel), "seed {seed}");
+        let allowed = (8.0 * EPS * (slope.norm() * ray.length() + truth.length())).max(1e-9);
+        assert!((pixel - truth).length() <= allowed, "seed {seed}: {pixel} is not {truth}");
+        // And back: the rounded pixel may lie past the end only near it.
+        match self.lens().unproject(truth) {
+            Ok(back) => self.ray_is_right(truth, back, "back"),
+            Err(limit) => {
+                let fine = inside > 1.0 - 1e-4 && self.lens().spec().model != Model::Pinhole;
+                let close = truth_is_within_an_ulp_of_the_rim(self, truth);
+                assert!(fine && close, "seed {seed}: {limit} for {truth} at {inside} of the domain");
+            }
+        }
+        self.seen.ok += 1;
+    }
+
+    fn random_point(&mut self, r: &mut Random) {
+        self.seen.checks += 1;
+        let radius = self.optics.dome_radius_mm();
+        let (phi, z) = (r.range(-PI, PI), r.unit());
+        let flat = (1.0 - z * z).sqrt();
+        let on_dome = DVec3::new(flat * phi.cos(), flat * phi.sin(), z) * radius;
+        let point = match r.bits() % 8 {
+            0 => on_dome * r.unit(),
+            1 => DVec3::new(phi.cos(), phi.sin(), 0.0) * radius * r.range(0.0, 2.0),
+            2 => DVec3::new(phi.cos(), phi.sin(), 0.0) * radius,
+            3 => DVec3::new(0.0, 0.0, radius * r.unit()),
+            _ => on_dome,
+        };
+        self.projected(point, None);
+    }
+
+    /// `seen_by` is the pixel that traced to the point, if one did.
+    fn projected(&mut self, point: DVec3, seen_by: Option<DVec2>) {
+        let seed = self.seed;
+        let found = self.optics.project_with_motion(point);
+        let plain = self.optics.project(point);
+        assert_ne!(plain, Err(Limit::NotConverged), "seed {seed}: point {point}");
+        let theta = match self.reference.chief(v3(point), self.end) {
+            Some(ray) => field_angle(ray).f64(),
+            // No reference: total reflection, or a pupil that does not settle.
+            None => f64::INFINITY,
+        };
+        let (pixel, motion) = match (plain, found) {
+            (Ok(pixel), Ok(motion)) => (pixel, motion),
+            (Err(limit), _) => {
+                self.seen.limits += 1;
+                let unsettled = !self.lens().is_central() && seen_by.is_none();
+                assert!(
+                    theta > self.end * (1.0 - 1e-6) || unsettled,
+                    "seed {seed}: {limit} for {point} at {theta} of {}",
+                    self.end
+                );
+                return;
+            }
+            (Ok(_), Err(limit)) => panic!("seed {seed}: no derivative at {point}: {limit}"),
+        };
+        self.seen.ok += 1;
+        assert!(pixel.is_finite() && motion.pixel == pixel, "seed {seed}: {} is not {pixel}", motion.pixel);
+        if theta > self.end * (1.0 - 1e-6) {
+            assert!(
+                theta <= self.end * (1.0 + 1e-6) || (theta.is_infinite() && !self.lens().is_central()),
+                "seed {seed}: {point} is seen at {theta} past {}",
+                self.end
+            );
+            return;
+        }
+        let ray = self.reference.chief(v3(point), self.end).unwrap();
+        let [u, v] = self.reference.lens.pixel(ray);
+        let truth = DVec2::new(u.f64(), v.f64());
+        let reach = point.length() + self.optics.sensor_from_camera().translation_mm.length();
+        let (by_point, by_pose) = (motion.by_point.norm(), motion.by_pose.norm());
+        assert!(by_pose.is_finite(), "seed {seed}");
+        // 8 ulp of all lengths that go in, times the slope.
+        let allowed = (8.0 * EPS * (by_point * reach + truth.length())).max(1e-9);
+        let error = (pixel - truth).length();
+        assert!(error <= allowed, "seed {seed}: point {point}: {error:e} px, {allowed:e} allowed");
+        if let Some(pixel) = seen_by {
+            let allowed = 4.0 * allowed + 64.0 * EPS * pixel.length();
+            let error = (truth - pixel).length();
+            // Near a fold one pixel ulp moves the point by many of its own.
+            let fold = 1e-9 + 1e3 * EPS * by_point * reach;
+            assert!(error <= allowed.max(fold), "seed {seed}: pixel {pixel} came back {error:e} px off");
+        }
+    }
+}
+
+fn truth_is_within_an_ulp_of_the_rim(run: &Run, pixel: DVec2) -> bool {
+    let [x, y] = run.reference.lens.image_of_pixel(pixel);
+    let length = (x * x + y * y).sqrt();
+    // Nudged inwards by 8 ulp it must be accepted.
+    let [[fx, _, cx], [_, fy, cy], _] = run.lens().spec().matrix;
+    let less = 1.0 - 16.0 * EPS * (1.0 + pixel.length() / (fx * length.f64()));
+    let nudged = DVec2::new(cx + fx * x.f64() * less, cy + fy * y.f64() * less);
+    run.lens().unproject(nudged).is_ok()
+}
+
+fn run(seed: u64, per_lens: u64) -> Seen {
+    let mut r = Random(seed);
+    let lens = lens_spec(&mut r);
+    let spec = optics_spec(&mut r, lens);
+    let channel = Channel::ALL[(r.bits() % 3) as usize];
+    let optics = match SensorOptics::new(&spec) {
+        Ok(optics) => optics.for_channel(channel),
+        Err(error) => panic!("seed {seed}: {error}"),
+    };
+    let end = optics.lens().max_field_angle_rad();
+    assert!(end > 0.0 && end.is_finite(), "seed {seed}");
+    let mut run = Run {
+        seed,
+        optics: &optics,
+        reference: reference::Sensor::new(&spec, &optics),
+        end,
+        seen: Seen { lenses: 1, ..Seen::default() },
+    };
+    // The reference takes directions as they are: a unit vector is needed only
+    // where angles are compared.
+    assert!((distance(unit([dd(0.0), dd(3.0), dd(4.0)]), [dd(0.0), dd(0.6), dd(0.8)])) < 1e-16);
+    for k in 0..per_lens {
+        match k % 3 {
+            0 => run.random_pixel(&mut r),
+            1 => run.random_ray(&mut r),
+            _ => run.random_point(&mut r),
+        }
+    }
+    run.seen
+}
+
+fn fuzz(lenses: u64, per_lens: u64, seed: u64) -> Seen {
+    (0..lenses).into_par_iter().map(|i| run(seed + i, per_lens)).reduce(Seen::default, Seen::plus)
+}
+
+#[test]
+fn random_optics_agree_with_the_reference() {
+    let seen = fuzz(600, 24, 1);
+    assert!(seen.ok > seen.checks / 4 && seen.limits > seen.checks / 20);
+}
+
+#[test]
+fn long_a_million_random_optics() {
+    let seed = std::env::var("DOMECAST_FUZZ_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(1_000_000);
+    let seen = fuzz(42_000, 24, seed);
+    println!("{} lenses, {} triples, {} ok, {} limits", seen.lenses, seen.checks, seen.ok, seen.limits);
+    assert!(seen.checks >= 1_000_000);
+}
+
+/// Shows and reruns one lens and stack by its seed (`DOMECAST_FUZZ_SEED=..`,
+/// `--no-capture`); without a seed there is nothing to show.
+#[test]
+fn long_show_seed() {
+    let Some(seed) = std::env::var("DOMECAST_FUZZ_SEED").ok().and_then(|s| s.parse().ok()) else {
+        return;
+    };
+    let mut r = Random(seed);
+    let lens = lens_spec(&mut r);
+    println!("{:?}", optics_spec(&mut r, lens.clone()));
+    let built = Lens::new(lens).unwrap();
+    println!("{} {:?} {}", built.max_field_angle_rad(), built.fold_angle_rad(), built.max_radius_px());
+    println!("{:?}", run(seed, 24).checks);
+}

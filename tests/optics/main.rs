@@ -1,0 +1,12 @@
+//! Lenses and refraction never lie: golden values, an independent reference in
+//! double-double arithmetic, and the fuzz run.
+//!
+//! Tests whose names begin with `long_` belong to the long suite
+//! (`scripts/test --all`).
+
+mod batch;
+mod cases;
+mod dd;
+mod fuzz;
+mod golden;
+mod reference;

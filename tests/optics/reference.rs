@@ -1,0 +1,341 @@
+//! The same optics again: slow, bracketed, in double-double, from the formulas.
+//!
+//! Nothing here calls the crate's solvers. The lens inverse bisects (radial
+//! lenses) or refines a candidate and proves it by its place in the domain (the
+//! map is one-to-one there); the way from a point to the camera bisects the
+//! rising reach.
+
+use domecast::camera::{LensSpec, Model};
+use domecast::optics::OpticsSpec;
+use glam::DVec2;
+
+use super::dd::{Dd, dd};
+
+pub type V3 = [Dd; 3];
+
+pub fn v3(v: glam::DVec3) -> V3 {
+    v.to_array().map(dd)
+}
+
+pub fn dot(a: V3, b: V3) -> Dd {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub fn unit(a: V3) -> V3 {
+    let length = dot(a, a).sqrt();
+    a.map(|v| v / length)
+}
+
+/// Distance of two vectors, as a double.
+pub fn distance(a: V3, b: V3) -> f64 {
+    let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    dot(d, d).sqrt().f64()
+}
+
+fn horner(u: Dd, coefficients: &[f64]) -> Dd {
+    coefficients.iter().rev().fold(dd(0.0), |s, &c| s * u + dd(c))
+}
+
+pub struct Lens<'a> {
+    pub spec: &'a LensSpec,
+    numerator: [f64; 4],
+    denominator: [f64; 4],
+    q: [f64; 2],
+}
+
+impl<'a> Lens<'a> {
+    pub fn new(spec: &'a LensSpec) -> Self {
+        let k = |i: usize| spec.distortion.get(i).copied().unwrap_or(0.0);
+        if spec.model == Model::BrownConrady {
+            Self {
+                spec,
+                numerator: [1.0, k(0), k(1), k(4)],
+                denominator: [1.0, k(5), k(6), k(7)],
+                q: [k(3), k(2)],
+            }
+        } else {
+            Self { spec, numerator: [1.0, 0.0, 0.0, 0.0], denominator: [1.0, 0.0, 0.0, 0.0], q: [0.0; 2] }
+        }
+    }
+
+    fn is_fisheye(&self) -> bool {
+        self.spec.model == Model::KannalaBrandt
+    }
+
+    /// Image radius of tan(theta), or of theta for a fisheye.
+    pub fn radius(&self, a: Dd) -> Dd {
+        let u = a * a;
+        if self.is_fisheye() {
+            let k = &self.spec.distortion;
+            return a * horner(u, &[1.0, k[0], k[1], k[2], k[3]]);
+        }
+        a * horner(u, &self.numerator) / horner(u, &self.denominator)
+    }
+
+    /// Image point (focal length 1) of a point of the plane z = 1.
+    fn plane_image(&self, x: Dd, y: Dd) -> [Dd; 2] {
+        let u = x * x + y * y;
+        let factor = horner(u, &self.numerator) / horner(u, &self.denominator);
+        let [qx, qy] = self.q.map(dd);
+        let along = factor + dd(2.0) * (qx * x + qy * y);
+        [x * along + qx * u, y * along + qy * u]
+    }
+
+    pub fn image(&self, ray: V3) -> [Dd; 2] {
+        if self.is_fisheye() {
+            let across = (ray[0] * ray[0] + ray[1] * ray[1]).sqrt();
+            let theta = Dd::atan2(across, ray[2]);
+            if across.hi == 0.0 {
+                return [dd(0.0); 2];
+            }
+            let scale = self.radius(theta) / across;
+            [ray[0] * scale, ray[1] * scale]
+        } else {
+            self.plane_image(ray[0] / ray[2], ray[1] / ray[2])
+        }
+    }
+
+    pub fn pixel(&self, ray: V3) -> [Dd; 2] {
+        let [[fx, _, cx], [_, fy, cy], _] = self.spec.matrix;
+        let [x, y] = self.image(ray);
+        [x * dd(fx) + dd(cx), y * dd(fy) + dd(cy)]
+    }
+
+    pub fn image_of_pixel(&self, pixel: DVec2) -> [Dd; 2] {
+        let [[fx, _, cx], [_, fy, cy], _] = self.spec.matrix;
+        [(dd(pixel.x) - dd(cx)) / dd(fx), (dd(pixel.y) - dd(cy)) / dd(fy)]
+    }
+
+    /// The angle variable in `[0, end]` whose image radius is `rho`, by
+    /// bisection to neighbouring doubles and one secant in double-double.
+    fn bisect(&self, rho: Dd, end: f64) -> Option<Dd> {
+        let (mut low, mut high) = (0.0_f64, end);
+        if self.radius(dd(end)) < rho {
+            return None;
+        }
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            if self.radius(dd(middle)) < rho {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let (at_low, at_high) = (self.radius(dd(low)), self.radius(dd(high)));
+        let rise = at_high - at_low;
+        if rise.hi <= 0.0 {
+            return Some(dd(low));
+        }
+        Some(dd(low) + (rho - at_low) * (dd(high) - dd(low)) / rise)
+    }
+
+    /// The ray of a pixel whose field angle is at most `end_rad`; `near` is a
+    /// candidate, used for tangential lenses only.
+    pub fn ray(&self, pixel: DVec2, end_rad: f64, near: Option<glam::DVec3>) -> Option<V3> {
+        let [x, y] = self.image_of_pixel(pixel);
+        let rho = (x * x + y * y).sqrt();
+        if self.is_fisheye() {
+            let theta = self.bisect(rho, end_rad)?;
+            let (sin, cos) = theta.sin_cos();
+            if rho.hi == 0.0 {
+                return Some([dd(0.0), dd(0.0), dd(1.0)]);
+            }
+            return Some([x * sin / rho, y * sin / rho, cos]);
+        }
+        if self.q == [0.0; 2] {
+            let r = self.bisect(rho, end_rad.tan() * (1.0 + 1e-15))?;
+            if rho.hi == 0.0 {
+                return Some([dd(0.0), dd(0.0), dd(1.0)]);
+            }
+            return Some(unit([x * r / rho, y * r / rho, dd(1.0)]));
+        }
+        let near = near?;
+        let (mut a, mut b) = (dd(near.x / near.z), dd(near.y / near.z));
+        let size = 1e-3 * (1.0 + a.hi.abs().max(b.hi.abs()));
+        for _ in 0..40 {
+            let at = self.plane_image(a, b);
+            let (ex, ey) = (at[0] - x, at[1] - y);
+            // The Jacobian in plain doubles: Newton's steps then gain a
+            // dozen digits each instead of doubling them.
+            let h = 1e-6 * size;
+            let d = |da: f64, db: f64| self.plane_image(a + dd(da), b + dd(db)).map(Dd::f64);
+            let (px, mx, py, my) = (d(h, 0.0), d(-h, 0.0), d(0.0, h), d(0.0, -h));
+            let j = [
+                [(px[0] - mx[0]) / (2.0 * h), (py[0] - my[0]) / (2.0 * h)],
+                [(px[1] - mx[1]) / (2.0 * h), (py[1] - my[1]) / (2.0 * h)],
+            ];
+            let det = j[0][0] * j[1][1] - j[0][1] * j[1][0];
+            let sx = (ex * dd(j[1][1]) - ey * dd(j[0][1])) / dd(det);
+            let sy = (ey * dd(j[0][0]) - ex * dd(j[1][0])) / dd(det);
+            if !sx.hi.is_finite() || !sy.hi.is_finite() {
+                return None;
+            }
+            a = a - sx;
+            b = b - sy;
+            if sx.hi.abs() + sy.hi.abs() < 1e-20 * (a.hi.abs() + b.hi.abs() + 1e-6) {
+                return Some(unit([a, b, dd(1.0)]));
+            }
+        }
+        None
+    }
+
+    pub fn shift(&self, theta: Dd) -> Dd {
+        let u = theta * theta;
+        u * horner(u, &self.spec.pupil_shift_mm)
+    }
+}
+
+pub fn field_angle(ray: V3) -> Dd {
+    Dd::atan2((ray[0] * ray[0] + ray[1] * ray[1]).sqrt(), ray[2])
+}
+
+pub struct Sensor<'a> {
+    pub lens: Lens<'a>,
+    rotation: [V3; 3],
+    position: V3,
+    sheet: Vec<(Dd, Dd)>,
+    fill: Dd,
+    bottom: Dd,
+    radius: f64,
+}
+
+impl<'a> Sensor<'a> {
+    /// Pose and air gap are the crate's own: a sum of thicknesses is rounded,
+    /// and whether the pupil touches the sheet is decided there once.
+    pub fn new(spec: &'a OpticsSpec, optics: &domecast::optics::SensorOptics) -> Self {
+        let (pose, channel) = (optics.sensor_from_camera(), optics.channel());
+        let r = pose.rotation;
+        let (last, sheet) = spec.layers.split_last().unwrap();
+        let sheet: Vec<(Dd, Dd)> =
+            sheet.iter().map(|l| (dd(l.index_for(channel)), dd(l.thickness_mm.unwrap()))).collect();
+        let bottom = dd(pose.translation_mm.z) + dd(optics.air_gap_mm());
+        Self {
+            lens: Lens::new(&spec.lens),
+            rotation: [v3(r.x_axis), v3(r.y_axis), v3(r.z_axis)],
+            position: v3(pose.translation_mm),
+            sheet,
+            fill: dd(last.index_for(channel)),
+            bottom,
+            radius: spec.dome_radius_mm,
+        }
+    }
+
+    fn turn(&self, v: V3) -> V3 {
+        std::array::from_fn(|i| {
+            self.rotation[0][i] * v[0] + self.rotation[1][i] * v[1] + self.rotation[2][i] * v[2]
+        })
+    }
+
+    fn turn_back(&self, v: V3) -> V3 {
+        self.rotation.map(|axis| dot(axis, v))
+    }
+
+    fn pupil(&self, shift: Dd) -> V3 {
+        std::array::from_fn(|i| self.position[i] + self.rotation[2][i] * shift)
+    }
+
+    /// Where a camera ray meets the dome; the distance of its base point from
+    /// the axis stands beside it. `None` when it misses.
+    pub fn surface(&self, ray: V3) -> (Option<V3>, f64) {
+        let d = self.turn(ray);
+        let origin = self.pupil(self.lens.shift(field_angle(ray)));
+        if d[2].hi <= 0.0 {
+            return (None, f64::INFINITY);
+        }
+        let sideways = d[0] * d[0] + d[1] * d[1];
+        let along = |n: Dd| (n * n - sideways).sqrt();
+        let mut per = (self.bottom - origin[2]) / d[2];
+        for &(n, thickness) in &self.sheet {
+            if thickness.hi > 0.0 {
+                per = per + thickness / along(n);
+            }
+        }
+        let (x, y) = (origin[0] + d[0] * per, origin[1] + d[1] * per);
+        let away = (x * x + y * y).sqrt();
+        let r = dd(self.radius);
+        let c = (r - away) * (r + away);
+        if c.hi < 0.0 {
+            return (None, away.f64());
+        }
+        let (sx, sy, up) = (d[0] / self.fill, d[1] / self.fill, along(self.fill) / self.fill);
+        let b = x * sx + y * sy;
+        let root = (b * b + c).sqrt();
+        let s = if b.hi > 0.0 { c / (b + root) } else { root - b };
+        (Some([x + sx * s, y + sy * s, up * s]), away.f64())
+    }
+
+    /// Direction in air, camera frame, of the ray from a shifted pupil.
+    fn ray_from(&self, point: V3, shift: Dd) -> Option<V3> {
+        let pupil = self.pupil(shift);
+        let zero = dd(0.0);
+        let mut parts = vec![(dd(1.0), self.bottom - pupil[2])];
+        parts.extend_from_slice(&self.sheet);
+        parts.push((self.fill, if point[2] > zero { point[2] } else { zero }));
+        parts.retain(|p| p.1.hi > 0.0);
+        let (hx, hy) = (point[0] - pupil[0], point[1] - pupil[1]);
+        let reach = (hx * hx + hy * hy).sqrt();
+        if reach.hi == 0.0 {
+            return Some(self.turn_back([zero, zero, dd(1.0)]));
+        }
+        let n0 = parts.iter().map(|p| p.0).fold(dd(f64::INFINITY), |m, n| if n < m { n } else { m });
+        let total = |t: Dd| {
+            parts.iter().fold(zero, |sum, &(n, d)| {
+                let a = (n - n0) * (n + n0);
+                sum + d * n0 * t / (n * n + a * t * t).sqrt()
+            })
+        };
+        let (mut low, mut high) = (0.0_f64, 1.0_f64);
+        while total(dd(high)) < reach {
+            low = high;
+            high *= 8.0;
+            if high > 1e30 {
+                return None;
+            }
+        }
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            if total(dd(middle)) < reach {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let (at_low, at_high) = (total(dd(low)), total(dd(high)));
+        let rise = at_high - at_low;
+        let t =
+            if rise.hi > 0.0 { dd(low) + (reach - at_low) * (dd(high) - dd(low)) / rise } else { dd(low) };
+        let sine = n0 * t / (dd(1.0) + t * t).sqrt();
+        let left = (dd(1.0) - sine) * (dd(1.0) + sine);
+        if left.hi <= 0.0 {
+            return None;
+        }
+        Some(self.turn_back([hx / reach * sine, hy / reach * sine, left.sqrt()]))
+    }
+
+    /// The camera ray that sees a point; `None` when no ray gets there.
+    pub fn chief(&self, point: V3, end_rad: f64) -> Option<V3> {
+        if self.lens.spec.pupil_shift_mm.is_empty() {
+            return self.ray_from(point, dd(0.0));
+        }
+        // s <- S(theta(s)) contracts strongly for the shifts of real lenses;
+        // when it does not settle there is no reference.
+        let mut shift = dd(0.0);
+        for _ in 0..80 {
+            let ray = self.ray_from(point, shift)?;
+            let theta = field_angle(ray);
+            let theta = if theta.hi > end_rad { dd(end_rad) } else { theta };
+            let next = self.lens.shift(theta);
+            if (next - shift).f64().abs() < 1e-29 {
+                return Some(ray);
+            }
+            shift = next;
+        }
+        None
+    }
+}

@@ -13,7 +13,9 @@ fn poses(c: &mut Criterion) {
         let path = format!("{}/designs/{name}.json", env!("CARGO_MANIFEST_DIR"));
         let Ok(design) = domecast::design::load(path.as_ref()) else { continue };
         let markers = markers_of(&design);
-        let Ok(solver) = PoseSolver::new(design.optics(), &markers, PoseOptions::new(0.1, 5.0)) else { continue };
+        let Ok(solver) = PoseSolver::new(design.optics(), &markers, PoseOptions::new(0.1, 5.0)) else {
+            continue;
+        };
         let turn = rotation_from_vector(DVec3::new(0.03, -0.02, 0.02));
         let pose = Rigid::new(turn, DVec3::new(0.2, 0.1, -1.5));
         let Ok(optics) = design.optics().at_pose(&pose) else { continue };

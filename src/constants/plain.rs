@@ -189,13 +189,10 @@ impl PlainFit {
         let seen: Vec<(Vec<Sighting>, Vec<DVec3>)> =
             loads.iter().map(|load| undistorted(input, &load.pose)).collect::<Result<_, _>>()?;
         let rest = undistorted(input, &Rigid::identity())?;
-        let bundled = apparent(input, loads, &seen, &rest)?;
+        let apparent_mm = apparent(input, loads, &seen, &rest)?;
         let truth: Vec<DVec3> = input.markers.iter().map(|m| m.position_mm).collect();
         let (naive_rest, naive_found) = run(input, &truth, &seen, &rest)?;
         let naive = bias(input, loads, &naive_found, &input.stiffness);
-        // Errors count against those of the naive runtime, so that no axis is bought with another.
-        let scale = naive.mean_wrench_size.map(|size| 1.0 / size.max(1e-9));
-        let apparent_mm = improved(input, loads, &seen, &rest, bundled, scale)?;
         let (rest_pose, found) = run(input, &apparent_mm, &seen, &rest)?;
         let stiffness = effective(input, loads, &found)?;
         let left = bias(input, loads, &found, &stiffness);
@@ -234,76 +231,6 @@ fn apparent(
     }
     settle_at_rest(input, &mut points, rest)?;
     Ok(points)
-}
-
-/// Scales the apparent positions and lifts them, both by a little, to where the wrenches that are left are smallest:
-/// the bundle's nearest points are best for rays, not for what plain PnP makes of them. Gauss-Newton with
-/// differences, eight rounds at most; every round that does not help ends it.
-fn improved(
-    input: &PlainInput,
-    loads: &[PosedLoad],
-    seen: &[(Vec<Sighting>, Vec<DVec3>)],
-    rest: &(Vec<Sighting>, Vec<DVec3>),
-    start: Vec<DVec3>,
-    scale: [f64; 6],
-) -> Result<Vec<DVec3>, PlainError> {
-    let middle = start.iter().sum::<DVec3>() / start.len().max(1) as f64;
-    let radius = start.iter().map(|p| p.distance(middle)).fold(0.0, f64::max).max(1e-9);
-    // Both in mm: growth at the rim, and lift. Where they stand at rest follows from the others.
-    let at = |x: [f64; 2]| -> Result<Vec<DVec3>, PlainError> {
-        let grown = |p: &DVec3| middle + (*p - middle) * (1.0 + x[0] / radius) + DVec3::Z * x[1];
-        let mut points: Vec<DVec3> = start.iter().map(grown).collect();
-        settle_at_rest(input, &mut points, rest)?;
-        Ok(points)
-    };
-    let residuals = |points: &[DVec3]| -> Result<Vec<f64>, PlainError> {
-        let (_, found) = run(input, points, seen, rest)?;
-        let stiffness = effective(input, loads, &found)?;
-        let left = |(load, d): (&PosedLoad, &[f64; 6])| {
-            let miss = stiffness * Vector6::from(*d) - Vector6::from(load.wrench);
-            (0..6).map(move |i| miss[i] * scale[i]).collect::<Vec<f64>>()
-        };
-        Ok(loads.iter().zip(&found).flat_map(left).collect())
-    };
-    let square = |r: &[f64]| r.iter().map(|v| v * v).sum::<f64>();
-    let (mut x, mut best) = ([0.0; 2], start.clone());
-    let mut now = residuals(&best)?;
-    for _ in 0..8 {
-        let step = 1e-3;
-        let mut slopes = Vec::with_capacity(2);
-        for k in 0..2 {
-            let mut y = x;
-            y[k] += step;
-            let there = residuals(&at(y)?)?;
-            slopes.push(there.iter().zip(&now).map(|(a, b)| (a - b) / step).collect::<Vec<f64>>());
-        }
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (aa, ab, bb) =
-            (dot(&slopes[0], &slopes[0]), dot(&slopes[0], &slopes[1]), dot(&slopes[1], &slopes[1]));
-        let (ra, rb) = (dot(&slopes[0], &now), dot(&slopes[1], &now));
-        // A lift that is settled at rest again may have no effect of its own: hold what is not seen.
-        let hold = 1e-9 * (aa + bb);
-        let det = (aa + hold) * (bb + hold) - ab * ab;
-        if det.is_nan() || det <= 0.0 {
-            break;
-        }
-        let move_x = [-((bb + hold) * ra - ab * rb) / det, -((aa + hold) * rb - ab * ra) / det];
-        // A tenth of the markers' radius is more than refraction moves them.
-        let size = move_x[0].hypot(move_x[1]);
-        let shorten = (0.1 * radius / size.max(1e-300)).min(1.0);
-        let next = [x[0] + shorten * move_x[0], x[1] + shorten * move_x[1]];
-        let Ok(points) = at(next) else { break };
-        let Ok(there) = residuals(&points) else { break };
-        if square(&there) >= square(&now) {
-            break;
-        }
-        let done = square(&now) - square(&there) < 1e-6 * square(&now);
-        (x, best, now) = (next, points, there);
-        if done {
-            break;
-        }
-    }
-    Ok(best)
 }
 
 /// Moves all positions as one so that plain PnP is right at rest.

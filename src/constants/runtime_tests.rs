@@ -32,7 +32,8 @@ fn the_plain_runtime_is_nearly_unbiased() {
     for axis in 0..6 {
         let (left, naive) = (fit.left.mean_wrench_size[axis], fit.naive.mean_wrench_size[axis]);
         let factor = if (2..5).contains(&axis) { 10.0 } else { 1.0 };
-        assert!(factor * left <= naive, "{}: {left} against {naive}", WRENCH_AXES[axis]);
+        // Below a thousandth of a newton(-millimetre) neither is worse.
+        assert!(factor * left <= naive.max(1e-3), "{}: {left} against {naive}", WRENCH_AXES[axis]);
     }
     // The offset at rest vanishes; the naive one is newtons.
     let off = design.optics().rest_from_camera().compose(&fit.rest_pose);

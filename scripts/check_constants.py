@@ -124,7 +124,9 @@ def check_plain_runtime(constants, report):
     left, naive = np.abs(left).mean(0), np.abs(naive).mean(0)
     for axis, name in enumerate(("Fx", "Fy", "Fz", "Mx", "My", "Mz")):
         print(f"     {name}: plain runtime {left[axis]:.4f}, naive {naive[axis]:.4f}")
-    check("plain runtime beats the naive one on Fz", left[2] < naive[2] / 3, f"{left[2]:.4f} < {naive[2]:.4f}/3")
+    factor = 5 if any(l["index"] != 1.0 for l in constants["optics"]["layers"]) else 1
+    check("plain runtime beats the naive one on Fz", left[2] < naive[2] / factor,
+          f"{left[2]:.4f} < {naive[2]:.4f} / {factor}")
 
 
 def check_layer_free(constants):

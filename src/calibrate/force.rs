@@ -156,12 +156,12 @@ pub fn fit(pairs: &[Pair], nominal: &Matrix6<f64>, sizes: &[f64; 6]) -> Result<F
         (0..pairs.len()).filter(|row| pairs[*row].wrench[axis].is_some()).collect()
     };
     let mut fitted_axes = Vec::new();
-    for axis in 0..6 {
+    for (axis, name) in WRENCH_AXES.iter().enumerate() {
         let readings = rows_of(axis).len();
         if readings == 0 {
-            refused.push(format!("{}: no reading", WRENCH_AXES[axis]));
+            refused.push(format!("{name}: no reading"));
         } else if readings < needed {
-            refused.push(format!("{}: {readings} readings, a fit needs {needed}", WRENCH_AXES[axis]));
+            refused.push(format!("{name}: {readings} readings, a fit needs {needed}"));
         } else {
             fitted_axes.push(axis);
         }

@@ -307,12 +307,15 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Of one pose: the inverse of its block, its coupling to the numbers, its right side.
+type OwnBlock = (Matrix6<f64>, DMatrix<f64>, Vector6<f64>);
+
 /// Normal equations with the poses eliminated, and what brings the poses back.
 struct Reduced {
     matrix: DMatrix<f64>,
     right: DVector<f64>,
     /// For each frame that is not at rest: inverse of the pose's own block, its coupling to the numbers, its right side.
-    poses: Vec<Option<(Matrix6<f64>, DMatrix<f64>, Vector6<f64>)>>,
+    poses: Vec<Option<OwnBlock>>,
     cost: f64,
     squares: f64,
     count: usize,
@@ -363,11 +366,11 @@ impl Problem<'_> {
             count: 0,
             outliers: 0,
         };
-        for k in 0..n {
-            let weight = self.priors[k].powi(-2);
-            out.cost += x[k] * x[k] * weight;
+        for (k, (value, sd)) in x.iter().zip(&self.priors).enumerate() {
+            let weight = sd.powi(-2);
+            out.cost += value * value * weight;
             out.matrix[(k, k)] += weight;
-            out.right[k] -= x[k] * weight;
+            out.right[k] -= value * weight;
         }
         for (frame, seen) in self.seen.iter().enumerate() {
             let optics = rest.at_pose(&poses[frame]).ok()?;
@@ -490,7 +493,7 @@ pub fn fit(
             continue;
         };
         let next_x: Vec<f64> = x.iter().zip(step.iter()).map(|(a, b)| a + b).collect();
-        let moved = |(pose, own): (&Rigid, &Option<(Matrix6<f64>, DMatrix<f64>, Vector6<f64>)>)| match own {
+        let moved = |(pose, own): (&Rigid, &Option<OwnBlock>)| match own {
             Some((inverse, coupling, right)) => {
                 let m = inverse * (right - coupling.transpose() * &step);
                 let motion = Rigid::new(

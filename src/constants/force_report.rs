@@ -18,7 +18,7 @@ use crate::numeric::Rigid;
 /// Directions around the axis that the table has.
 const AZIMUTHS: u32 = 8;
 /// Mixes of push and press along the border in the picture.
-const BORDER_POINTS: u32 = 41;
+const BORDER_POINTS: u32 = 31;
 
 /// One line of the load table.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -29,11 +29,11 @@ fn the_plain_runtime_is_nearly_unbiased() {
     };
     let fit = PlainFit::over(&input, &loads).unwrap();
     println!("LINEAR {:#?} {:#?}", fit.left, fit.naive);
-    for axis in 0..6 {
+    for (axis, name) in WRENCH_AXES.iter().enumerate() {
         let (left, naive) = (fit.left.mean_wrench_size[axis], fit.naive.mean_wrench_size[axis]);
         let factor = if (2..5).contains(&axis) { 10.0 } else { 1.0 };
         // Below a thousandth of a newton(-millimetre) neither is worse.
-        assert!(factor * left <= naive.max(1e-3), "{}: {left} against {naive}", WRENCH_AXES[axis]);
+        assert!(factor * left <= naive.max(1e-3), "{name}: {left} against {naive}");
     }
     // The offset at rest vanishes; the naive one is newtons.
     let off = design.optics().rest_from_camera().compose(&fit.rest_pose);
@@ -93,9 +93,9 @@ fn the_table_is_near_the_law() {
     for load in claimed_loads(&design, &suspension) {
         let d = crate::mechanics::Displacement::of_pose(&load.pose, suspension.at_mm());
         let by_table = wrench_by_table(&springs, &d);
-        for axis in 0..6 {
+        for (axis, name) in WRENCH_AXES.iter().enumerate() {
             let (miss, allowed) = (by_table[axis] - load.wrench[axis], if axis < 3 { 0.05 } else { 1.0 });
-            assert!(miss.abs() < allowed, "{} {miss} at {:?}", WRENCH_AXES[axis], load.wrench);
+            assert!(miss.abs() < allowed, "{name} {miss} at {:?}", load.wrench);
         }
     }
 }

@@ -22,7 +22,7 @@ pub struct Direction {
 pub struct Reach {
     /// The direction.
     pub direction: Direction,
-    /// The factor at which the first limit is met, to a millionth; at most the search's end.
+    /// The factor at which the first limit is met, to a hundred-thousandth; at most the search's end.
     pub factor: f64,
     /// What ends it; `None` where nothing did before the search's end.
     pub ended_by: Option<Check>,
@@ -46,10 +46,10 @@ pub fn try_all(suspension: &Suspension, limits: &Limits, more: MoreChecks, wrenc
     case
 }
 
-/// Drives one load up until the first limit is met: doubling from an eighth, then bisection (at most 40 steps).
+/// Drives one load up until the first limit is met: growing from an eighth by sixty per cent at a time, then bisection (at most 40 steps).
 ///
 /// The part of each limit that is used need not grow with the load; what is found is the first limit met at the
-/// resolution of the doubling.
+/// resolution of that growth.
 pub fn reach(suspension: &Suspension, limits: &Limits, more: MoreChecks, direction: &Direction) -> Reach {
     let at = |factor: f64| try_all(suspension, limits, more, &direction.wrench.scaled(factor));
     let passed = |case: &LoadCase| case.equilibrium.is_err() || case.passed().next().is_some();
@@ -57,15 +57,15 @@ pub fn reach(suspension: &Suspension, limits: &Limits, more: MoreChecks, directi
     let mut over = at(high);
     while !passed(&over) && high < LARGEST_FACTOR {
         low = high;
-        // Small steps where the limits lie: a quarter more each time.
-        high *= 1.25;
+        // Steps of sixty per cent: limits that are met and left again within one are not seen.
+        high *= 1.6;
         over = at(high);
     }
     if !passed(&over) {
         return Reach { direction: direction.clone(), factor: high, ended_by: None, case: over };
     }
     for _ in 0..40 {
-        if high - low <= 1e-6 * high {
+        if high - low <= 1e-5 * high {
             break;
         }
         let middle = 0.5 * (low + high);

@@ -242,7 +242,7 @@ impl ForceReport {
              N</text>\n",
             WIDTH - 20.0,
             zero - 6.0,
-            TOP + 4.0
+            TOP - 12.0
         );
         let mut names: Vec<&str> = Vec::new();
         for pair in self.border.windows(2) {

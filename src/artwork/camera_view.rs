@@ -3,12 +3,12 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
-use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Stroke, Transform};
+use tiny_skia::Pixmap;
 
 use super::RenderError;
+use super::canvas::{color, fill, fill_outline, stroke};
 use crate::design::sections::EvenIn;
 use crate::layout::frame::EvenFrame;
-use crate::layout::outline::Outline;
 use crate::layout::{Layout, LayoutSpec, region};
 
 const AROUND: [u8; 3] = [58, 58, 62];
@@ -57,63 +57,11 @@ pub fn camera_view(spec: &LayoutSpec, layout: &Layout) -> Result<Vec<u8>, Render
         let corners: Vec<DVec2> = around()
             .filter_map(|out| undistorted.raw_from_even(mask.center_px + out * mask.radius_px).ok())
             .collect();
-        stroke(&mut picture, &corners, MASK);
+        stroke(&mut picture, &corners, true, 1.0, MASK);
     }
     picture.encode_png().map_err(|error| RenderError::Encode(error.to_string()))
 }
 
 fn around() -> impl Iterator<Item = DVec2> {
     (0..CORNERS).map(|k| DVec2::from_angle(TAU * f64::from(k) / f64::from(CORNERS)))
-}
-
-fn color([r, g, b]: [u8; 3]) -> Color {
-    Color::from_rgba8(r, g, b, 255)
-}
-
-fn paint(rgb: [u8; 3]) -> Paint<'static> {
-    let mut paint = Paint::default();
-    paint.set_color(color(rgb));
-    paint.anti_alias = true;
-    paint
-}
-
-/// Pixel centres lie half a pixel inside the canvas.
-fn canvas(p: DVec2) -> (f32, f32) {
-    ((p.x + 0.5) as f32, (p.y + 0.5) as f32)
-}
-
-fn closed(corners: &[DVec2]) -> Option<tiny_skia::Path> {
-    let mut builder = PathBuilder::new();
-    for (i, corner) in corners.iter().enumerate() {
-        let (x, y) = canvas(*corner);
-        if i == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
-    }
-    builder.close();
-    builder.finish()
-}
-
-fn fill(picture: &mut Pixmap, corners: &[DVec2], rgb: [u8; 3]) {
-    if let Some(path) = closed(corners) {
-        picture.fill_path(&path, &paint(rgb), FillRule::Winding, Transform::identity(), None);
-    }
-}
-
-fn stroke(picture: &mut Pixmap, corners: &[DVec2], rgb: [u8; 3]) {
-    if let Some(path) = closed(corners) {
-        picture.stroke_path(&path, &paint(rgb), &Stroke::default(), Transform::identity(), None);
-    }
-}
-
-fn fill_outline(picture: &mut Pixmap, outline: &Outline, rgb: [u8; 3]) {
-    let mut builder = PathBuilder::new();
-    let (x, y) = canvas(outline.start());
-    builder.move_to(x, y);
-    for piece in outline.pieces() {
-        let [(ax, ay), (bx, by), (x, y)] = piece.map(canvas);
-        builder.cubic_to(ax, ay, bx, by, x, y);
-    }
-    builder.close();
-    if let Some(path) = builder.finish() {
-        picture.fill_path(&path, &paint(rgb), FillRule::Winding, Transform::identity(), None);
-    }
 }

@@ -150,6 +150,53 @@ impl Path {
         Self::new(outline.start(), segments, true)
     }
 
+    /// The path as a polygon within `tolerance_mm`; the start is not repeated. A closed path of curves is grown
+    /// about its middle until the polygon encloses the path's own area.
+    pub fn polygon(&self, tolerance_mm: f64) -> Vec<DVec2> {
+        let mut curves = Vec::new();
+        for segment in &self.segments {
+            match segment {
+                Segment::Cubic(a, b, to) => curves.push([*a, *b, *to]),
+                Segment::Line(_) => break,
+            }
+        }
+        if self.closed && curves.len() == self.segments.len() && !curves.is_empty() {
+            let outline = Outline::from_pieces(curves);
+            let mut points = outline.polygon_within(tolerance_mm);
+            let next = points.iter().cycle().skip(1);
+            let area: f64 = 0.5 * points.iter().zip(next).map(|(p, q)| p.perp_dot(*q)).sum::<f64>();
+            let growth = (outline.signed_area() / area).sqrt();
+            if growth.is_finite() {
+                let middle = outline.centroid();
+                for point in &mut points {
+                    *point = middle + (*point - middle) * growth;
+                }
+            }
+            return points;
+        }
+        let mut points = vec![self.start];
+        for segment in &self.segments {
+            match segment {
+                Segment::Line(to) => points.push(*to),
+                Segment::Cubic(a, b, to) => {
+                    // A lone curve: its chord's error falls with the square of the number of chords.
+                    let from = points.last().copied().unwrap_or(self.start);
+                    let bend = (from - 2.0 * *a + *b).length().max((*a - 2.0 * *b + *to).length());
+                    let count = (0.75 * bend / tolerance_mm).sqrt().ceil().clamp(1.0, 1e4) as u32;
+                    points.extend((1..=count).map(|k| {
+                        let t = f64::from(k) / f64::from(count);
+                        let u = 1.0 - t;
+                        from * (u * u * u)
+                            + *a * (3.0 * u * u * t)
+                            + *b * (3.0 * u * t * t)
+                            + *to * (t * t * t)
+                    }));
+                }
+            }
+        }
+        points
+    }
+
     /// Where the path starts, mm.
     pub fn start(&self) -> DVec2 {
         self.start

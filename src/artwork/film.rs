@@ -6,7 +6,10 @@
 use glam::DVec2;
 
 use super::drawing::{Anchor, Drawing, Ink, Item, Layer, NotFinite, Path, Shape};
-use crate::layout::{Dot, Layout};
+use crate::layout::Layout;
+use crate::layout::outline::Outline;
+use crate::layout::target::TargetMark;
+use crate::transfer::TransferMap;
 
 /// Half the length of a registration cross, mm.
 const CROSS_ARM_MM: f64 = 1.5;
@@ -21,9 +24,9 @@ const CHIRAL_MM: f64 = 3.0;
 /// Height of the capitals of notes, mm, and the distance of their lines.
 const TEXT_MM: f64 = 1.0;
 const TEXT_LINE_MM: f64 = 1.9;
-/// Width of the notes, mm, and the characters that surely fit: wide sans-serif fonts take 0.85 mm each.
+/// Width of the notes, mm, and the characters that surely fit: the lettering takes 0.92 mm each.
 const NOTES_WIDTH_MM: f64 = 40.0;
-const NOTES_CHARACTERS: usize = 44;
+const NOTES_CHARACTERS: usize = 40;
 
 /// What the notes of a film say beside what the layout knows.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,53 +56,137 @@ pub fn film(
     pad_over_image: f64,
     label: &FilmLabel,
 ) -> Result<Drawing, NotFinite> {
-    let dots: Vec<&Dot> = layout.dots.iter().filter(|dot| dot.hit == hit).collect();
-    let mut dot_layer = Layer::new("dots");
-    for dot in &dots {
-        dot_layer.items.push(Item::Shape(dot_shape(dot)?));
-    }
-    let footprint_mm = pad_over_image * picture_radius_mm(&dots);
+    let dots = layout.dots.iter().filter(|dot| dot.hit == hit);
+    let marks: Vec<Mark<'_>> =
+        dots.map(|dot| Mark { id: dot.id, plate_mm: dot.plate_mm, outline: &dot.plate_outline }).collect();
     let films = layout.hits.len();
-    let tilt_deg = layout.hits.get(hit).map_or(0.0, |hit| hit.tilt_rad.to_degrees());
-    let azimuth_deg = layout.hits.get(hit).map_or(0.0, |hit| hit.azimuth_rad.to_degrees());
-    let map = match layout.transfer.correction() {
-        None => layout.transfer.nominal().as_str().to_owned(),
-        Some(_) => format!("{}, corrected by measurement", layout.transfer.nominal().as_str()),
-    };
+    let (tilt_deg, azimuth_deg) = layout
+        .hits
+        .get(hit)
+        .map_or((0.0, 0.0), |hit| (hit.tilt_rad.to_degrees(), hit.azimuth_rad.to_degrees()));
     let jig = if tilt_deg == 0.0 {
         "pole upright".to_owned()
     } else {
-        format!("part tilted {tilt_deg:.2} deg, azimuth {azimuth_deg:.2} deg up")
+        format!("jig {tilt_deg:.2} deg: the dome's azimuth {azimuth_deg:.2} deg is tilted up to the pad")
     };
-    let notes = wrapped(&[
-        format!("{}  sha256 {}", label.design, label.short_hash()),
-        format!("film {} of {films}: {} dots, {jig}", hit + 1, dots.len()),
-        format!("1:1 in mm, positive: black is ink; map {map}"),
-        "Seen from above the plate, with the F upright and unmirrored: reads like the part seen from outside, \
-         x to the right, y up. The camera inside sees the mirror image. Do not mirror."
-            .to_owned(),
-    ]);
-    let sheet = Sheet::new(footprint_mm, notes.len());
-    Ok(Drawing {
-        title: format!("{} film {} of {films}", label.design, hit + 1),
-        description: format!(
-            "Pad-print film of {} ({}), 1:1 in mm, seen from above the plate, y up. One user unit is 1 mm; a \
-             plate point (x, y) is drawn at (x, -y). Reads like the part seen from outside; do not mirror.",
-            label.design, label.hash
-        ),
-        page_mm: sheet.page_mm(),
+    Film {
+        name: format!("film {} of {films}", hit + 1),
+        shape: "dot",
+        first_note: format!("film {} of {films}: {} dots, {jig}", hit + 1, marks.len()),
+        marks,
         facts: vec![
+            ("film".into(), format!("{} of {films}", hit + 1)),
+            ("tilt-deg".into(), tilt_deg.to_string()),
+            ("azimuth-deg".into(), azimuth_deg.to_string()),
+        ],
+        further_notes: Vec::new(),
+    }
+    .drawing(&layout.transfer, pad_over_image, label)
+}
+
+/// The film of the test target by which a pad's map is measured.
+///
+/// # Errors
+/// A coordinate is not finite.
+pub fn target_film(
+    target: &[TargetMark],
+    transfer: &TransferMap,
+    pad_over_image: f64,
+    label: &FilmLabel,
+) -> Result<Drawing, NotFinite> {
+    let marks = target
+        .iter()
+        .map(|mark| Mark { id: mark.id, plate_mm: mark.plate_mm, outline: &mark.outline })
+        .collect();
+    Film {
+        name: "print target".to_owned(),
+        shape: "mark",
+        marks,
+        first_note: format!("test target: {} marks, pole upright", target.len()),
+        facts: vec![("film".into(), "print target".into())],
+        further_notes: vec![
+            "Mark 0 is the pole; rings of 6, 12, 18 .. marks follow, numbered counter-clockwise from the large \
+             marks along +x. Print it, measure each mark from outside (id,x_mm,y_mm, pole at the origin), and run \
+             domecast calibrate-print."
+                .to_owned(),
+        ],
+    }
+    .drawing(transfer, pad_over_image, label)
+}
+
+/// A mark of a film.
+struct Mark<'a> {
+    id: u32,
+    plate_mm: DVec2,
+    outline: &'a Outline,
+}
+
+/// What differs from film to film.
+struct Film<'a> {
+    name: String,
+    shape: &'static str,
+    marks: Vec<Mark<'a>>,
+    first_note: String,
+    facts: Vec<(String, String)>,
+    further_notes: Vec<String>,
+}
+
+impl Film<'_> {
+    fn drawing(
+        self,
+        transfer: &TransferMap,
+        pad_over_image: f64,
+        label: &FilmLabel,
+    ) -> Result<Drawing, NotFinite> {
+        let mut layer = Layer::new("dots");
+        for mark in &self.marks {
+            layer.items.push(Item::Shape(Shape {
+                id: format!("{}-{}", self.shape, mark.id),
+                facts: vec![
+                    ("id".into(), mark.id.to_string()),
+                    ("x-mm".into(), mark.plate_mm.x.to_string()),
+                    ("y-mm".into(), mark.plate_mm.y.to_string()),
+                ],
+                path: Path::of_outline(mark.outline)?,
+                ink: Ink::Fill,
+            }));
+        }
+        let footprint_mm = pad_over_image * picture_radius_mm(self.marks.iter().map(|mark| mark.outline));
+        let map = match transfer.correction() {
+            None => transfer.nominal().as_str().to_owned(),
+            Some(_) => format!("{}, corrected by measurement", transfer.nominal().as_str()),
+        };
+        let mut notes = vec![
+            format!("{}  sha256 {}", label.design, label.short_hash()),
+            self.first_note,
+            format!("1:1 in mm, positive: black is ink; map {map}"),
+            "Seen from above the plate, with the F upright and unmirrored: reads like the part seen from outside, \
+             x to the right, y up. The camera inside sees the mirror image. Do not mirror."
+                .to_owned(),
+        ];
+        notes.extend(self.further_notes);
+        let notes = wrapped(&notes);
+        let sheet = Sheet::new(footprint_mm, notes.len());
+        let mut facts = vec![
             ("design".into(), label.design.clone()),
             ("design-sha256".into(), label.hash.clone()),
             ("frame".into(), "plate: origin under the pole, seen from above, y up, mm".into()),
             ("map".into(), map),
-            ("film".into(), format!("{} of {films}", hit + 1)),
-            ("tilt-deg".into(), format!("{tilt_deg}")),
-            ("azimuth-deg".into(), format!("{azimuth_deg}")),
-            ("pad-footprint-radius-mm".into(), format!("{footprint_mm}")),
-        ],
-        layers: vec![dot_layer, sheet.registration()?, sheet.notes(&notes)?],
-    })
+            ("pad-footprint-radius-mm".into(), footprint_mm.to_string()),
+        ];
+        facts.extend(self.facts);
+        Ok(Drawing {
+            title: format!("{} {}", label.design, self.name),
+            description: format!(
+                "Pad-print film of {} ({}), 1:1 in mm, seen from above the plate, y up. One user unit is 1 mm; a \
+                 plate point (x, y) is drawn at (x, -y). Reads like the part seen from outside; do not mirror.",
+                label.design, label.hash
+            ),
+            page_mm: sheet.page_mm(),
+            facts,
+            layers: vec![layer, sheet.registration()?, sheet.notes(&notes)?],
+        })
+    }
 }
 
 /// Breaks lines between words where they would not fit.
@@ -121,23 +208,9 @@ fn wrapped(paragraphs: &[String]) -> Vec<String> {
     lines
 }
 
-fn dot_shape(dot: &Dot) -> Result<Shape, NotFinite> {
-    Ok(Shape {
-        id: format!("dot-{}", dot.id),
-        facts: vec![
-            ("id".into(), dot.id.to_string()),
-            ("x-mm".into(), dot.plate_mm.x.to_string()),
-            ("y-mm".into(), dot.plate_mm.y.to_string()),
-        ],
-        path: Path::of_outline(&dot.plate_outline)?,
-        ink: Ink::Fill,
-    })
-}
-
 /// Radius of the circle around the stroke's axis that holds all outlines, mm.
-pub fn picture_radius_mm(dots: &[&Dot]) -> f64 {
-    let corners = dots.iter().flat_map(|dot| dot.plate_outline.polygon(4));
-    corners.map(|p| p.length()).fold(0.0, f64::max)
+pub fn picture_radius_mm<'a>(outlines: impl Iterator<Item = &'a Outline>) -> f64 {
+    outlines.flat_map(|outline| outline.polygon(4)).map(|p| p.length()).fold(0.0, f64::max)
 }
 
 /// What surrounds the picture: crosses, scale bar, chiral mark, notes.

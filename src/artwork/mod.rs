@@ -4,19 +4,30 @@
 //! each writer spells it in its format without deciding anything.
 
 mod camera_view;
+mod canvas;
 pub mod drawing;
+mod dxf_file;
 mod film;
+mod outside_view;
+mod pdf_file;
+mod strokes;
 mod svg_file;
 #[cfg(test)]
 mod tests;
+mod tiff_file;
 
 use std::fmt;
 
 pub use camera_view::camera_view;
 pub use drawing::Drawing;
-pub use film::{FilmLabel, film};
+pub use dxf_file::to_dxf;
+pub use film::{FilmLabel, film, target_film};
+pub use outside_view::outside_view;
+pub use pdf_file::to_pdf;
 pub use svg_file::to_svg;
+pub use tiff_file::to_tiff;
 
+use crate::layout::target::print_target;
 use crate::layout::{Layout, LayoutSpec};
 
 /// A file of the artwork.
@@ -57,14 +68,41 @@ impl From<drawing::NotFinite> for RenderError {
     }
 }
 
+/// Path of the film of a hit in a build, for a kind of file (`svg`): `artwork/dots.svg` for the first hit,
+/// `artwork/dots-2.svg` for the second.
+pub fn film_path(hit: usize, kind: &str) -> String {
+    if hit == 0 { format!("artwork/dots.{kind}") } else { format!("artwork/dots-{}.{kind}", hit + 1) }
+}
+
 /// All artwork of a layout, in a fixed order.
 ///
 /// # Errors
 /// See [`RenderError`].
 pub fn files(spec: &LayoutSpec, layout: &Layout, label: &FilmLabel) -> Result<Vec<ArtworkFile>, RenderError> {
-    let drawing = film(layout, 0, spec.print.pad_over_image, label)?;
-    Ok(vec![
-        ArtworkFile { path: "artwork/dots.svg".into(), bytes: to_svg(&drawing) },
-        ArtworkFile { path: "artwork/camera-view.png".into(), bytes: camera_view(spec, layout)? },
+    let mut files = Vec::new();
+    for hit in 0..layout.hits.len() {
+        let drawing = film(layout, hit, spec.print.pad_over_image, label)?;
+        files.extend(film_files(&drawing, |kind| film_path(hit, kind), spec)?);
+    }
+    let target = print_target(&layout.transfer, &spec.print);
+    let drawing = target_film(&target, &layout.transfer, spec.print.pad_over_image, label)?;
+    files.extend(film_files(&drawing, |kind| format!("artwork/print-target.{kind}"), spec)?);
+    files.push(ArtworkFile { path: "artwork/camera-view.png".into(), bytes: camera_view(spec, layout)? });
+    files.push(ArtworkFile { path: "artwork/outside-view.png".into(), bytes: outside_view(layout)? });
+    Ok(files)
+}
+
+/// One film in every format.
+fn film_files(
+    drawing: &Drawing,
+    path: impl Fn(&str) -> String,
+    spec: &LayoutSpec,
+) -> Result<[ArtworkFile; 4], RenderError> {
+    let file = |kind: &str, bytes: Vec<u8>| ArtworkFile { path: path(kind), bytes };
+    Ok([
+        file("svg", to_svg(drawing)),
+        file("pdf", to_pdf(drawing)?),
+        file("dxf", to_dxf(drawing, spec.print.outline_tolerance_mm)?),
+        file("tif", to_tiff(drawing, spec.print.dpi)?),
     ])
 }

@@ -62,8 +62,7 @@ fn svg_read_again_maps_back_to_the_dome() {
 fn registration_stays_off_the_pad() {
     let (_, layout, label) = thumb24();
     let drawing = film(&layout, 0, 1.3, &label).unwrap();
-    let all: Vec<_> = layout.dots.iter().collect();
-    let footprint_mm = 1.3 * film::picture_radius_mm(&all);
+    let footprint_mm = 1.3 * film::picture_radius_mm(layout.dots.iter().map(|dot| &dot.plate_outline));
     for layer in &drawing.layers[1..] {
         for item in &layer.items {
             match item {
@@ -126,4 +125,16 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
         })
     };
     assert_eq!(make(1), make(4));
+}
+
+#[test]
+#[ignore = "writes files to look at; set DOMECAST_LOOK to a folder"]
+fn look() {
+    let folder = std::path::PathBuf::from(std::env::var("DOMECAST_LOOK").unwrap());
+    let (spec, layout, label) = thumb24();
+    for file in files(&spec, &layout, &label).unwrap() {
+        let path = folder.join(&file.path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, file.bytes).unwrap();
+    }
 }

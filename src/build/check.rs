@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::manifest::{DESIGN_NAME, MANIFEST_NAME, Manifest, PartRecord, sha256_hex};
 use super::tree::list_files;
+use crate::artwork;
 use crate::constants::Constants;
 use crate::design::{self, Design, DesignError};
 use crate::layout::Layout;
@@ -155,10 +156,10 @@ fn check_constants(report: &mut CheckReport, dir: &Path, design: &Design, consta
     report.add("constants: dots on the dome", dots_on_dome(design, constants));
     report.add("constants: dots and markers in the image", dots_in_image(design, constants));
     report.add("constants: neighbours", neighbors(constants));
-    report.add(
-        "artwork/dots.svg",
-        read(dir, "artwork/dots.svg").and_then(|text| check_svg(&text, &layout, constants)),
-    );
+    // one film for each hit of the pad; together they hold every dot once
+    let films = (0..layout.hits.len()).map(|hit| read(dir, &artwork::film_path(hit, "svg")));
+    let films: Result<Vec<String>, String> = films.collect();
+    report.add("artwork: films", films.and_then(|texts| check_svg(&texts.join("\n"), &layout, constants)));
 }
 
 fn dots_on_dome(design: &Design, constants: &Constants) -> Result<String, String> {

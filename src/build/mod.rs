@@ -19,6 +19,7 @@ use std::fmt;
 use crate::artwork::{self, FilmLabel, RenderError};
 use crate::constants;
 use crate::design::{Design, DesignError};
+use crate::layout::report::LayoutReport;
 use crate::layout::{Layout, LayoutError, LayoutSpec};
 use crate::mechanics::{Check, claims_of, suspension_of};
 use crate::numeric::Rigid;
@@ -47,7 +48,16 @@ impl From<LayoutError> for BuildError {
 
 impl From<RenderError> for BuildError {
     fn from(error: RenderError) -> Self {
-        Self::Ours(format!("the artwork could not be drawn: {error}"))
+        match error {
+            RenderError::Size => DesignError::at(
+                "print.dpi",
+                "",
+                "the film would be wider or higher than 60000 px at this resolution",
+                "a lower resolution, or a smaller dome",
+            )
+            .into(),
+            error => Self::Ours(format!("the artwork could not be drawn: {error}")),
+        }
     }
 }
 
@@ -113,6 +123,12 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     for file in artwork::files(&spec, &layout, &label)? {
         tree.add(file.path, file.bytes);
     }
+    step("judging the layout");
+    // numbers, strings and lists only: nothing here can fail to be written
+    let mut text =
+        serde_json::to_string_pretty(&LayoutReport::new(design, &spec, &layout)).unwrap_or_default();
+    text.push('\n');
+    tree.add("artwork/layout.json", text.into_bytes());
     step("making the parts");
     let mut records = Vec::new();
     let solids = parts::build(design)?;

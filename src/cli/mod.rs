@@ -3,6 +3,7 @@
 mod build;
 mod calibrate_force;
 mod calibrate_optics;
+mod calibrate_print;
 mod check;
 mod output;
 mod points;
@@ -92,6 +93,20 @@ enum Command {
     },
     /// Print the JSON schema of the design file.
     Schema,
+    /// Fit the pad's map to a measured test print, and write it into a new design file.
+    CalibratePrint {
+        /// CSV of `id,x_mm,y_mm` (seen from outside, pole at the origin) or `id,phi_deg,theta_deg`, optionally
+        /// `print`.
+        measured: PathBuf,
+        /// The design file from which the test print was made.
+        design: PathBuf,
+        /// The new design file [default: <design>-measured.json beside the design].
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Which artwork was printed [default: the one whose marks fit].
+        #[arg(long, value_enum)]
+        marks: Option<calibrate_print::Marks>,
+    },
 }
 
 /// Runs the program on the process's arguments.
@@ -134,5 +149,8 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
             calibrate_optics::run(output, centroids, constants, out.as_deref(), *rest_frames)
         }
         Command::Schema => schema::run(output),
+        Command::CalibratePrint { measured, design, out, marks } => {
+            calibrate_print::run(output, measured, design, out.as_deref(), *marks)
+        }
     }
 }

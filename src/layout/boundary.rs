@@ -25,23 +25,6 @@ impl Boundary {
         Self { radius_px }
     }
 
-    /// Like [`Self::new`], for a radius that can fail.
-    ///
-    /// # Errors
-    /// The first failure of `radius`.
-    pub fn try_new<E>(mut radius: impl FnMut(DVec2) -> Result<f64, E>) -> Result<Self, E> {
-        let mut failure = None;
-        let boundary = Self::new(|direction| match radius(direction) {
-            _ if failure.is_some() => 0.0,
-            Ok(r) => r,
-            Err(e) => {
-                failure = Some(e);
-                0.0
-            }
-        });
-        failure.map_or(Ok(boundary), Err)
-    }
-
     /// Radius of the edge in the direction of `offset`, px.
     pub fn radius_px(&self, offset: DVec2) -> f64 {
         let turns = offset.to_angle() / TAU;

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::boundary::Boundary;
-use super::dot::{Carrier, Dot, DotSize};
+use super::dot::{Carrier, Dot, DotSize, plate_outline};
 use super::frame::EvenFrame;
 use super::lost::{LostDot, Reason, Rule, Zone};
 use super::neighbors::neighbors;
@@ -14,8 +14,8 @@ use super::outline::Outline;
 use super::pattern::{Pattern, PatternError};
 use super::spec::LayoutSpec;
 use super::zones::ImageZone;
-use super::{Hit, Layout, LayoutError, gaps, region, zones};
-use crate::design::sections::{OnLost, PatternCentre, PatternKind};
+use super::{Hit, Layout, LayoutError, gaps, hits, region, zones};
+use crate::design::sections::{Hits, OnLost, PatternCentre, PatternKind};
 use crate::optics::Limit;
 
 /// Delaunay edges up to this multiple of the nearest distance count as neighbours: below the diagonal of a
@@ -49,7 +49,7 @@ pub(super) fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
             format!("below the pitch, {pitch_px} px"),
         ));
     }
-    let hits = vec![Hit::new(0.0, 0.0)];
+    let hits = plan_hits(spec, &carrier, center_px, &places);
     let zones = zones::image_zones(spec);
     let checked: Vec<Result<Dot, LostDot>> =
         places.par_iter().map(|place| check_dot(spec, &carrier, &hits, &zones, center_px + *place)).collect();
@@ -108,6 +108,28 @@ fn center(spec: &LayoutSpec, frame: &EvenFrame<'_>) -> Result<DVec2, LayoutError
     };
     let raw = raw.map_err(lost)?;
     frame.even_from_raw(raw).map_err(|limit| lost(limit.into()))
+}
+
+/// The hits that the dots of the pattern need, those left aside that the lens does not see.
+fn plan_hits(spec: &LayoutSpec, carrier: &Carrier<'_>, center_px: DVec2, places: &[DVec2]) -> Vec<Hit> {
+    if spec.print.hits == Hits::Single {
+        return vec![Hit::new(0.0, 0.0)];
+    }
+    let radius_mm = spec.optics.dome_radius_mm();
+    let polar_and_own = |place: &DVec2| -> Option<(f64, f64)> {
+        let even_px = center_px + *place;
+        let pixel = carrier.frame.raw_from_even(even_px).ok()?;
+        let surface = spec.optics.trace(pixel).ok()?;
+        let curve = carrier.curve(even_px, surface.surface_mm);
+        let own_rad = (0.5 * carrier.dome_diameter_mm(&curve).ok()? / radius_mm).min(1.0).asin();
+        Some((surface.normal.truncate().length().atan2(surface.normal.z), own_rad))
+    };
+    let (polar_rad, own_rad) = places
+        .par_iter()
+        .filter_map(polar_and_own)
+        .reduce(|| (0.0, 0.0), |a, b| (a.0.max(b.0), a.1.max(b.1)));
+    let reach_rad = spec.print.wrap_limit_deg.to_radians() - own_rad;
+    hits::split(polar_rad, reach_rad, spec.print.max_tilt_deg.to_radians())
 }
 
 /// Where the dots' centres may lie: the pattern's edge, drawn in so that no dot is cut.
@@ -276,7 +298,9 @@ fn check_dot(
         .transfer
         .plate_from_dome(hit_from_sensor * surface.surface_mm)
         .map_err(|limit| lose(Reason::BeyondTransfer(limit)))?;
-    let plate_outline = carrier.plate_outline(&curve, hit_from_sensor).map_err(lose)?;
+    let plate_outline =
+        plate_outline(&curve, carrier.transfer, hit_from_sensor, carrier.outline_tolerance_mm)
+            .map_err(lose)?;
     let (width_mm, _) = plate_outline.widths();
     if width_mm < spec.print.min_dot_mm {
         return Err(lose(Reason::TooSmall { width_mm, least_mm: spec.print.min_dot_mm }));

@@ -8,7 +8,7 @@ use nalgebra::{Vector2, Vector3};
 use super::frame::EvenFrame;
 use super::lost::Reason;
 use super::outline::{CurvePoint, Outline};
-use crate::optics::SensorOptics;
+use crate::optics::{Limit, SensorOptics};
 use crate::transfer::TransferMap;
 
 /// A dot that is laid out.
@@ -85,10 +85,19 @@ pub(super) enum DotCurve<'a> {
     /// A circle in the even frame.
     Apparent { carrier: &'a Carrier<'a>, center_px: DVec2, radius_px: f64 },
     /// A circle on the dome: the centre of its plane, and its two radii.
-    OnDome { carrier: &'a Carrier<'a>, center: DVec3, side: DVec3, up: DVec3 },
+    OnDome { optics: Option<&'a SensorOptics>, center: DVec3, side: DVec3, up: DVec3 },
 }
 
 impl DotCurve<'_> {
+    /// A circle on the dome around a point of it; it has no image.
+    pub(super) fn on_dome_of(radius_mm: f64, surface_mm: DVec3, diameter_mm: f64) -> Self {
+        let flat = 0.5 * diameter_mm;
+        let axis = surface_mm / radius_mm;
+        let (side, up) = tangents(axis);
+        let center = axis * ((radius_mm - flat) * (radius_mm + flat)).max(0.0).sqrt();
+        Self::OnDome { optics: None, center, side: side * flat, up: up * flat }
+    }
+
     /// The point on the dome and its derivative, mm.
     fn on_dome(&self, angle: f64) -> Result<(DVec3, DVec3), Reason> {
         match self {
@@ -117,9 +126,10 @@ impl DotCurve<'_> {
                     .map_err(|limit| Reason::Unseen(limit.into()))?;
                 Ok(CurvePoint { at, slope })
             }
-            Self::OnDome { carrier, .. } => {
+            Self::OnDome { optics, .. } => {
                 let (point, slope) = self.on_dome(angle)?;
-                let (at, by_point) = carrier.optics.project_with_jacobian(point).map_err(Reason::Unseen)?;
+                let optics = optics.ok_or(Reason::Unseen(Limit::Unreachable))?;
+                let (at, by_point) = optics.project_with_jacobian(point).map_err(Reason::Unseen)?;
                 let slope = by_point * Vector3::from(slope.to_array());
                 Ok(CurvePoint { at, slope: DVec2::new(slope.x, slope.y) })
             }
@@ -134,12 +144,11 @@ impl Carrier<'_> {
                 DotCurve::Apparent { carrier: self, center_px: even_px, radius_px: 0.5 * diameter }
             }
             DotSize::OnDome(diameter_mm) => {
-                let radius = self.optics.dome_radius_mm();
-                let flat = 0.5 * diameter_mm;
-                let axis = surface_mm / radius;
-                let (side, up) = tangents(axis);
-                let center = axis * ((radius - flat) * (radius + flat)).max(0.0).sqrt();
-                DotCurve::OnDome { carrier: self, center, side: side * flat, up: up * flat }
+                let mut curve = DotCurve::on_dome_of(self.optics.dome_radius_mm(), surface_mm, diameter_mm);
+                if let DotCurve::OnDome { optics, .. } = &mut curve {
+                    *optics = Some(self.optics);
+                }
+                curve
             }
         }
     }
@@ -147,29 +156,6 @@ impl Carrier<'_> {
     /// The dot's outline in the raw image.
     pub(super) fn image_outline(&self, curve: &DotCurve<'_>) -> Result<Outline, Reason> {
         Ok(Outline::of_curve(|angle| curve.in_image(angle), IMAGE_TOLERANCE_PX)?.0)
-    }
-
-    /// The dot's outline on the plate of a hit, as `hit_from_sensor` turns the dome under the pad, counter-
-    /// clockwise seen from above.
-    pub(super) fn plate_outline(
-        &self,
-        curve: &DotCurve<'_>,
-        hit_from_sensor: DMat3,
-    ) -> Result<Outline, Reason> {
-        let (outline, fit) = Outline::of_curve(
-            |angle| {
-                let (point, slope) = curve.on_dome(angle)?;
-                let plate = self
-                    .transfer
-                    .plate_from_dome_with_slope(hit_from_sensor * point)
-                    .map_err(Reason::BeyondTransfer)?;
-                let slope = hit_from_sensor * slope;
-                let [x, y] = plate.plate_from_dome;
-                Ok(CurvePoint { at: plate.plate_mm, slope: DVec2::new(x.dot(slope), y.dot(slope)) })
-            },
-            self.outline_tolerance_mm,
-        )?;
-        if fit.reached { Ok(outline) } else { Err(Reason::NotSmooth { error_mm: fit.error }) }
     }
 
     /// Diameter of the flat disc whose area is the vector area of the curve on the dome, mm.
@@ -187,6 +173,28 @@ impl Carrier<'_> {
         }
         Ok(2.0 * (area.length() * 0.5 * TAU / f64::from(AREA_POINTS) / PI).sqrt())
     }
+}
+
+/// A curve's outline on the plate of a hit, as `hit_from_sensor` turns the dome under the pad.
+pub(super) fn plate_outline(
+    curve: &DotCurve<'_>,
+    transfer: &TransferMap,
+    hit_from_sensor: DMat3,
+    tolerance_mm: f64,
+) -> Result<Outline, Reason> {
+    let (outline, fit) = Outline::of_curve(
+        |angle| {
+            let (point, slope) = curve.on_dome(angle)?;
+            let plate = transfer
+                .plate_from_dome_with_slope(hit_from_sensor * point)
+                .map_err(Reason::BeyondTransfer)?;
+            let slope = hit_from_sensor * slope;
+            let [x, y] = plate.plate_from_dome;
+            Ok(CurvePoint { at: plate.plate_mm, slope: DVec2::new(x.dot(slope), y.dot(slope)) })
+        },
+        tolerance_mm,
+    )?;
+    if fit.reached { Ok(outline) } else { Err(Reason::NotSmooth { error_mm: fit.error }) }
 }
 
 /// Two unit vectors across a unit axis, the first level and the second uphill; right-handed with the axis.

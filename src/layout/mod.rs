@@ -6,17 +6,24 @@
 //! design says.
 
 pub mod boundary;
+pub mod calibrate;
 mod carry;
+mod chance;
+pub mod coverage;
 pub mod dot;
-pub mod fill;
+pub mod evenness;
+mod fill;
 pub mod frame;
 mod gaps;
+mod hits;
 pub mod lost;
 pub mod neighbors;
 pub mod outline;
 pub mod pattern;
 pub mod region;
+pub mod report;
 mod spec;
+pub mod target;
 #[cfg(test)]
 mod tests;
 mod zones;

@@ -80,15 +80,9 @@ impl Outline {
         Ok((Self { pieces }, error))
     }
 
-    /// A circle, within 2.7e-4 of its radius.
-    pub fn circle(center: DVec2, radius: f64) -> Self {
-        let curve = |angle: f64| -> Result<CurvePoint, std::convert::Infallible> {
-            let out = DVec2::from_angle(angle) * radius;
-            Ok(CurvePoint { at: center + out, slope: out.perp() })
-        };
-        match Self::of_curve_in(&mut { curve }, 4) {
-            Ok((outline, _)) => outline,
-        }
+    /// An outline from its pieces, each as (first control point, second control point, end).
+    pub fn from_pieces(pieces: Vec<[DVec2; 3]>) -> Self {
+        Self { pieces }
     }
 
     /// Where the outline starts and ends.
@@ -173,12 +167,6 @@ impl Outline {
             high - low
         };
         (0..32).map(width).fold((f64::INFINITY, 0.0), |(l, h), w| (l.min(w), h.max(w)))
-    }
-
-    /// The outline with every point carried through `map`. Exact for affine maps.
-    #[must_use]
-    pub fn mapped(&self, map: impl Fn(DVec2) -> DVec2) -> Self {
-        Self { pieces: self.pieces.iter().map(|piece| piece.map(&map)).collect() }
     }
 }
 

@@ -331,3 +331,153 @@ fn nonsense_gets_a_named_error() {
         }
     }
 }
+
+#[test]
+fn hits_are_few_and_reach_everything() {
+    for limit_deg in [30.0, 40.0, 50.0] {
+        let mut spec =
+            spec(Model::KannalaBrandt, serde_json::json!({"polar_angle_deg": 75.0, "pitch_px": 18.0}));
+        spec.print.wrap_limit_deg = limit_deg;
+        spec.print.min_dot_mm = 0.1;
+        spec.print.hits = crate::design::sections::Hits::Split;
+        spec.print.max_tilt_deg = 80.0;
+        let layout = Layout::new(&spec).unwrap();
+        assert!(layout.hits.len() > 1 && layout.lost.is_empty());
+        let mut shares = vec![0; layout.hits.len()];
+        for dot in &layout.dots {
+            shares[dot.hit] += 1;
+            let hit = &layout.hits[dot.hit];
+            assert!(dot.wrap_rad < limit_deg.to_radians());
+            let on_hit = layout.transfer.dome_from_plate(dot.plate_mm).unwrap();
+            assert!((hit.hit_from_sensor.transpose() * on_hit - dot.surface_mm).length() < 1e-12);
+            // Nearer to its own stroke than to any other.
+            for other in &layout.hits {
+                let z = (other.hit_from_sensor * dot.normal).z;
+                assert!(z.clamp(-1.0, 1.0).acos() >= dot.wrap_rad - 1e-12);
+            }
+        }
+        assert!(shares.iter().all(|share| *share > 0), "{shares:?}");
+        // One sector less would not reach: some point between the sectors is further than the limit from all.
+        let sectors = layout.hits.len() - 1;
+        let own = 0.03;
+        let reach = limit_deg.to_radians() - own;
+        let reached = |count: usize, tilt: f64| {
+            let axis = region::dome_point(1.0, tilt, 0.0);
+            [reach, 75f64.to_radians() - own].iter().all(|polar| {
+                let between = region::dome_point(1.0, *polar, std::f64::consts::PI / count as f64);
+                axis.angle_between(between) <= reach
+            })
+        };
+        if sectors > 2 {
+            assert!(!(0..900).any(|k| reached(sectors - 1, f64::from(k).to_radians() / 10.0)), "{sectors}");
+        }
+    }
+    // The stroke's axis, in the hit's frame, is its +z; the azimuth keeps its direction.
+    let hit = Hit::new(0.7, 2.0);
+    let axis = region::dome_point(1.0, 0.7, 2.0);
+    assert!((hit.hit_from_sensor * axis - DVec3::Z).length() < 1e-15);
+    let further = hit.hit_from_sensor * region::dome_point(1.0, 0.9, 2.0);
+    assert!((further - region::dome_point(1.0, 0.2, 2.0)).length() < 1e-15);
+}
+
+#[test]
+fn the_pinhole_alone_misses_by_what_is_known() {
+    // Published for a dome of 10 mm radius, 1 mm of acrylic and the pupil 8 mm under the sheet's top: a dot laid
+    // out by the pinhole alone lies 1.1, 1.6 and 1.1 mm off at 20, 40 and 50 degrees of field.
+    let mut spec = spec(Model::KannalaBrandt, serde_json::json!({"polar_angle_deg": 60.0}));
+    spec.optics = optics(Model::KannalaBrandt, DVec3::new(0.0, 0.0, -8.0), DMat3::IDENTITY);
+    let layout = Layout::new(&spec).unwrap();
+    let comparison = evenness::by_pinhole(&spec, &layout).unwrap();
+    assert!((1.3..1.75).contains(&comparison.max_shift_mm), "{comparison:?}");
+    let own = evenness::by_design(&layout).unwrap();
+    assert!(own.image_px.nearest.variation < 1e-6);
+    assert!(comparison.image_px.nearest.variation > 0.03, "{comparison:?}");
+    assert_eq!(own.image_px, own.even_frame_px);
+}
+
+#[test]
+fn tolerances_show_what_they_do() {
+    let spec = spec(Model::KannalaBrandt, serde_json::json!({"polar_angle_deg": 50.0}));
+    let layout = Layout::new(&spec).unwrap();
+    let tolerances = |change: serde_json::Value| {
+        let mut json = serde_json::json!({
+            "pupil_mm": [0.0, 0.0, 0.0], "camera_rotation_deg": [0.0, 0.0, 0.0], "dome_radius_mm": 0.0,
+            "layer_thickness_mm": 0.0, "index": 0.0, "white_marker_mm": 0.0, "black_dot_mm": 0.0,
+            "print_registration_mm": 0.0, "print_rotation_deg": 0.0, "print_scatter_mm": 0.0,
+            "wire_diameter_mm": 0.0, "spring_diameter_mm": 0.0, "samples": 40, "seed": 5,
+        });
+        for (key, value) in change.as_object().unwrap() {
+            json[key] = value.clone();
+        }
+        serde_json::from_value(json).unwrap()
+    };
+    // Without tolerances nothing moves.
+    let none = evenness::under_tolerances(&spec, &layout, &tolerances(serde_json::json!({}))).unwrap();
+    assert!(none.nearest_variation_p95 < 1e-9 && none.mean_shift_px < 1e-9, "{none:?}");
+    // A turn of the camera about its axis turns the image and leaves it even.
+    let turned = tolerances(serde_json::json!({"camera_rotation_deg": [0.0, 0.0, 1.0]}));
+    let turned = evenness::under_tolerances(&spec, &layout, &turned).unwrap();
+    assert!(turned.nearest_variation_p95 < 1e-9 && turned.mean_shift_px > 0.3, "{turned:?}");
+    // Scatter on the plate shows in the image at about 13 px per mm, and is named first.
+    let scatter = tolerances(serde_json::json!({"print_scatter_mm": 0.05, "dome_radius_mm": 0.01}));
+    let scatter = evenness::under_tolerances(&spec, &layout, &scatter).unwrap();
+    assert_eq!(scatter.ranking[0].tolerance, "print_scatter_mm");
+    assert!((0.4..1.2).contains(&scatter.mean_shift_px), "{scatter:?}");
+    assert_eq!(scatter.blind, 0);
+    assert_eq!(
+        Some(&scatter),
+        evenness::under_tolerances(
+            &spec,
+            &layout,
+            &tolerances(serde_json::json!({"print_scatter_mm": 0.05, "dome_radius_mm": 0.01}))
+        )
+        .as_ref()
+    );
+}
+
+#[test]
+fn coverage_shrinks_as_the_camera_comes_closer() {
+    let spec = spec(Model::BrownConrady, serde_json::json!({}));
+    let layout = Layout::new(&spec).unwrap();
+    let rest = coverage::coverage(&spec, &layout, &spec.optics);
+    assert_eq!((rest.seen_by_lens, rest.on_raster, rest.in_mask), (1.0, 1.0, 1.0));
+    assert_eq!(rest.whole_to_deg, 90.0);
+    assert!(rest.unseen_dots.is_empty());
+    let pressed = Rigid::from_translation(DVec3::new(0.0, 0.0, -7.5));
+    let pressed = spec.optics.at_pose(&pressed).unwrap();
+    let under = coverage::coverage(&spec, &layout, &pressed);
+    assert!(under.seen_by_lens < 0.9 && under.whole_to_deg < 80.0, "{under:?}");
+    assert!(under.in_mask <= under.on_raster && under.on_raster <= under.seen_by_lens);
+}
+
+#[test]
+fn outlines_measure_themselves_exactly() {
+    // An ellipse, traced; its area and centroid are known.
+    let (half, center) = (DVec2::new(3.0, 1.5), DVec2::new(10.0, -7.0));
+    let curve = |angle: f64| -> Result<outline::CurvePoint, ()> {
+        let (sin, cos) = angle.sin_cos();
+        let at = center + DVec2::new(half.x * cos, half.y * sin);
+        Ok(outline::CurvePoint { at, slope: DVec2::new(-half.x * sin, half.y * cos) })
+    };
+    for tolerance in [1e-2, 1e-4, 1e-6] {
+        let (outline, fit) = outline::Outline::of_curve(curve, tolerance).unwrap();
+        assert!(fit.reached && fit.error <= tolerance);
+        let area = std::f64::consts::PI * half.x * half.y;
+        assert!((outline.signed_area() / area - 1.0).abs() < tolerance);
+        assert!((outline.centroid() - center).length() < 1e-12);
+        // Against a fine polygon of the cubics themselves.
+        let polygon = outline.polygon(2000);
+        let next = polygon.iter().cycle().skip(1);
+        let flat =
+            0.5 * polygon.iter().zip(next).map(|(a, b)| (*a - center).perp_dot(*b - center)).sum::<f64>();
+        assert!((outline.signed_area() / flat - 1.0).abs() < 1e-6);
+        let (narrow, wide) = outline.widths();
+        assert!((narrow - 3.0).abs() < 0.01 && (wide - 6.0).abs() < 0.01, "{narrow} {wide}");
+        for corner in outline.polygon_within(tolerance) {
+            let on = ((corner - center) / half).length();
+            assert!((on - 1.0).abs() < tolerance);
+        }
+    }
+    // A failure of the curve is the failure of the outline.
+    assert_eq!(outline::Outline::of_curve(|_| Err("no"), 1.0), Err("no"));
+}

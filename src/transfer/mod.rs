@@ -10,6 +10,8 @@
 //! from straight above, a tilted one for others; +z is the pad's stroke, reversed.
 
 mod correction;
+pub mod fit;
+pub mod measured_csv;
 mod nominal;
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,7 @@
 //! domecast: from a parameter file to a dome-shaped camera tactile sensor.
 pub mod artwork;
 pub mod build;
+pub mod calibrate;
 pub mod camera;
 pub mod cli;
 pub mod constants;

@@ -13,7 +13,7 @@ const ROWS: [&[&str]; 11] = [
     &["layout"],
     &["artwork", "parts"],
     &["constants"],
-    &["sim", "track"],
+    &["sim", "track", "calibrate"],
     &["build", "accuracy", "report"],
     &["cli"],
 ];

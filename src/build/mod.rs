@@ -115,7 +115,8 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     step("laying out the dots");
     let (spec, layout) = lay_out(design)?;
     step("writing the constants");
-    let constants = constants::of(design, &layout)?;
+    let springs = constants::springs_of(design)?;
+    let constants = constants::with_springs(design, &layout, &springs)?;
     tree.add("constants/constants.json", constants.to_json().into_bytes());
     step("drawing the artwork");
     let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
@@ -148,6 +149,17 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
             bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
         })
         .collect();
+    step("writing what other programs read");
+    tree.add("constants/constants.schema.json", constants::Constants::schema().into_bytes());
+    let forms = constants::formats::format_files(design, &constants, &made, &Default::default());
+    for (path, text) in forms.files {
+        tree.add(path, text.into_bytes());
+    }
+    warnings.extend(forms.left_out.into_iter().map(|message| Warning { field: "constants".into(), message }));
+    step("driving the loads to their limits");
+    for (path, text) in constants::force_report(design, &springs)?.files() {
+        tree.add(path, text.into_bytes());
+    }
     warnings.extend(
         layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
     );

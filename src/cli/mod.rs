@@ -1,6 +1,8 @@
 //! Arguments, progress, messages and exit codes: the only place that prints.
 
 mod build;
+mod calibrate_force;
+mod calibrate_optics;
 mod calibrate_print;
 mod check;
 mod output;
@@ -65,6 +67,30 @@ enum Command {
         #[arg(long)]
         pose: Option<PathBuf>,
     },
+    /// Fit the springs' stiffness to measured pairs of displacement and wrench.
+    CalibrateForce {
+        /// CSV of `tx,ty,tz,rx,ry,rz` (mm, rad) or `u0,v0,..,u3,v3` (px), then `Fx,Fy,Fz,Mx,My,Mz` (N, N*mm); an
+        /// empty cell is a missing axis.
+        measured: PathBuf,
+        /// The constants.json of the sensor.
+        constants: PathBuf,
+        /// Where to write [default: constants.measured.json beside the constants].
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+    /// Fit pupil, sheet, indices, markers and dots to what the built sensor sees.
+    CalibrateOptics {
+        /// CSV of `frame,kind,id,u,v`: centroids in the raw image, px; the lowest frames are at rest.
+        centroids: PathBuf,
+        /// The constants.json of the sensor.
+        constants: PathBuf,
+        /// Where to write [default: constants.measured.json beside the constants].
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// How many frames, from the lowest, are without load: their noise is in all that is measured from rest.
+        #[arg(long, default_value_t = 1)]
+        rest_frames: usize,
+    },
     /// Print the JSON schema of the design file.
     Schema,
     /// Fit the pad's map to a measured test print, and write it into a new design file.
@@ -116,6 +142,12 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::Check { dir } => check::run(output, dir),
         Command::Trace { design, pixels, pose } => points::trace(output, design, pixels, pose.as_deref()),
         Command::Project { design, points, pose } => points::project(output, design, points, pose.as_deref()),
+        Command::CalibrateForce { measured, constants, out } => {
+            calibrate_force::run(output, measured, constants, out.as_deref())
+        }
+        Command::CalibrateOptics { centroids, constants, out, rest_frames } => {
+            calibrate_optics::run(output, centroids, constants, out.as_deref(), *rest_frames)
+        }
         Command::Schema => schema::run(output),
         Command::CalibratePrint { measured, design, out, marks } => {
             calibrate_print::run(output, measured, design, out.as_deref(), *marks)

@@ -3,14 +3,28 @@
 //! Everything here comes from the resolved design and its layout, so that a runtime which sees nothing
 //! but the constants works with the same numbers that the artwork and the parts were made from.
 
+mod force_report;
+pub mod formats;
 mod model;
+mod plain;
+mod resolution;
+mod sensor;
+mod sight;
+mod springs;
 
 use serde_json::json;
 
+pub use force_report::{EnvelopeLine, ForceReport, force_report};
 pub use model::{
-    BlackDot, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants, Matrix4, OpticsConstants,
-    PlainRuntime, SpringConstants, StiffnessAt, VERSION, WhiteMarker,
+    BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants, Matrix4,
+    OpticsConstants, PlainRuntime, SpringConstants, StiffnessAt, VERSION, WhiteMarker,
 };
+pub use plain::{Bias, PlainError, PlainFit, PlainInput, PosedLoad, loads_over};
+pub use resolution::{
+    DesignChoice, POSE_AXES, Resolution, WRENCH_AXES, design_choices, resolution_at, spec_of,
+};
+pub use sight::{MarkerSight, markers_of};
+pub use springs::{DesignSprings, claimed_loads, matrix_of, rows, springs_of, wrench_by_table};
 
 use crate::design::{Design, DesignError};
 use crate::layout::Layout;
@@ -21,11 +35,29 @@ use crate::optics::Channel;
 /// # Errors
 /// A white marker whose centre the lens cannot see at rest.
 pub fn of(design: &Design, layout: &Layout) -> Result<Constants, DesignError> {
+    with_springs(design, layout, &springs_of(design)?)
+}
+
+/// [`of`] with springs that are known already.
+///
+/// # Errors
+/// As [`of`].
+pub fn with_springs(
+    design: &Design,
+    layout: &Layout,
+    springs: &DesignSprings,
+) -> Result<Constants, DesignError> {
     let sections = design.sections();
     let optics = design.optics();
     let spec = optics.lens().spec();
     let undistorted_matrix = design.undistorted_matrix();
     let [[_, _, cx], [_, _, cy], _] = undistorted_matrix;
+    let mut white_markers = white_markers(design)?;
+    if let Some(plain) = &springs.plain {
+        for (marker, apparent) in white_markers.iter_mut().zip(&plain.apparent_mm) {
+            marker.apparent_position_mm = Some(apparent.to_array());
+        }
+    }
     Ok(Constants {
         format: FORMAT.into(),
         version: VERSION,
@@ -55,7 +87,7 @@ pub fn of(design: &Design, layout: &Layout) -> Result<Constants, DesignError> {
                 .collect(),
         },
         mask: MaskConstants { center_px: [cx, cy], radius_px: sections.runtime.mask_radius_px },
-        white_markers: white_markers(design)?,
+        white_markers,
         black_dots: layout
             .dots
             .iter()
@@ -69,8 +101,25 @@ pub fn of(design: &Design, layout: &Layout) -> Result<Constants, DesignError> {
                 neighbors: dot.neighbors.iter().map(|id| *id as usize).collect(),
             })
             .collect(),
-        springs: None,
+        springs: Some(springs.constants.clone()),
+        tolerances: Some(priors_of(design)),
+        calibrations: Vec::new(),
     })
+}
+
+/// The tolerances of a design, as the priors of `calibrate-optics`.
+pub fn priors_of(design: &Design) -> CalibrationPriors {
+    let (tolerances, noise) = (&design.sections().tolerances, &design.sections().noise);
+    CalibrationPriors {
+        pupil_mm: tolerances.pupil_mm,
+        camera_rotation_rad: tolerances.camera_rotation_deg.map(f64::to_radians),
+        layer_thickness_mm: tolerances.layer_thickness_mm,
+        index: tolerances.index,
+        white_marker_mm: tolerances.white_marker_mm,
+        black_dot_mm: tolerances.black_dot_mm,
+        white_centroid_px: noise.white_centroid_px,
+        black_centroid_px: noise.black_centroid_px,
+    }
 }
 
 fn white_markers(design: &Design) -> Result<Vec<WhiteMarker>, DesignError> {
@@ -104,6 +153,14 @@ impl Constants {
         text
     }
 
+    /// JSON schema of the file, for those who read it with other programs.
+    pub fn schema() -> String {
+        let schema = schemars::schema_for!(Constants);
+        let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
     /// Reads the file's text.
     ///
     /// # Errors
@@ -120,3 +177,6 @@ impl Constants {
         Ok(constants)
     }
 }
+
+#[cfg(test)]
+mod runtime_tests;

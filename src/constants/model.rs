@@ -1,5 +1,6 @@
 //! The form of `constants.json`.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Marks the file for readers.
@@ -13,7 +14,7 @@ pub type Matrix4 = [[f64; 4]; 4];
 /// What a runtime must know of one sensor.
 ///
 /// Lengths mm, angles rad, pixels px (the centre of the top-left pixel is 0, 0).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Constants {
     /// Always `domecast-constants`.
     pub format: String,
@@ -34,10 +35,37 @@ pub struct Constants {
     /// The springs between the platforms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub springs: Option<SpringConstants>,
+    /// How far the built sensor may be off these numbers: the priors of `calibrate-optics`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerances: Option<CalibrationPriors>,
+    /// What calibrations say of the numbers that they measured, one entry each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub calibrations: Vec<serde_json::Value>,
+}
+
+/// Standard deviations of the nominal numbers, and of the centroids.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CalibrationPriors {
+    /// Pupil, sensor frame, mm.
+    pub pupil_mm: [f64; 3],
+    /// Camera about its axes, rad.
+    pub camera_rotation_rad: [f64; 3],
+    /// Each flat layer, mm.
+    pub layer_thickness_mm: f64,
+    /// Each layer's index.
+    pub index: f64,
+    /// Each white marker on each axis, mm.
+    pub white_marker_mm: f64,
+    /// Each black dot in each direction along the dome, mm.
+    pub black_dot_mm: f64,
+    /// A white marker's centroid on each image axis, px.
+    pub white_centroid_px: f64,
+    /// A black dot's.
+    pub black_centroid_px: f64,
 }
 
 /// The camera.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CameraConstants {
     /// `pinhole`, `brown_conrady` or `kannala_brandt`.
     pub model: String,
@@ -61,7 +89,7 @@ pub struct CameraConstants {
 }
 
 /// The layers and the dome.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OpticsConstants {
     /// Radius of the dots' surface.
     pub dome_radius_mm: f64,
@@ -70,7 +98,7 @@ pub struct OpticsConstants {
 }
 
 /// One flat layer.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LayerConstants {
     /// What it is made of.
     pub name: String,
@@ -84,7 +112,7 @@ pub struct LayerConstants {
 }
 
 /// The circular mask of the undistorted frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MaskConstants {
     /// Its centre.
     pub center_px: [f64; 2],
@@ -93,7 +121,7 @@ pub struct MaskConstants {
 }
 
 /// A white marker.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WhiteMarker {
     /// Its number.
     pub id: usize,
@@ -109,7 +137,7 @@ pub struct WhiteMarker {
 }
 
 /// A black dot.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BlackDot {
     /// Its number.
     pub id: usize,
@@ -128,7 +156,7 @@ pub struct BlackDot {
 }
 
 /// The springs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpringConstants {
     /// From displacement to wrench at `at_mm`, at rest.
     pub stiffness: [[f64; 6]; 6],
@@ -139,22 +167,25 @@ pub struct SpringConstants {
     /// Stiffness as the springs are compressed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stiffness_at: Vec<StiffnessAt>,
+    /// The wrench that a calibration's reference showed at rest; it is no part of `stiffness`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<[f64; 6]>,
     /// For a runtime that runs plain solvePnP on the apparent positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plain_runtime: Option<PlainRuntime>,
 }
 
 /// The stiffness at one compression.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StiffnessAt {
-    /// Axial compression of the springs from their free length.
+    /// How far the platform is pressed down from rest.
     pub compression_mm: f64,
     /// The 6x6 there.
     pub stiffness: [[f64; 6]; 6],
 }
 
 /// Constants for plain solvePnP.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlainRuntime {
     /// From pose relative to `rest_pose` to wrench.
     pub stiffness: [[f64; 6]; 6],

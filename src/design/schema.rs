@@ -226,7 +226,7 @@ impl<'a> Walk<'a> {
         }
         if let Some(Value::Object(reasons)) = map.get("why") {
             // a reason for a field that does not exist is a misspelt field
-            for (key, value) in reasons.iter().filter(|(key, _)| !known.contains_key(*key)) {
+            if let Some((key, value)) = reasons.iter().find(|(key, _)| !known.contains_key(*key)) {
                 return Err(unknown_key(key, value, &known, &join(at, "why")));
             }
         }

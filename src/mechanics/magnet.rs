@@ -9,6 +9,8 @@
 //!
 //! smooth and periodic, so the trapezoidal rule converges exponentially.
 
+use std::sync::OnceLock;
+
 use super::spring::SpecError;
 
 /// Permeability of vacuum times 1e6: T^2 / MU_0 comes out in N/mm^2.
@@ -76,20 +78,36 @@ impl MagnetPair {
     }
 }
 
+/// Numbers of nodes that the rule is kept ready for.
+const READY: [usize; 5] = [16, 24, 32, 48, 96];
+
+/// cos(phi) and 4 sin^2(phi/2) at the nodes of a rule, with the weights of its ends halved into the cosine.
+fn nodes(a: f64) -> &'static [[f64; 2]] {
+    static RULES: OnceLock<Vec<Vec<[f64; 2]>>> = OnceLock::new();
+    let rules = RULES.get_or_init(|| {
+        let rule = |count: &usize| {
+            let node = |i: usize| {
+                let phi = std::f64::consts::PI * i as f64 / *count as f64;
+                let weight = if i == 0 || i == *count { 0.5 } else { 1.0 };
+                [weight * phi.cos() / *count as f64, 4.0 * (0.5 * phi).sin().powi(2)]
+            };
+            (0..=*count).map(node).collect()
+        };
+        READY.iter().map(rule).collect()
+    });
+    // At most 96, where a = 0.4.
+    let wanted = NODES_PER_ASINH / (0.5 * a).asinh();
+    let at = READY.iter().position(|count| *count as f64 >= wanted).unwrap_or(READY.len() - 1);
+    rules.get(at).map_or(&[], Vec::as_slice)
+}
+
 /// I(a) and its derivative.
 fn faces(a: f64) -> [f64; 2] {
-    // At most 96, where a = 0.4.
-    let nodes = (NODES_PER_ASINH / (0.5 * a).asinh()).ceil().clamp(4.0, 96.0) as u32;
-    let step = std::f64::consts::PI / f64::from(nodes);
-    let mut value = 0.0;
-    let mut slope = 0.0;
-    for i in 0..=nodes {
-        let phi = step * f64::from(i);
-        let weight = if i == 0 || i == nodes { 0.5 } else { 1.0 };
-        let half = (0.5 * phi).sin();
-        let root = (a * a + 4.0 * half * half).sqrt();
-        value -= weight * (a + root).ln() * phi.cos();
-        slope -= weight * phi.cos() / root;
+    let (mut value, mut slope) = (0.0, 0.0);
+    for [weighted_cos, square] in nodes(a) {
+        let root = (a * a + square).sqrt();
+        value -= weighted_cos * (a + root).ln();
+        slope -= weighted_cos / root;
     }
-    [value / f64::from(nodes), slope / f64::from(nodes)]
+    [value, slope]
 }

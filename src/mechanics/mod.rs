@@ -5,6 +5,7 @@
 
 mod column;
 mod dual;
+mod envelope;
 mod limits;
 mod load;
 mod magnet;
@@ -13,6 +14,10 @@ mod spring;
 mod suspension;
 
 pub use column::{Column, EndStiffness};
+pub use envelope::{
+    Choice, Direction, LARGEST_FACTOR, MoreChecks, Reach, choices, push_press_border, reach,
+    standard_directions, try_all,
+};
 pub use limits::{Check, Limit, Limits, LoadCase, Stop, StopShape, checks_at, sort_worst_first, try_load};
 pub use load::Wrench;
 pub use magnet::MagnetPair;

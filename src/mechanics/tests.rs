@@ -333,3 +333,38 @@ fn stiffness_at_is_exact_on_the_axis() {
     let miss = k * Vector6::from(beside.to_array()) - suspension.wrench_at(&beside).unwrap().to_vector();
     assert!(miss.norm() < 1e-6, "{miss}");
 }
+
+#[test]
+fn the_envelope_ends_at_what_is_known() {
+    let suspension = platform(4.0, false);
+    let limits = Limits { grip_force_n: Some(0.8), ..Limits::default() };
+    let nothing = |_: &Rigid| Vec::new();
+    let directions = standard_directions(suspension.at_mm(), 10.0, 4);
+    let press = reach(&suspension, &limits, &nothing, &directions[0]);
+    // Six springs of four coils bind at 20.1 N; the wire bears 838 MPa at 17 N, so 1180 at 23.9.
+    close(press.factor, 20.12, 0.02);
+    assert_eq!(press.ended_by.unwrap().limit, Limit::CoilBind);
+    let pull = reach(&suspension, &limits, &nothing, &directions[1]);
+    close(pull.factor, 6.0 * 0.8, 2e-4);
+    assert_eq!(pull.ended_by.unwrap().limit, Limit::SpringLeavesMagnet);
+    // A check from outside ends a load too.
+    let below = |pose: &Rigid| {
+        vec![Check {
+            limit: Limit::MarkerOutOfMask,
+            part: "marker 0".into(),
+            value: -pose.translation_mm.z,
+            bound: 1.0,
+            unit: "px",
+        }]
+    };
+    let press = reach(&suspension, &limits, &below, &directions[0]);
+    close(press.factor, 6.0 * suspension.spec().spring.axial_n_per_mm(), 2e-4);
+    assert_eq!(press.ended_by.unwrap().limit, Limit::MarkerOutOfMask);
+    let found = choices(suspension.spec(), &limits, &nothing, &directions[0].wrench.scaled(17.0));
+    let fit: Vec<f64> = found
+        .iter()
+        .filter(|c| c.spring.wire_diameter_mm == 0.3 && !c.worst.is_passed())
+        .map(|c| c.spring.active_coils)
+        .collect();
+    assert_eq!(fit, [2.0, 3.0, 4.0]);
+}

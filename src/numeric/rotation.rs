@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn vector_and_matrix_invert_each_other_at_every_angle() {
         for angle in
-            [0.0, 1e-12, 1e-9, 9e-5, 1.1e-4, 0.3, 1.5, 2.0, 2.2, 3.0, 3.141, std::f64::consts::PI - 1e-9]
+            [0.0, 1e-12, 1e-9, 9e-5, 1.1e-4, 0.3, 1.5, 2.0, 2.2, 3.0, 3.13, std::f64::consts::PI - 1e-9]
         {
             for axis in [
                 DVec3::X,

@@ -88,6 +88,19 @@ impl Marker {
     }
 }
 
+/// Centroid of the image of any smooth small outline, less the image of its centre: `see(cos, sin)` gives the pixel
+/// of the outline's point at that azimuth. `None` where a point is not seen.
+pub fn outline_centroid_offset(
+    center_px: DVec2,
+    mut see: impl FnMut(f64, f64) -> Option<DVec2>,
+) -> Option<DVec2> {
+    let mut outline = [DVec2::ZERO; OUTLINE];
+    for (point, [cos, sin]) in outline.iter_mut().zip(DIRECTIONS) {
+        *point = see(cos, sin)?;
+    }
+    Some(centroid_offset(center_px, &outline))
+}
+
 /// Area centroid of the region inside a smooth closed outline, from `center`.
 ///
 /// Green's theorem with x(phi) a trigonometric polynomial through the eight points: its derivative at the points

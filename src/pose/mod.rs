@@ -11,7 +11,7 @@ mod solver;
 mod start;
 mod view;
 
-pub use disc::{DiscImage, Marker};
+pub use disc::{DiscImage, Marker, outline_centroid_offset};
 pub use estimate::{PoseEstimate, PoseOptions, Sighting, displacement_from_motion};
 pub use fault::PoseError;
 pub use solver::{MOST_MARKERS, PoseSolver};

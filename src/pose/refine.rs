@@ -168,8 +168,8 @@ impl Model for Sharp<'_> {
     }
 }
 
-/// Refines a pose; gives up early when after two steps the residual is beyond `far`, or when the pose closes in on
-/// one that is `known`.
+/// Refines a pose; gives up early when after two steps (with a pose `known`: at once) the residual is beyond
+/// `far`, or when the pose closes in on the known one.
 pub(super) fn refine(
     model: &mut impl Model,
     start: Rigid,
@@ -180,7 +180,8 @@ pub(super) fn refine(
     let (mut now, mut exact) = model.at(&pose, f64::INFINITY)?;
     let (mut damping, mut steps, mut settled) = (0.0, 0, false);
     while steps < MOST_STEPS && !settled {
-        if steps >= 2 && now.chi2 > far.max(1.0) {
+        // A second start is the mirror of a pose that fits: where both fit it starts near its end.
+        if (steps >= 2 || known.is_some()) && now.chi2 > far.max(1.0) {
             break;
         }
         steps += 1;

@@ -176,7 +176,8 @@ impl PoseSolver {
         let first = run(&starts[0], None);
         let second = run(&starts[1], first.as_ref().filter(|f| f.chi2 <= allowed).map(|f| &f.pose));
         let (best, other) = match (first, second) {
-            (Some(a), Some(b)) if b.chi2 < a.chi2 => (b, Some(a)),
+            // A second fit that stopped because it was closing in on the first is the first.
+            (Some(a), Some(b)) if b.chi2 < a.chi2 && (b.settled || !a.settled) => (b, Some(a)),
             (Some(a), b) => (a, b),
             (None, Some(b)) => (b, None),
             (None, None) => {

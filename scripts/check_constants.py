@@ -1,0 +1,231 @@
+"""Reads the constants of a build with the programs that they are for, and checks what they say.
+
+    python3 scripts/check_constants.py output/thumb24 [...]
+
+OpenCV: FileStorage, projectPoints against `image_px` where no layer refracts, solvePnP with the plain
+runtime's constants against the loads of `report/force.json`, through a refraction written here a second
+time. PyYAML: camera_info and camchain. yourdfpy: URDF. mujoco: MJCF, stepped under a known load.
+"""
+import json
+import pathlib
+import sys
+
+import cv2
+import numpy as np
+import yaml
+
+failed = 0
+
+
+def check(what, holds, detail=""):
+    global failed
+    failed += not holds
+    print(f"{'ok  ' if holds else 'FAIL'} {what:<46} {detail}")
+
+
+def numbers(store, name):
+    return store.getNode(name).mat()
+
+
+def lens_project(camera, rays):
+    """Pixels of rays (n, 3) by OpenCV."""
+    K, D = np.array(camera["matrix"]), np.array(camera["distortion"], float)
+    zero = np.zeros(3)
+    if camera["model"] == "kannala_brandt":
+        return cv2.fisheye.projectPoints(rays[:, None], zero, zero, K, D)[0][:, 0]
+    return cv2.projectPoints(rays, zero, zero, K, D if len(D) else None)[0][:, 0]
+
+
+def refracted_rays(constants, pose, points):
+    """Directions in the camera's air of points on the sheet's top, by bisection on Snell's invariant."""
+    rest_from_camera = np.linalg.inv(np.array(constants["camera"]["camera_from_sensor"]))
+    sensor_from_camera = np.linalg.inv(pose) @ rest_from_camera
+    pupil, R = sensor_from_camera[:3, 3], sensor_from_camera[:3, :3]
+    flat = [(l["index"], l["thickness_mm"]) for l in constants["optics"]["layers"][1:] if l["thickness_mm"]]
+    gap = -sum(d for _, d in flat) - pupil[2]
+    rays = []
+    for point in points:
+        side = point[:2] - pupil[:2]
+        reach, low, high = np.linalg.norm(side), 0.0, 1.0
+        for _ in range(200):
+            s = 0.5 * (low + high)
+            far = gap * s / np.sqrt(1 - s * s) + sum(d * s / np.sqrt(n * n - s * s) for n, d in flat)
+            low, high = (s, high) if far < reach else (low, s)
+        s = 0.5 * (low + high)
+        direction = np.r_[s * side / max(reach, 1e-300), np.sqrt(1 - s * s)]
+        rays.append(R.T @ direction)
+    return np.array(rays)
+
+
+def unproject(camera, pixel, ray):
+    """The ray of a pixel near a known ray: Newton with differences."""
+    for _ in range(20):
+        plane = ray[:2] / ray[2]
+        at = lambda p: lens_project(camera, np.array([[p[0], p[1], 1.0]]))[0]
+        h, left = 1e-6, pixel - at(plane)
+        J = np.stack([(at(plane + h * e) - at(plane - h * e)) / (2 * h) for e in np.eye(2)], axis=1)
+        plane = plane + np.linalg.solve(J, left)
+        ray = np.r_[plane, 1.0]
+    return ray / np.linalg.norm(ray)
+
+
+def undistorted_centroids(constants, pose):
+    """Centroids of the discs' images in the undistorted frame."""
+    found, Ku = [], np.array(constants["camera"]["undistorted_matrix"])
+    phi = np.linspace(0, 2 * np.pi, 180, endpoint=False)
+    for marker in constants["white_markers"]:
+        center, r = np.array(marker["position_mm"]), marker["diameter_mm"] / 2
+        ring = center + r * np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=1)
+        x = lens_project(constants["camera"], refracted_rays(constants, pose, ring))
+        y = np.roll(x, -1, axis=0)
+        cross = x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]
+        centroid = ((x + y) * cross[:, None]).sum(0) / (3 * cross.sum())
+        start = refracted_rays(constants, pose, [center])[0]
+        ray = unproject(constants["camera"], centroid, start)
+        found.append((Ku @ (ray / ray[2]))[:2])
+    return np.array(found)
+
+
+def solve(points, pixels, Ku):
+    _, r, t = cv2.solvePnP(points, pixels, Ku, None, flags=cv2.SOLVEPNP_ITERATIVE)
+    r, t = cv2.solvePnPRefineLM(points, pixels, Ku, None, r, t,
+                                (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-14))
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = cv2.Rodrigues(r)[0], t[:, 0]
+    return pose
+
+
+def displacement(pose, rest, at):
+    moved = np.linalg.inv(rest) @ pose
+    return np.r_[moved[:3, :3] @ at + moved[:3, 3] - at, cv2.Rodrigues(moved[:3, :3])[0][:, 0]]
+
+
+def check_plain_runtime(constants, report):
+    springs = constants["springs"]
+    plain = springs.get("plain_runtime")
+    if plain is None:
+        check("plain runtime", False, "no plain_runtime in the constants")
+        return
+    at, Ku = np.array(springs["at_mm"]), np.array(constants["camera"]["undistorted_matrix"])
+    true = np.array([m["position_mm"] for m in constants["white_markers"]])
+    seen_at = np.array([m["apparent_position_mm"] for m in constants["white_markers"]])
+    at_rest = undistorted_centroids(constants, np.eye(4))
+    own_rest, naive_rest = solve(seen_at, at_rest, Ku), solve(true, at_rest, Ku)
+    away = np.abs(own_rest - np.array(plain["rest_pose"])).max()
+    check("solvePnP at rest gives rest_pose", away < 2e-4, f"{away:.1e}")
+    left, naive = [], []
+    for claim in report["claims"]:
+        pixels = undistorted_centroids(constants, np.array(claim["pose"]))
+        wrench = np.array(claim["wrench"])
+        own = displacement(solve(seen_at, pixels, Ku), np.array(plain["rest_pose"]), at)
+        other = displacement(solve(true, pixels, Ku), naive_rest, at)
+        left.append(np.array(plain["stiffness"]) @ own - wrench)
+        naive.append(np.array(springs["stiffness"]) @ other - wrench)
+    left, naive = np.abs(left).mean(0), np.abs(naive).mean(0)
+    for axis, name in enumerate(("Fx", "Fy", "Fz", "Mx", "My", "Mz")):
+        print(f"     {name}: plain runtime {left[axis]:.4f}, naive {naive[axis]:.4f}")
+    factor = 5 if any(l["index"] != 1.0 for l in constants["optics"]["layers"]) else 1
+    check("plain runtime beats the naive one on Fz", left[2] < naive[2] / factor,
+          f"{left[2]:.4f} < {naive[2]:.4f} / {factor}")
+
+
+def check_layer_free(constants):
+    if any(l["index"] != 1.0 for l in constants["optics"]["layers"]):
+        return
+    T = np.array(constants["camera"]["camera_from_sensor"])
+    dots = constants["white_markers"] + constants["black_dots"]
+    points = np.array([d.get("surface_mm") or d["position_mm"] for d in dots])
+    pixels = lens_project(constants["camera"], points @ T[:3, :3].T + T[:3, 3])
+    worst = np.abs(pixels - np.array([d["image_px"] for d in dots])).max()
+    check("cv2 projects every mark to its image_px", worst < 1e-6, f"{worst:.1e} px")
+
+
+def check_opencv(folder, constants):
+    store = cv2.FileStorage(str(folder / "opencv.yaml"), cv2.FileStorage_READ)
+    same = np.array_equal(numbers(store, "camera_matrix"), np.array(constants["camera"]["matrix"]))
+    same &= np.array_equal(numbers(store, "undistorted_matrix"), constants["camera"]["undistorted_matrix"])
+    same &= np.array_equal(numbers(store, "springs_stiffness"), constants["springs"]["stiffness"])
+    same &= np.array_equal(numbers(store, "apparent_white_markers_mm"),
+                           [m["apparent_position_mm"] for m in constants["white_markers"]])
+    same &= int(store.getNode("image_width").real()) == constants["camera"]["width"]
+    check("cv2.FileStorage reads opencv.yaml", bool(same))
+
+
+def check_ros(folder, constants):
+    info = yaml.safe_load((folder / "camera_info.yaml").read_text())
+    camera = constants["camera"]
+    want = {"kannala_brandt": "equidistant"}.get(camera["model"],
+                                                 "plumb_bob" if len(camera["distortion"]) <= 5 else "rational_polynomial")
+    shapes = all(info[n]["rows"] * info[n]["cols"] == len(info[n]["data"]) for n in
+                 ("camera_matrix", "distortion_coefficients", "rectification_matrix", "projection_matrix"))
+    keep = list(info["camera_matrix"]["data"]) == [v for row in camera["matrix"] for v in row]
+    keep &= info["distortion_coefficients"]["data"][:len(camera["distortion"])] == camera["distortion"]
+    check("camera_info.yaml", shapes and keep and info["distortion_model"] == want
+          and info["image_width"] == camera["width"], info["distortion_model"])
+
+
+def check_kalibr(folder, constants):
+    path, camera = folder / "kalibr.yaml", constants["camera"]
+    sayable = camera["model"] != "brown_conrady" or not any(camera["distortion"][4:])
+    check("kalibr.yaml stands where it can say the lens", path.exists() == sayable)
+    if path.exists():
+        cam = yaml.safe_load(path.read_text())["cam0"]
+        model = {"kannala_brandt": "equidistant", "pinhole": "none", "brown_conrady": "radtan"}[camera["model"]]
+        check("kalibr.yaml", cam["distortion_model"] == model and len(cam["intrinsics"]) == 4
+              and cam["resolution"] == [camera["width"], camera["height"]], model)
+
+
+def check_robots(folder, constants):
+    import mujoco
+    import yourdfpy
+
+    robot = yourdfpy.URDF.load(str(folder / "sensor.urdf"), load_meshes=False)
+    at = np.array(constants["springs"]["at_mm"]) * 1e-3
+    mount = robot.get_transform("sensor", "base")[2, 3]
+    check("URDF: frames", set(robot.link_map) == {"base", "sensor", "wrench", "camera"}
+          and np.allclose(robot.get_transform("wrench", "sensor")[:3, 3], at), f"sensor {mount * 1e3:.1f} mm up")
+    camera = np.linalg.inv(robot.get_transform("camera", "sensor"))
+    want = np.array(constants["camera"]["camera_from_sensor"])
+    want[:3, 3] *= 1e-3
+    check("URDF: camera_from_sensor", np.allclose(camera, want, atol=1e-9))
+    for name in ("base", "sensor"):
+        inertia = robot.link_map[name].inertial.inertia
+        values = np.linalg.eigvalsh(inertia)
+        check(f"URDF: inertia of {name}", values.min() > 0 and values.max() < values.sum() - values.max(),
+              f"{robot.link_map[name].inertial.mass * 1e3:.2f} g")
+    model = mujoco.MjModel.from_xml_path(str(folder / "sensor.xml"))
+    model.opt.gravity[:] = 0
+    data = mujoco.MjData(model)
+    body = model.body("sensor").id
+    force, moment = np.array([0.3, -0.2, -2.0]), np.array([2e-3, 1e-3, -1e-3])
+    mujoco.mj_forward(model, data)
+    start = data.sensor("position").data.copy()
+    for _ in range(20000):
+        # A known wrench about the site: MuJoCo applies forces at the centre of mass.
+        lever = data.site("wrench").xpos - data.xipos[body]
+        data.xfrc_applied[body] = np.r_[force, moment + np.cross(lever, force)]
+        mujoco.mj_step(model, data)
+    R = data.site("wrench").xmat.reshape(3, 3)
+    # MuJoCo reports what the body does to its parent at the site: the world's load handed on.
+    got_force, got_moment = R @ data.sensor("force").data, R @ data.sensor("torque").data
+    sign = -1.0 if got_force @ force < 0 else 1.0
+    check("MJCF: force sensor", np.allclose(sign * got_force, force, atol=1e-4), str(np.round(got_force, 4)))
+    check("MJCF: torque sensor", np.allclose(sign * got_moment, moment, atol=2e-5), str(np.round(got_moment, 5)))
+    K = np.array(constants["springs"]["stiffness"])
+    moved = (data.sensor("position").data - start) * 1e3
+    check("MJCF: springs give way as the constants say",
+          np.allclose(moved, force / np.diag(K)[:3], atol=0.02 * np.abs(moved).max() + 1e-3), str(np.round(moved, 4)))
+
+
+for argument in sys.argv[1:]:
+    print(argument)
+    root = pathlib.Path(argument)
+    folder = root / "constants"
+    constants = json.loads((folder / "constants.json").read_text())
+    check_layer_free(constants)
+    check_opencv(folder, constants)
+    check_ros(folder, constants)
+    check_kalibr(folder, constants)
+    check_robots(folder, constants)
+    check_plain_runtime(constants, json.loads((root / "report" / "force.json").read_text()))
+sys.exit(1 if failed else 0)

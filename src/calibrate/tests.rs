@@ -1,0 +1,345 @@
+use nalgebra::{Matrix6, Vector6};
+
+use super::force::{ForceModel, Pair, fit};
+use super::*;
+
+/// Deterministic normal noise: a splitmix generator and the polar method.
+pub(super) struct Noise(pub u64);
+impl Noise {
+    pub fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+    pub fn normal(&mut self) -> f64 {
+        loop {
+            let (a, b) = (2.0 * self.uniform() - 1.0, 2.0 * self.uniform() - 1.0);
+            let s = a * a + b * b;
+            if s > 0.0 && s < 1.0 {
+                return a * (-2.0 * s.ln() / s).sqrt();
+            }
+        }
+    }
+}
+
+fn truth() -> Matrix6<f64> {
+    let mut k = Matrix6::from_diagonal(&Vector6::new(5.9, 6.1, 8.3, 420.0, 431.0, 560.0));
+    for (i, j, v) in [(0, 4, 3.0), (4, 0, 3.0), (1, 3, -2.5), (3, 1, -2.5), (2, 5, 0.4), (5, 2, 0.4)] {
+        k[(i, j)] = v;
+    }
+    k
+}
+
+const SIZES: [f64; 6] = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4];
+
+fn pairs(count: usize, noise: f64, wild: f64, seed: u64) -> Vec<Pair> {
+    let mut random = Noise(seed);
+    let k = truth();
+    (0..count)
+        .map(|_| {
+            let d: [f64; 6] = std::array::from_fn(|i| {
+                let u = 2.0 * random.uniform() - 1.0;
+                match i {
+                    2 => -2.0 * random.uniform(),
+                    0 | 1 => 0.3 * u,
+                    _ => 0.04 * u,
+                }
+            });
+            let w = k * Vector6::from(d);
+            let range = [1.8, 1.8, 16.0, 17.0, 17.0, 22.0];
+            let wrench = std::array::from_fn(|i| {
+                let off = if random.uniform() < wild { 3.0 * range[i] * random.uniform() } else { 0.0 };
+                Some(w[i] + noise * range[i] * random.normal() + off)
+            });
+            Pair { displacement: d, wrench }
+        })
+        .collect()
+}
+
+#[test]
+fn clean_data_give_the_matrix_back() {
+    let found = fit(&pairs(60, 0.0, 0.0, 1), &Matrix6::identity(), &SIZES).unwrap();
+    assert_eq!(found.model, ForceModel::Linear);
+    assert!(found.refused.is_empty(), "{:?}", found.refused);
+    for i in 0..6 {
+        for j in 0..6 {
+            assert!(
+                (found.stiffness[i][j] - truth()[(i, j)]).abs() < 1e-8,
+                "{i} {j} {}",
+                found.stiffness[i][j]
+            );
+        }
+    }
+}
+
+// One per cent noise, five per cent outliers, all missing on one axis: nineteen of twenty entries inside their
+// intervals, the missing axis by name, and its nominal row kept.
+#[test]
+fn noisy_data_with_outliers_and_a_missing_axis() {
+    let (mut inside, mut all) = (0, 0);
+    for seed in 0..8 {
+        let mut data = pairs(300, 0.01, 0.05, 100 + seed);
+        for pair in &mut data {
+            pair.wrench[5] = None;
+        }
+        let nominal = Matrix6::identity() * 7.0;
+        let found = fit(&data, &nominal, &SIZES).unwrap();
+        assert_eq!(found.model, ForceModel::Linear);
+        assert_eq!(found.refused, ["Mz: no reading"]);
+        assert_eq!(found.stiffness[5], [0.0, 0.0, 0.0, 0.0, 0.0, 7.0]);
+        for (i, axis) in found.axes.iter().enumerate() {
+            assert!(axis.outliers.len() > 3, "{}", axis.outliers.len());
+            for j in 0..6 {
+                let (miss, half) = (axis.coefficients[j] - truth()[(i, j)], axis.half_widths[j].unwrap());
+                all += 1;
+                inside += u32::from(miss.abs() <= half);
+                assert!(miss.abs() < 3.0 * half, "{i} {j}: {miss} of {half}");
+            }
+            assert!(axis.hysteresis.unwrap().abs() < 0.02);
+        }
+    }
+    let part = f64::from(inside) / f64::from(all);
+    assert!(part > 0.9 && part < 0.99, "{part}");
+}
+
+#[test]
+fn a_motion_that_is_not_there_is_refused() {
+    let mut data = pairs(100, 0.01, 0.0, 5);
+    for pair in &mut data {
+        let w = truth() * Vector6::from(pair.displacement);
+        pair.displacement[5] = 0.0;
+        let still = truth() * Vector6::from(pair.displacement);
+        for i in 0..6 {
+            pair.wrench[i] = pair.wrench[i].map(|v| v - w[i] + still[i]);
+        }
+    }
+    let found = fit(&data, &Matrix6::identity(), &SIZES).unwrap();
+    assert_eq!(found.refused, ["rz: does not vary in the data"]);
+    assert_eq!(found.stiffness[5][5], 1.0);
+    assert!((found.stiffness[2][2] - 8.3).abs() < 0.1);
+}
+
+#[test]
+fn motions_that_go_together_are_not_separated() {
+    let mut data = pairs(100, 0.01, 0.0, 6);
+    for pair in &mut data {
+        pair.displacement[4] = 0.1 * pair.displacement[0];
+        let w = truth() * Vector6::from(pair.displacement);
+        pair.wrench = std::array::from_fn(|i| Some(w[i]));
+    }
+    let found = fit(&data, &Matrix6::identity(), &SIZES).unwrap();
+    assert!(
+        found.refused.iter().any(|r| r == "Fx by tx: the data do not separate it"),
+        "{:?}",
+        found.refused
+    );
+    assert!(
+        found.refused.iter().any(|r| r == "My by ry: the data do not separate it"),
+        "{:?}",
+        found.refused
+    );
+    assert!((found.stiffness[2][2] - 8.3).abs() < 1e-6);
+}
+
+#[test]
+fn offset_and_stiffening_are_found() {
+    let mut data = pairs(300, 0.001, 0.02, 9);
+    for pair in &mut data {
+        pair.wrench[2] = pair.wrench[2].map(|w| w + 0.5);
+    }
+    let found = fit(&data, &Matrix6::identity(), &SIZES).unwrap();
+    assert_eq!(found.model, ForceModel::Affine);
+    assert!((found.offset.unwrap()[2] - 0.5).abs() < 0.01);
+    for pair in &mut data {
+        let d = pair.displacement;
+        pair.wrench[0] = pair.wrench[0].map(|w| w - 0.6 * d[2] * d[0]);
+    }
+    let found = fit(&data, &Matrix6::identity(), &SIZES).unwrap();
+    assert_eq!(found.model, ForceModel::Compressing);
+    assert!((found.by_compression.unwrap()[0][0] - 0.6).abs() < 0.1, "{:?}", found.by_compression);
+}
+
+#[test]
+fn too_little_is_said() {
+    let data = pairs(5, 0.0, 0.0, 1);
+    assert!(matches!(fit(&data, &Matrix6::identity(), &SIZES), Err(force::ForceError::TooFew { .. })));
+    assert!(matches!(fit(&[], &Matrix6::identity(), &SIZES), Err(force::ForceError::NoMotion)));
+}
+
+#[test]
+fn tables_name_their_faults() {
+    let table = Table::parse("a, b\n1,\n# note\n\n2,x\n").unwrap();
+    assert_eq!(table.number(0, 0), Ok(Some(1.0)));
+    assert_eq!(table.number(0, 1), Ok(None));
+    assert_eq!(table.required(0, 1).unwrap_err().line, 2);
+    assert_eq!(table.number(1, 1).unwrap_err().line, 5);
+    assert!(Table::parse("").is_err());
+    assert!(Table::parse("a,a\n").is_err());
+    assert!(Table::parse("a,b\n1,2,3\n").is_err());
+}
+
+mod built {
+    //! A sensor built with every nominal number off by its tolerance, and what its frames bring back.
+
+    use std::path::Path;
+
+    use glam::{DVec2, DVec3};
+
+    use super::Noise;
+    use crate::calibrate::optics::{Kind, Observation, fit};
+    use crate::constants::{self, Constants};
+    use crate::layout::Layout;
+    use crate::mechanics::Displacement;
+    use crate::numeric::{Rigid, rotation_from_vector};
+    use crate::optics::SensorOptics;
+    use crate::pose::{Marker, PoseOptions, PoseSolver, Sighting, outline_centroid_offset};
+
+    fn nominal() -> Constants {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
+        let design = crate::design::load(&path).unwrap();
+        let layout = Layout::of_design(&design).unwrap();
+        constants::of(&design, &layout).unwrap()
+    }
+
+    /// Constants of a sensor whose numbers are all off by one tolerance, with random signs.
+    fn built(nominal: &Constants, random: &mut Noise) -> Constants {
+        let priors = nominal.tolerances.unwrap();
+        let mut sign = || if random.uniform() < 0.5 { -1.0 } else { 1.0 };
+        let mut spec = nominal.optics_spec().unwrap();
+        for i in 0..3 {
+            spec.sensor_from_camera.translation_mm[i] += sign() * priors.pupil_mm[i];
+        }
+        let turn = DVec3::from_array(priors.camera_rotation_rad.map(|v| v * sign()));
+        spec.sensor_from_camera.rotation *= rotation_from_vector(turn);
+        let mut made = nominal.clone();
+        for layer in &mut made.optics.layers[1..] {
+            layer.thickness_mm = layer.thickness_mm.map(|d| d + sign() * priors.layer_thickness_mm);
+            let step = sign() * priors.index;
+            layer.index += step;
+            layer.index_rgb = layer.index_rgb.map(|rgb| rgb.map(|n| n + step));
+        }
+        made.camera.camera_from_sensor = spec.sensor_from_camera.inverse().to_rows_4x4();
+        for marker in &mut made.white_markers {
+            for axis in 0..2 {
+                marker.position_mm[axis] += sign() * priors.white_marker_mm;
+            }
+        }
+        for dot in &mut made.black_dots {
+            let at = DVec3::from_array(dot.surface_mm);
+            let east = DVec3::new(-at.y, at.x, 0.0).normalize();
+            let moved = at + (east * sign() + at.cross(east).normalize() * sign()) * priors.black_dot_mm;
+            dot.surface_mm = (moved * (at.length() / moved.length())).to_array();
+        }
+        made
+    }
+
+    fn frames(built: &Constants, poses: &[Rigid], random: &mut Noise) -> Vec<Observation> {
+        let rest = built.sensor().unwrap();
+        let mut seen = Vec::new();
+        for (frame, pose) in poses.iter().enumerate() {
+            let optics = rest.at_pose(pose).unwrap();
+            let mut add = |kind, id, px: DVec2| {
+                let noise = DVec2::new(random.normal(), random.normal()) * 0.1;
+                seen.push(Observation { frame, kind, id, centroid_px: px + noise });
+            };
+            for marker in built.markers() {
+                add(Kind::White, marker.id as usize, marker.image(&optics).unwrap().centroid_px);
+            }
+            for dot in &built.black_dots {
+                let at = DVec3::from_array(dot.surface_mm);
+                let east = DVec3::new(-at.y, at.x, 0.0).normalize();
+                let north = at.cross(east).normalize();
+                let center = optics.project(at).unwrap();
+                let offset = outline_centroid_offset(center, |c, s| {
+                    let there = at + (east * c + north * s) * (0.5 * dot.diameter_mm);
+                    optics.project(there * (at.length() / there.length())).ok()
+                });
+                add(Kind::Black, dot.id, center + offset.unwrap());
+            }
+        }
+        seen
+    }
+
+    fn poses(random: &mut Noise, count: usize, at: DVec3) -> Vec<Rigid> {
+        let mut all = vec![Rigid::identity()];
+        for _ in 1..count {
+            let mut u = || 2.0 * random.uniform() - 1.0;
+            let displacement = Displacement {
+                translation_mm: DVec3::new(0.15 * u(), 0.15 * u(), -1.0 - u()),
+                rotation_rad: DVec3::new(0.03 * u(), 0.03 * u(), 0.02 * u()),
+            };
+            all.push(displacement.to_pose(at));
+        }
+        all
+    }
+
+    /// Root mean square wrench error (N, N*mm) over poses of a runtime that believes `believed`.
+    fn wrench_error(
+        truth: &Constants,
+        believed: &Constants,
+        poses: &[Rigid],
+        random: &mut Noise,
+    ) -> [f64; 6] {
+        let springs = truth.springs.as_ref().unwrap();
+        let at = DVec3::from_array(springs.at_mm);
+        let optics = truth.sensor().unwrap();
+        let sensor: SensorOptics = believed.sensor().unwrap();
+        let markers: Vec<Marker> = believed.markers();
+        let solver = PoseSolver::new(&sensor, &markers, PoseOptions::new(5.0, 10.0)).unwrap();
+        let mut sums = [0.0; 6];
+        for pose in poses {
+            let placed = optics.at_pose(pose).unwrap();
+            let sightings: Vec<Sighting> = truth
+                .markers()
+                .iter()
+                .map(|m| {
+                    let noise = DVec2::new(random.normal(), random.normal()) * 0.1;
+                    Sighting { id: m.id, centroid_px: m.image(&placed).unwrap().centroid_px + noise }
+                })
+                .collect();
+            let found = solver.solve(&sightings).unwrap().pose;
+            let wrench = |p: &Rigid| constants::wrench_by_table(springs, &Displacement::of_pose(p, at));
+            let (w, t) = (wrench(&found), wrench(pose));
+            for i in 0..6 {
+                sums[i] += (w[i] - t[i]).powi(2) / poses.len() as f64;
+            }
+        }
+        sums.map(f64::sqrt)
+    }
+
+    #[test]
+    fn frames_bring_a_sensor_that_is_off_back() {
+        let nominal = nominal();
+        let mut random = Noise(3);
+        let truth = built(&nominal, &mut random);
+        let at = DVec3::from_array(nominal.springs.as_ref().unwrap().at_mm);
+        let mut shown = vec![Rigid::identity(); 11];
+        shown.extend(poses(&mut random, 20, at));
+        let seen = frames(&truth, &shown, &mut random);
+        let found = fit(&nominal, &seen, &nominal.tolerances.unwrap(), 12).unwrap();
+        println!("{} steps", found.iterations);
+        assert!(found.rms_px[0] > 1.0 && found.rms_px[1] < 0.11, "{:?}", found.rms_px);
+        for p in &found.parameters {
+            println!("{p:?}");
+        }
+        let tries = poses(&mut random, 200, at);
+        let perfect = wrench_error(&truth, &truth, &tries, &mut Noise(11));
+        let fitted = wrench_error(&truth, &found.constants, &tries, &mut Noise(11));
+        let before = wrench_error(&truth, &nominal, &tries, &mut Noise(11));
+        println!("perfect {perfect:?}\nfitted {fitted:?}\nbefore {before:?}");
+        for i in 0..6 {
+            assert!(
+                fitted[i] <= 1.5 * perfect[i],
+                "{}: {} {}",
+                constants::WRENCH_AXES[i],
+                fitted[i],
+                perfect[i]
+            );
+        }
+        assert!(before[2] > 3.0 * perfect[2]);
+        let observed = |name: &str| found.parameters.iter().find(|p| p.name == name).unwrap().observed;
+        assert!(observed("camera_rotation.x") && observed("pupil.z"));
+    }
+}

@@ -1,0 +1,291 @@
+//! What the sensor carries and what it resolves, as a table, a picture and a file for programs.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::Serialize;
+use serde_json::json;
+
+use super::resolution::{design_choices, resolution_at};
+use super::sight::{MarkerSight, markers_of};
+use super::springs::DesignSprings;
+use crate::design::{Design, DesignError};
+use crate::mechanics::{
+    Check, Direction, Limit, Reach, Wrench, choices, limits_of, push_press_border, reach,
+    standard_directions, suspension_of, try_all,
+};
+use crate::numeric::Rigid;
+
+/// Directions around the axis that the table has.
+const AZIMUTHS: u32 = 8;
+/// Mixes of push and press along the border in the picture.
+const BORDER_POINTS: u32 = 31;
+
+/// One line of the load table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EnvelopeLine {
+    /// The load at factor 1, in words.
+    pub load: String,
+    /// Wrench at the end, about the reference point: N, N*mm.
+    pub wrench: [f64; 6],
+    /// Newtons (or newton-millimetres, for tilts and twists) of the load at the end.
+    pub size: f64,
+    /// What ends it.
+    pub ended_by: String,
+    /// The part that ends it.
+    pub part: String,
+}
+
+/// The load envelope, the claims, the choices of spring, and the resolution.
+#[derive(Debug, Clone)]
+pub struct ForceReport {
+    /// The load table.
+    pub lines: Vec<EnvelopeLine>,
+    /// Border of pushes (N, along x) and presses (N) at the pole, with what ends each.
+    pub border: Vec<([f64; 2], Option<Limit>)>,
+    /// All of it, for programs.
+    pub json: serde_json::Value,
+}
+
+fn line(reached: &Reach) -> EnvelopeLine {
+    let (ended_by, part) = reached
+        .ended_by
+        .as_ref()
+        .map_or(("nothing".to_owned(), String::new()), |c| (c.limit.as_str().to_owned(), c.part.clone()));
+    let wrench = reached.direction.wrench.scaled(reached.factor);
+    EnvelopeLine {
+        load: reached.direction.name.clone(),
+        wrench: wrench.to_array(),
+        size: reached.factor,
+        ended_by,
+        part,
+    }
+}
+
+fn check_json(check: &Check) -> serde_json::Value {
+    json!({
+        "limit": check.limit.as_str(), "part": check.part, "value": check.value, "bound": check.bound,
+        "unit": check.unit, "used": check.used(),
+    })
+}
+
+/// Computes the report of a design; `springs` is what went into its constants.
+///
+/// # Errors
+/// [`DesignError`] where the springs cannot be.
+pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceReport, DesignError> {
+    let suspension = suspension_of(design)?;
+    let limits = limits_of(design);
+    let sight = MarkerSight::of(design);
+    let more = |pose: &Rigid| sight.checks(pose);
+    let radius_mm = design.sections().dome.radius_mm;
+    let directions = standard_directions(suspension.at_mm(), radius_mm, AZIMUTHS);
+    let lines: Vec<EnvelopeLine> =
+        directions.par_iter().map(|d| line(&reach(&suspension, &limits, &more, d))).collect();
+    let border = push_press_border(&suspension, &limits, &more, radius_mm, 0.0, BORDER_POINTS);
+
+    let mut claims = Vec::new();
+    let mut hardest: Option<Wrench> = None;
+    for claim in &design.sections().loads.claims {
+        let [force, moment, point] = [claim.force_n, claim.moment_nmm, claim.point_mm].map(DVec3::from_array);
+        let wrench = Wrench::of_load(force, moment, point, suspension.at_mm());
+        let case = try_all(&suspension, &limits, &more, &wrench);
+        let direction = Direction { name: claim.name.clone(), wrench };
+        let reached = reach(&suspension, &limits, &more, &direction);
+        if hardest.is_none_or(|h| wrench.force_n.z < h.force_n.z) {
+            hardest = Some(wrench);
+        }
+        claims.push(json!({
+            "name": claim.name,
+            "wrench": wrench.to_array(),
+            "held": case.passed().next().is_none() && case.equilibrium.is_ok(),
+            "pose": case.equilibrium.as_ref().ok().map(|e| e.pose.to_rows_4x4()),
+            "displacement": case.equilibrium.as_ref().ok().map(|e| e.displacement.to_array()),
+            "checks": case.checks.iter().map(check_json).collect::<Vec<_>>(),
+            "factor_to_first_limit": reached.factor,
+            "first_limit": reached.ended_by.as_ref().map(check_json),
+        }));
+    }
+    // The paper's measured maximum, checked whether or not the design claims it.
+    let press =
+        Wrench::of_load(DVec3::new(0.0, 0.0, -17.0), DVec3::ZERO, DVec3::Z * radius_mm, suspension.at_mm());
+    let paper = try_all(&suspension, &limits, &more, &press);
+    let tried =
+        choices(suspension.spec(), &limits, &more, &hardest.filter(|h| h.force_n.z < 0.0).unwrap_or(press));
+    let springs_that_hold: Vec<_> = tried
+        .iter()
+        .map(|choice| {
+            json!({
+                "wire_diameter_mm": choice.spring.wire_diameter_mm,
+                "active_coils": choice.spring.active_coils,
+                "axial_n_per_mm": choice.axial_n_per_mm,
+                "held": !choice.worst.is_passed(),
+                "worst": check_json(&choice.worst),
+            })
+        })
+        .collect();
+    let markers = markers_of(design);
+    let noise_px = design.sections().noise.white_centroid_px;
+    let at_rest = resolution_at(design.optics(), &markers, noise_px, &suspension, &Rigid::identity());
+    let pressed = paper
+        .equilibrium
+        .as_ref()
+        .ok()
+        .and_then(|e| resolution_at(design.optics(), &markers, noise_px, &suspension, &e.pose));
+    let plain = springs.plain.as_ref().map(|fit| {
+        json!({
+            "left": fit.left, "naive": fit.naive,
+            "naive_at_rest_pose": fit.naive_at_rest_pose, "naive_at_rest_wrench": fit.naive_at_rest_wrench,
+        })
+    });
+    let spring = &suspension.spec().spring;
+    let json = json!({
+        "at_mm": suspension.at_mm().to_array(),
+        "spring": {
+            "axial_n_per_mm": spring.axial_n_per_mm(),
+            "lateral_n_per_mm": spring.lateral_n_per_mm(0.0),
+            "torsion_nmm_per_rad": spring.torsion_nmm_per_rad(),
+            "index": spring.index(),
+            "wahl_factor": spring.wahl_factor(),
+            "solid_height_mm": spring.solid_height_mm(),
+            "rest_compression_mm": suspension.rest_compression_mm(),
+        },
+        "stiffness": springs.constants.stiffness,
+        "envelope": lines,
+        "border_push_press_n": border.iter().map(|(p, l)| json!({
+            "push_n": p[0], "press_n": p[1], "ended_by": l.map(Limit::as_str),
+        })).collect::<Vec<_>>(),
+        "claims": claims,
+        "press_17_n": {
+            "held": paper.passed().next().is_none() && paper.equilibrium.is_ok(),
+            "checks": paper.checks.iter().map(check_json).collect::<Vec<_>>(),
+        },
+        "spring_choices": springs_that_hold,
+        "centroid_noise_px": noise_px,
+        "resolution_at_rest": at_rest,
+        "resolution_at_17_n": pressed,
+        "design_choices": design_choices(design.optics(), &markers, noise_px, &suspension),
+        "plain_runtime_bias": plain,
+    });
+    Ok(ForceReport { lines, border, json })
+}
+
+impl ForceReport {
+    /// The load table as CSV.
+    pub fn csv(&self) -> String {
+        let mut text = String::from("load,size,Fx_n,Fy_n,Fz_n,Mx_nmm,My_nmm,Mz_nmm,ended_by,part\n");
+        for l in &self.lines {
+            let w: Vec<String> = l.wrench.iter().map(|v| format!("{v:.4}")).collect();
+            let name = l.load.replace(',', "");
+            text += &format!("{name},{:.4},{},{},{}\n", l.size, w.join(","), l.ended_by, l.part);
+        }
+        text
+    }
+
+    /// The border of pushes and presses at the pole, each stretch in the colour of what ends it.
+    pub fn svg(&self) -> String {
+        const WIDTH: f64 = 560.0;
+        const HEIGHT: f64 = 420.0;
+        const LEFT: f64 = 70.0;
+        const TOP: f64 = 30.0;
+        let most = |k: usize, sign: f64| self.border.iter().map(|(p, _)| sign * p[k]).fold(0.1, f64::max);
+        let (push, press, pull) = (1.1 * most(0, 1.0), 1.1 * most(1, 1.0), 1.1 * most(1, -1.0));
+        let x = |v: f64| LEFT + v / push * (WIDTH - LEFT - 20.0);
+        let y = |v: f64| TOP + (press - v) / (press + pull) * (HEIGHT - TOP - 60.0);
+        let mut text = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
+             font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" \
+             fill=\"white\"/>\n<text x=\"{LEFT}\" y=\"18\">Push and press at the pole until the first limit</text>\n"
+        );
+        let zero = y(0.0);
+        text += &format!(
+            "<path d=\"M{} {zero:.1}H{:.1}M{LEFT} {TOP}V{:.1}\" stroke=\"#444\" fill=\"none\"/>\n",
+            LEFT,
+            WIDTH - 20.0,
+            HEIGHT - 60.0
+        );
+        let step = |span: f64| {
+            let rough = 10_f64.powf((span / 5.0).log10().floor());
+            [1.0, 2.0, 5.0, 10.0]
+                .map(|m| m * rough)
+                .into_iter()
+                .find(|s| span / s <= 8.0)
+                .unwrap_or(10.0 * rough)
+        };
+        let (dx, dy) = (step(push), step(press + pull));
+        for i in 1..20 {
+            let v = dx * f64::from(i);
+            if v < push {
+                text += &format!(
+                    "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\n",
+                    x(v),
+                    zero + 16.0,
+                    (v * 1e6).round() / 1e6
+                );
+            }
+        }
+        for i in -20..=20 {
+            let v = dy * f64::from(i);
+            if v < press && v > -pull {
+                let label = (v * 1e6).round() / 1e6;
+                let at = y(v);
+                text += &format!(
+                    "<path d=\"M{:.1} {at:.1}H{LEFT}\" stroke=\"#444\"/><text x=\"{:.1}\" y=\"{:.1}\" \
+                     text-anchor=\"end\">{label}</text>\n",
+                    LEFT - 5.0,
+                    LEFT - 9.0,
+                    at + 4.0
+                );
+            }
+        }
+        text += &format!(
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">push, N</text>\n<text x=\"8\" y=\"{:.1}\">press, \
+             N</text>\n",
+            WIDTH - 20.0,
+            zero - 6.0,
+            TOP - 12.0
+        );
+        let mut names: Vec<&str> = Vec::new();
+        for pair in self.border.windows(2) {
+            let [(a, _), (b, limit)] = pair else { continue };
+            let name = limit.map_or("nothing", Limit::as_str);
+            if !names.contains(&name) {
+                names.push(name);
+            }
+            let color = COLORS[names.iter().position(|n| *n == name).unwrap_or(0) % COLORS.len()];
+            text += &format!(
+                "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" stroke=\"{color}\" stroke-width=\"3\" \
+                 stroke-linecap=\"round\"/>\n",
+                x(a[0]),
+                y(a[1]),
+                x(b[0]),
+                y(b[1])
+            );
+        }
+        for (i, name) in names.iter().enumerate() {
+            let at = LEFT + 165.0 * (i % 3) as f64;
+            let row = HEIGHT - 34.0 + 18.0 * (i / 3) as f64;
+            text += &format!(
+                "<path d=\"M{at:.1} {:.1}h18\" stroke=\"{}\" stroke-width=\"3\"/><text x=\"{:.1}\" \
+                 y=\"{row:.1}\">{}</text>\n",
+                row - 4.0,
+                COLORS[i % COLORS.len()],
+                at + 24.0,
+                name.replace('_', " ")
+            );
+        }
+        text + "</svg>\n"
+    }
+
+    /// The report's files: path in the build's tree, and content.
+    pub fn files(&self) -> Vec<(String, String)> {
+        let json = serde_json::to_string_pretty(&self.json).unwrap_or_default() + "\n";
+        vec![
+            ("report/force.json".into(), json),
+            ("report/load_envelope.csv".into(), self.csv()),
+            ("report/load_envelope.svg".into(), self.svg()),
+        ]
+    }
+}
+
+/// Told apart by people who see few colours too (Okabe and Ito's set).
+const COLORS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#000000"];

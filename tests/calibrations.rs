@@ -1,0 +1,111 @@
+//! The calibrating commands: what they write, and what they say of bad input.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use domecast::constants::{self, Constants};
+use domecast::layout::Layout;
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_domecast")).args(arguments).output().expect("domecast runs")
+}
+
+fn thumb24() -> Constants {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
+    let design = domecast::design::load(&path).expect("a design");
+    constants::of(&design, &Layout::of_design(&design).expect("a layout")).expect("constants")
+}
+
+struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let bench = Self { folder: tempfile::tempdir().expect("a folder") };
+        bench.write("constants.json", &thumb24().to_json());
+        bench
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).expect("a file");
+    }
+
+    fn run(&self, command: &str, table: &str) -> Output {
+        self.write("table.csv", table);
+        let [table, constants] = ["table.csv", "constants.json"].map(|n| self.path(n).display().to_string());
+        run(&["--json", command, &table, &constants])
+    }
+}
+
+/// Pairs from a stiffness that is a tenth above the nominal one, Mz never read.
+fn pairs() -> String {
+    let stiffness = thumb24().springs.expect("springs").stiffness;
+    let mut text = String::from("tx,ty,tz,rx,ry,rz,Fx,Fy,Fz,Mx,My,Mz\n");
+    for i in 0..60 {
+        let wave = |k: f64| (k * f64::from(i)).sin();
+        let d = [
+            0.2 * wave(1.1),
+            0.2 * wave(2.3),
+            wave(0.7) - 1.0,
+            0.03 * wave(3.1),
+            0.03 * wave(1.7),
+            0.03 * wave(2.9),
+        ];
+        let w = |row: usize| 1.1 * stiffness[row].iter().zip(d).map(|(k, d)| k * d).sum::<f64>();
+        let cells: Vec<String> = d.iter().copied().chain((0..5).map(w)).map(|v| v.to_string()).collect();
+        text += &format!("{},\n", cells.join(","));
+    }
+    text
+}
+
+#[test]
+fn a_measured_stiffness_replaces_the_nominal_one() {
+    let bench = Bench::new();
+    let ran = bench.run("calibrate-force", &pairs());
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&ran.stdout).expect("JSON");
+    assert_eq!(told["fit"]["refused"][0], "Mz: no reading");
+    let text = fs::read_to_string(bench.path("constants.measured.json")).expect("measured constants");
+    let (measured, nominal) = (Constants::parse(&text).expect("constants"), thumb24());
+    let (measured, nominal) = (measured.springs.expect("springs"), nominal.springs.expect("springs"));
+    assert_eq!(measured.source, "measured");
+    assert!((measured.stiffness[2][2] / nominal.stiffness[2][2] - 1.1).abs() < 1e-9);
+    assert_eq!(measured.stiffness[5], nominal.stiffness[5]);
+    // The plain runtime follows.
+    let plain =
+        |s: &constants::SpringConstants| s.plain_runtime.as_ref().expect("a plain runtime").stiffness[2][2];
+    assert!((plain(&measured) / plain(&nominal) - 1.1).abs() < 0.03);
+    // The nominal file stays as it was.
+    assert_eq!(fs::read_to_string(bench.path("constants.json")).expect("constants"), thumb24().to_json());
+}
+
+#[test]
+fn bad_tables_are_told_by_place_and_write_nothing() {
+    let bench = Bench::new();
+    let cases = [
+        ("calibrate-force", "tx,ty,tz,rx,ry,rz\n0,0,0,0,0,0\n", "Fx"),
+        ("calibrate-force", "Fz\n1\n", "tx,ty,tz"),
+        ("calibrate-force", "tx,ty,tz,rx,ry,rz,Fz\n0,0,oops,0,0,0,1\n", "line 2"),
+        ("calibrate-force", "tx,ty,tz,rx,ry,rz,Fz\n0,0,0,0,0,0,1\n", "varies"),
+        ("calibrate-force", "u0,v0,u1,v1,u2,v2,u3,v3,Fz\n1,2,3,4,5,6,7,8,1\n", "line 2"),
+        ("calibrate-force", "", "empty"),
+        ("calibrate-optics", "frame,kind,id,u\n", "column v"),
+        ("calibrate-optics", "frame,kind,id,u,v\n0,grey,0,1,1\n", "grey"),
+        ("calibrate-optics", "frame,kind,id,u,v\n0,white,77,1,1\n", "77"),
+        ("calibrate-optics", "frame,kind,id,u,v\n", "no observations"),
+        ("calibrate-optics", "frame,kind,id,u,v\n0.5,white,0,1,1\n", "whole number"),
+    ];
+    for (command, table, word) in cases {
+        let ran = bench.run(command, table);
+        let told = String::from_utf8_lossy(&ran.stdout).into_owned() + &String::from_utf8_lossy(&ran.stderr);
+        assert_eq!(ran.status.code(), Some(1), "{command} {table:?}: {told}");
+        assert!(told.contains(word), "{command} {table:?}: {told}");
+        assert!(!bench.path("constants.measured.json").exists());
+    }
+}

@@ -129,20 +129,25 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     text.push('\n');
     tree.add("artwork/layout.json", text.into_bytes());
     step("making the parts");
-    let mut records = Vec::new();
-    for part in parts::build(design)? {
-        let file = format!("parts/{}.stl", part.name);
-        let mut bytes = Vec::new();
-        part.write_stl(&mut bytes).map_err(|error| BuildError::Ours(format!("{file}: {error}")))?;
-        tree.add(file.clone(), bytes);
-        records.push(PartRecord {
-            name: part.name.to_owned(),
-            file,
+    let measures = parts::Measures::of(design)?;
+    let made = parts::build(&measures, &layout.hits)?;
+    step("checking the assembly");
+    let assembly = parts::Assembly::of(&measures, &made)?;
+    parts::check_assembly(&measures, &made, &assembly)?;
+    step("writing the parts");
+    for file in parts::files(design, &measures, &made, &assembly)? {
+        tree.add(file.path, file.bytes);
+    }
+    let records = made
+        .iter()
+        .map(|part| PartRecord {
+            name: part.name.clone(),
+            file: format!("parts/{}.stl", part.name),
             volume_mm3: part.volume_mm3,
             genus: part.genus,
             bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
-        });
-    }
+        })
+        .collect();
     warnings.extend(
         layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
     );

@@ -18,22 +18,34 @@
 //! ([`TriMesh::rounding_mm`]) follows from the size of the numbers and decides
 //! what counts as equal. Neither ever stands in for the other.
 
+mod brep;
 mod check;
 mod chord;
+mod distance;
 mod error;
+mod exact;
+mod glb;
+mod picture;
 mod primitives;
+mod rays;
 mod shape;
 mod solid;
 mod stl;
+mod threemf;
 mod triangles;
 
 #[cfg(test)]
 mod tests;
 
+pub use brep::Brep;
 pub use check::{Inspection, inspect};
 pub use chord::{Chord, Fit};
 pub use error::MeshError;
+pub use glb::{GlbItem, GlbScene, write_glb};
+pub use picture::{PictureItem, View, shade};
+pub use rays::RayTarget;
 pub use shape::{Construction, Piece, Profile, ProfileEdge, Shape};
 pub use solid::Solid;
 pub use stl::{read_stl, write_stl};
+pub use threemf::write_3mf;
 pub use triangles::{BoundingBox, TriMesh};

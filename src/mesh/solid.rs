@@ -1,7 +1,7 @@
 //! Booleans. The only file that knows the kernel behind them.
 
-use glam::DVec3;
-use manifold_rust::linalg::Vec3;
+use glam::{DAffine3, DVec3};
+use manifold_rust::linalg::{Mat3x4, Vec3};
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{BooleanEngine, Error as KernelError, MeshGL64, OpType};
 
@@ -73,6 +73,22 @@ impl Solid {
         guarded(operation, || self.inner.boolean_with_engine(&other.inner, op, BooleanEngine::Exact))
     }
 
+    /// The solid moved by a rigid (or other affine, not mirroring) map.
+    ///
+    /// # Errors
+    /// [`MeshError::Kernel`] if the map is not finite.
+    pub fn moved(&self, target_from_source: &DAffine3) -> Result<Self, MeshError> {
+        let column = |v: DVec3| Vec3::new(v.x, v.y, v.z);
+        let m = &target_from_source.matrix3;
+        let map = Mat3x4::from_cols(
+            column(m.x_axis),
+            column(m.y_axis),
+            column(m.z_axis),
+            column(target_from_source.translation),
+        );
+        guarded("move", || self.inner.transform(&map))
+    }
+
     /// Volume, mm^3.
     pub fn volume_mm3(&self) -> f64 {
         self.inner.volume()
@@ -100,13 +116,6 @@ impl Solid {
                 .map(|t| [t[0] as u32, t[1] as u32, t[2] as u32])
                 .collect(),
         }
-    }
-
-    /// Whether the segment from `from_mm` to `to_mm` meets the surface, and
-    /// the first fraction along it where it does.
-    pub fn first_hit(&self, from_mm: DVec3, to_mm: DVec3) -> Option<f64> {
-        let kernel = |v: DVec3| Vec3::new(v.x, v.y, v.z);
-        self.inner.ray_cast(kernel(from_mm), kernel(to_mm)).first().map(|hit| hit.distance)
     }
 }
 

@@ -19,6 +19,21 @@ impl BoundingBox {
         self.max_mm - self.min_mm
     }
 
+    /// Whether the two boxes share no point.
+    pub fn is_apart_from(&self, other: &Self) -> bool {
+        (self.min_mm - other.max_mm).max(other.min_mm - self.max_mm).max_element() > 0.0
+    }
+
+    /// A box round this one after a move: round its moved corners.
+    #[must_use]
+    pub fn transformed(&self, target_from_source: &DAffine3) -> Self {
+        let center = target_from_source.transform_point3(0.5 * (self.min_mm + self.max_mm));
+        let m = &target_from_source.matrix3;
+        let half = 0.5 * self.size_mm();
+        let reach = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+        Self { min_mm: center - reach, max_mm: center + reach }
+    }
+
     /// The smallest box round this one and another.
     pub fn union(&self, other: &Self) -> Self {
         Self { min_mm: self.min_mm.min(other.min_mm), max_mm: self.max_mm.max(other.max_mm) }

@@ -11,7 +11,7 @@ pub enum PartError {
     /// Dimensions of the design contradict each other.
     Infeasible {
         /// The part.
-        part: &'static str,
+        part: String,
         /// Where in it, and what is wrong.
         place: String,
         /// What was found, mm.
@@ -25,7 +25,7 @@ pub enum PartError {
     /// A shape or a boolean failed.
     Mesh {
         /// The part.
-        part: &'static str,
+        part: String,
         /// Why.
         error: MeshError,
     },
@@ -33,8 +33,15 @@ pub enum PartError {
     /// should be.
     Broken {
         /// The part.
-        part: &'static str,
+        part: String,
         /// What is wrong with it.
+        problem: String,
+    },
+    /// A file cannot be made.
+    Unwritable {
+        /// Which.
+        path: String,
+        /// Why.
         problem: String,
     },
     /// The camera's view cannot be computed.
@@ -54,6 +61,7 @@ impl fmt::Display for PartError {
             }
             Self::Mesh { part, error } => write!(f, "{part}: {error}"),
             Self::Broken { part, problem } => write!(f, "{part}: {problem}"),
+            Self::Unwritable { path, problem } => write!(f, "{path}: {problem}"),
             Self::View { problem, field } => write!(f, "the camera's view: {problem}; change {field}"),
         }
     }
@@ -80,6 +88,12 @@ impl From<PartError> for DesignError {
                 "mesh.chord_tolerance_mm",
                 "",
                 format!("{part}: {error}"),
+                "a tolerance that suits the size",
+            ),
+            PartError::Unwritable { path, problem } => Self::at(
+                "mesh.chord_tolerance_mm",
+                "",
+                format!("{path}: {problem}"),
                 "a tolerance that suits the size",
             ),
             PartError::Broken { part, problem } => Self::at(

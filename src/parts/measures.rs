@@ -3,14 +3,16 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::view::ViewCone;
-use super::{PartError, upper};
+use super::{Blueprint, Feature, PartError, upper};
 use crate::design::Design;
 use crate::design::sections::{
-    CameraBodySection, LedsSection, MagnetPocketsSection, MagnetsSection, MouldSection, PlatformsSection,
-    ProcessSection, SheetSection, SpringEnds,
+    CameraBodySection, CouponSection, JigSection, LedsSection, MagnetPocketsSection, MagnetsSection,
+    MouldSection, PlatformsSection, ProcessSection, SheetSection, SpringEnds, StencilSection,
 };
-use crate::mesh::{Chord, Fit, Profile, Shape};
+use crate::mechanics::{claims_of, suspension_of};
+use crate::mesh::{Chord, Fit, Shape};
 use crate::numeric::Rigid;
+use crate::optics::SensorOptics;
 
 /// Dimensions of a design as the parts need them. Heights are in the sensor
 /// frame at rest.
@@ -50,6 +52,31 @@ pub struct Measures {
     pub sensor_from_camera: DAffine3,
     /// What the camera must see through the upper platform.
     pub view: ViewCone,
+    /// Named positions of the platform, `rest_from_platform`: rest first, then
+    /// the travel, then the claimed loads.
+    pub poses: Vec<(String, Rigid)>,
+    /// Lens, layers and dome at rest.
+    pub optics: SensorOptics,
+    /// Centres of the white markers on the sheet's top face, mm.
+    pub markers_mm: Vec<DVec2>,
+    /// Radius of a white marker, mm.
+    pub marker_radius_mm: f64,
+    /// Thickness of the membrane on the dome, mm.
+    pub membrane_mm: f64,
+    /// Room that the whole sensor may take, mm.
+    pub envelope_mm: DVec3,
+    /// Wire of the springs, mm.
+    pub spring_wire_mm: f64,
+    /// Outer diameter of the springs, mm.
+    pub spring_outer_mm: f64,
+    /// Active coils of the springs.
+    pub spring_coils: f64,
+    /// The pad-print jig.
+    pub jig: JigSection,
+    /// The marker stencil.
+    pub stencil: StencilSection,
+    /// The fit coupon.
+    pub coupon: CouponSection,
     /// Tolerance of ordinary faces.
     pub chord: Chord,
     /// Tolerance of the mould's cavity.
@@ -61,14 +88,6 @@ pub struct Measures {
 /// A point in the plane from radius and azimuth.
 pub(super) fn polar(radius_mm: f64, azimuth_deg: f64) -> DVec2 {
     radius_mm * DVec2::from_angle(azimuth_deg.to_radians())
-}
-
-/// What must be seen through the platform's window: the dome's base and the
-/// white markers, as discs on the sheet's top face.
-fn view_targets_mm(design: &Design) -> Vec<(DVec2, f64)> {
-    let marker_radius_mm = 0.5 * design.sections().white_markers.diameter_mm;
-    let markers = design.white_markers_mm().into_iter().map(|p| (p.truncate(), marker_radius_mm));
-    std::iter::once((DVec2::ZERO, design.sections().dome.radius_mm)).chain(markers).collect()
 }
 
 /// How far the upper platform can go straight down: until the springs are
@@ -90,14 +109,31 @@ fn axial_travel_mm(design: &Design) -> f64 {
     (springs.free_length_mm - solid_mm).min(clear_mm).min(above_camera_mm).max(0.0)
 }
 
-/// Positions of the platform between rest and springs pressed solid (or the
-/// stop, or the sheet on the camera, whichever comes first).
-fn travel_poses(design: &Design) -> Vec<Rigid> {
-    const STEPS: u32 = 8;
+/// The positions of the platform that parts are made and checked for: rest,
+/// straight down to the end of the travel, and the balance under every load
+/// that the design claims. Each has a name for messages.
+fn poses(design: &Design) -> Result<Vec<(String, Rigid)>, PartError> {
+    const STEPS: u32 = 4;
     let travel_mm = axial_travel_mm(design);
-    (0..=STEPS)
-        .map(|i| Rigid::from_translation(DVec3::NEG_Z * (travel_mm * f64::from(i) / f64::from(STEPS))))
-        .collect()
+    let mut out: Vec<(String, Rigid)> = (0..=STEPS)
+        .map(|i| {
+            let name = match i {
+                0 => "at rest".to_owned(),
+                STEPS => "at full travel".to_owned(),
+                _ => format!("at {i}/{STEPS} of the travel"),
+            };
+            let down_mm = travel_mm * f64::from(i) / f64::from(STEPS);
+            (name, Rigid::from_translation(DVec3::NEG_Z * down_mm))
+        })
+        .collect();
+    let fault = |problem: String| PartError::View { problem, field: "loads.claims".into() };
+    let suspension = suspension_of(design).map_err(|error| fault(error.to_string()))?;
+    for (claim, case) in design.sections().loads.claims.iter().zip(claims_of(design, &suspension)) {
+        let balance = case.equilibrium.map_err(|error| fault(format!("load \"{}\": {error}", claim.name)))?;
+        let pose = balance.displacement.to_pose(suspension.at_mm());
+        out.push((format!("under the load \"{}\"", claim.name), pose));
+    }
+    Ok(out)
 }
 
 impl Measures {
@@ -109,15 +145,17 @@ impl Measures {
     pub fn of(design: &Design) -> Result<Self, PartError> {
         let sections = design.sections();
         let chord = |tolerance_mm: f64| {
-            Chord::new(tolerance_mm).map_err(|error| PartError::Mesh { part: "mesh", error })
+            Chord::new(tolerance_mm).map_err(|error| PartError::Mesh { part: "mesh".into(), error })
         };
         let camera = design.sensor_from_camera();
+        let poses = poses(design)?;
+        let markers_mm: Vec<DVec2> = design.white_markers_mm().iter().map(|p| p.truncate()).collect();
         let view = ViewCone::over(
             design.optics(),
-            &view_targets_mm(design),
-            &travel_poses(design),
-            sections.platforms.upper.underside_z_mm,
-            design.sheet_underside_z_mm(),
+            sections.dome.radius_mm,
+            (&markers_mm, 0.5 * sections.white_markers.diameter_mm),
+            &poses.iter().map(|(_, pose)| *pose).collect::<Vec<_>>(),
+            (sections.platforms.upper.underside_z_mm, design.sheet_underside_z_mm()),
             sections.platforms.window_margin_mm,
         )?;
         Ok(Self {
@@ -138,6 +176,18 @@ impl Measures {
             spring_axes_mm: design.springs_at_mm(),
             sensor_from_camera: DAffine3 { matrix3: camera.rotation, translation: camera.translation_mm },
             view,
+            poses,
+            optics: design.optics().clone(),
+            markers_mm,
+            marker_radius_mm: 0.5 * sections.white_markers.diameter_mm,
+            membrane_mm: sections.elastomer.membrane_thickness_mm,
+            envelope_mm: DVec3::from_array(sections.envelope.size_mm),
+            spring_wire_mm: sections.springs.wire_diameter_mm,
+            spring_outer_mm: sections.springs.outer_diameter_mm,
+            spring_coils: sections.springs.active_coils,
+            jig: sections.jig.clone(),
+            stencil: sections.stencil.clone(),
+            coupon: sections.coupon.clone(),
             chord: chord(sections.mesh.chord_tolerance_mm)?,
             optical_chord: chord(sections.mesh.optical_chord_tolerance_mm)?,
             // Any length will do that is not small against the part.
@@ -195,20 +245,27 @@ impl Measures {
         upper::platform_from_led(self, i)
     }
 
-    /// Tool for a magnet's pocket that opens at the face `face_z_mm`, with its
-    /// push-out hole up (or down) to `end_z_mm`.
-    pub(super) fn magnet_pocket(&self, face_z_mm: f64, end_z_mm: f64, over_mm: f64) -> Shape {
+    /// Cuts a pocket for a magnet at every spring into the face at
+    /// `face_z_mm`, each with its push-out hole as far as `end_z_mm`, beyond
+    /// the part.
+    pub(super) fn cut_magnet_pockets(&self, b: &mut Blueprint, face_z_mm: f64, end_z_mm: f64) {
         let (radius, depth) = self.pocket_mm();
-        let hole = 0.5 * self.pockets.push_out_diameter_mm;
         let into = (end_z_mm - face_z_mm).signum();
-        let mut points = vec![(radius, face_z_mm - into * over_mm), (radius, face_z_mm + into * depth)];
-        if hole > 0.0 {
-            points.push((hole, face_z_mm + into * depth));
-            points.push((hole, end_z_mm));
+        let cylinder = |radius: f64, from: f64, to: f64| {
+            Shape::cylinder(radius, from.min(to), from.max(to), Fit::Outside)
+        };
+        for (i, axis) in self.spring_axes_mm.iter().enumerate() {
+            let pocket = cylinder(radius, face_z_mm - into * self.overcut_mm, face_z_mm + into * depth);
+            let feature = Feature::new("magnet pocket", "springs.places", pocket);
+            b.cut.push(feature.numbered(i).at(axis.x, axis.y));
+            let hole = 0.5 * self.pockets.push_out_diameter_mm;
+            if hole > 0.0 {
+                // From the middle of the pocket, so that no faces coincide.
+                let shape = cylinder(hole, face_z_mm + into * 0.5 * depth, end_z_mm);
+                let feature = Feature::new("push-out hole", "magnet_pockets.push_out_diameter_mm", shape);
+                b.cut.push(feature.numbered(i).at(axis.x, axis.y));
+                b.genus += 1;
+            }
         }
-        if into < 0.0 {
-            points.reverse();
-        }
-        Shape::Turned { profile: Profile::lines(&points), fit: Fit::Outside }
     }
 }

@@ -10,12 +10,21 @@
 //! Frames: the platforms are in the sensor frame at rest, the mould has its own
 //! with the parting plane at z = 0 and the cavity below.
 
+mod accessories;
+mod assembly;
+mod bom;
+mod bought;
+mod checks;
+mod drawing;
 mod error;
+mod feature;
+mod files;
 mod lower;
 mod measures;
 mod mould;
 mod upper;
 mod view;
+mod walls;
 
 #[cfg(test)]
 mod tests;
@@ -24,18 +33,22 @@ use std::io::{self, Write};
 
 use rayon::prelude::*;
 
+pub use assembly::{Assembly, Item};
+pub use checks::check_assembly;
 pub use error::PartError;
+use feature::{Blueprint, Feature};
+pub use files::{PartFile, files};
 pub use measures::Measures;
 pub use view::ViewCone;
 
-use crate::design::Design;
-use crate::mesh::{BoundingBox, Chord, Construction, Inspection, TriMesh, inspect, write_stl};
+use crate::layout::Hit;
+use crate::mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, write_stl};
 
 /// One part, ready to be written.
 #[derive(Debug, Clone)]
 pub struct Part {
     /// Name, also of its files: `upper_platform`.
-    pub name: &'static str,
+    pub name: String,
     /// One line on what it is and what it is made of.
     pub summary: &'static str,
     /// The exact shapes that it is made of.
@@ -55,33 +68,27 @@ pub struct Part {
     pub bounds: BoundingBox,
 }
 
-/// A part before it is meshed.
-pub(crate) struct Blueprint {
-    pub name: &'static str,
-    pub summary: &'static str,
-    pub construction: Construction,
-    pub genus: i64,
-    pub chord: Chord,
-}
-
 type Maker = fn(&Measures) -> Result<Blueprint, PartError>;
 
 impl Blueprint {
-    fn build(self) -> Result<Part, PartError> {
-        let Self { name, summary, construction, genus, chord } = self;
-        let solid = construction.solid(chord).map_err(|error| PartError::Mesh { part: name, error })?;
-        let exact_vertices = solid.to_mesh();
-        let mesh = exact_vertices.welded_f32();
-        let broken = |problem: String| PartError::Broken { part: name, problem };
+    /// Meshes the part and looks at what came out.
+    fn build(&self) -> Result<Part, PartError> {
+        let construction = self.construction();
+        let solid = construction
+            .solid(self.chord)
+            .map_err(|error| PartError::Mesh { part: self.name.clone(), error })?;
+        let in_f64 = solid.to_mesh();
+        let mesh = in_f64.welded_f32();
+        let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
         let part = Part {
-            name,
-            summary,
+            name: self.name.clone(),
+            summary: self.summary,
             construction,
-            chord_tolerance_mm: chord.tolerance_mm(),
-            volume_mm3: exact_vertices.volume_mm3(),
-            area_mm2: exact_vertices.area_mm2(),
-            genus,
+            chord_tolerance_mm: self.chord.tolerance_mm(),
+            volume_mm3: in_f64.volume_mm3(),
+            area_mm2: in_f64.area_mm2(),
+            genus: self.genus,
             bounds,
             mesh,
         };
@@ -113,7 +120,7 @@ impl Part {
         });
         match problem {
             None => Ok(()),
-            Some(problem) => Err(PartError::Broken { part: self.name, problem }),
+            Some(problem) => Err(PartError::Broken { part: self.name.clone(), problem }),
         }
     }
 
@@ -126,19 +133,34 @@ impl Part {
     }
 }
 
-/// Makes all parts of a design, in a fixed order.
+/// Makes all parts, in a fixed order, and checks each against the process. One
+/// pad-printing jig is made for each hit.
 ///
 /// # Errors
 /// The first part, in that order, that cannot be made.
-pub fn build(design: &Design) -> Result<Vec<Part>, PartError> {
-    build_measured(&Measures::of(design)?)
-}
-
-/// [`build`] for measures that are at hand.
-///
-/// # Errors
-/// As [`build`].
-pub fn build_measured(measures: &Measures) -> Result<Vec<Part>, PartError> {
-    let makers: [Maker; 4] = [upper::blueprint, lower::blueprint, mould::cavity, mould::base];
-    makers.par_iter().map(|make| make(measures)?.build()).collect::<Vec<_>>().into_iter().collect()
+pub fn build(m: &Measures, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
+    let makers: [Maker; 7] = [
+        upper::blueprint,
+        lower::blueprint,
+        mould::cavity,
+        mould::base,
+        accessories::sheet,
+        accessories::stencil,
+        accessories::coupon,
+    ];
+    let jig = |i: usize| {
+        let name = if hits.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") };
+        hits.get(i).map(|hit| accessories::jig(m, &name, hit))
+    };
+    (0..makers.len() + hits.len())
+        .into_par_iter()
+        .filter_map(|i| makers.get(i).map(|make| make(m)).or_else(|| jig(i - makers.len())))
+        .map(|blueprint| {
+            let blueprint = blueprint?;
+            walls::check(&blueprint, m)?;
+            blueprint.build()
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
 }

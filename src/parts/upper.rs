@@ -3,82 +3,98 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::measures::{Measures, polar};
-use super::{Blueprint, PartError};
-use crate::mesh::{Construction, Fit, Piece, Profile, Shape};
+use super::{Blueprint, Feature, PartError};
+use crate::mesh::{Fit, Profile, Shape};
 
-pub(super) const NAME: &str = "upper_platform";
-
-/// The light channel is this much wider than the pit on each side: their side
-/// faces are then clearly apart, not almost in one plane.
-const CHANNEL_STEP_MM: f64 = 0.1;
+/// The light channel is wider than the pit by this share on each side: their
+/// side faces are then clearly apart, not almost in one plane.
+const CHANNEL_STEP: f64 = 0.04;
 
 pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     let upper = &m.platforms.upper;
     let (bottom, seat, over) = (upper.underside_z_mm, m.seat_z_mm(), m.overcut_mm);
     let top = m.upper_top_z_mm();
+    let mut b = Blueprint::new(
+        "upper_platform",
+        "upper platform: sheet seat, window, LED seats, magnet pockets; printed",
+        m.chord,
+    );
+    // All of it is open to the recess above; pockets and wire holes must keep
+    // their distance. Lip and rim are left to the check of wall thickness.
+    b.may_meet = &[
+        ("sheet recess", "window"),
+        ("sheet recess", "push-out hole"),
+        ("sheet recess", "LED pit"),
+        ("sheet recess", "light channel"),
+        ("sheet recess", "rim notch"),
+        ("sheet recess", "marker window"),
+        ("window", "marker window"),
+        ("marker window", "marker window"),
+        ("marker window", "push-out hole"),
+        ("marker window", "LED pit"),
+        ("marker window", "light channel"),
+        ("window", "push-out hole"),
+        ("window", "LED pit"),
+        ("window", "light channel"),
+        ("window", "rim notch"),
+        ("LED pit", "light channel"),
+        ("LED pit", "rim notch"),
+        ("LED pit", "LED wire hole"),
+        ("light channel", "rim notch"),
+        ("light channel", "light channel"),
+    ];
     if bottom >= seat {
-        return Err(PartError::Infeasible {
-            part: NAME,
-            place: "underside below the sheet's seat by".into(),
-            value_mm: seat - bottom,
-            limit_mm: m.process.min_wall_mm,
-            field: "platforms.upper.underside_z_mm".into(),
-        });
+        let field = "platforms.upper.underside_z_mm";
+        return Err(b.infeasible(
+            "plate under the sheet's seat",
+            seat - bottom,
+            m.process.min_wall_mm,
+            field,
+        ));
     }
     let h = 0.5 * m.outer_mm;
-    let mut genus = 0;
-    let mut c = Construction {
-        added: vec![Piece::new(
-            "plate",
-            Shape::cuboid(DVec3::new(-h.x, -h.y, bottom), DVec3::new(h.x, h.y, top)),
-        )],
-        cut: vec![],
-    };
+    let plate = Shape::cuboid(DVec3::new(-h.x, -h.y, bottom), DVec3::new(h.x, h.y, top));
+    b.added.push(Feature::new("plate", "platforms.outer_mm", plate));
 
     let recess = 0.5 * m.sheet_size_mm + glam::DVec2::splat(m.sheet.clearance_mm);
+    let wall = (h - recess).min_element();
     if upper.rim_height_mm > 0.0 {
+        if wall < m.process.min_wall_mm {
+            return Err(b.infeasible("rim round the sheet", wall, m.process.min_wall_mm, "sheet.size_mm"));
+        }
         let pocket =
             Shape::cuboid(DVec3::new(-recess.x, -recess.y, seat), DVec3::new(recess.x, recess.y, top + over));
-        c.cut.push(Piece::new("sheet recess", pocket));
+        b.cut.push(Feature::new("sheet recess", "sheet.size_mm", pocket));
     }
 
-    let window = m.view.profile(bottom, seat, top, over);
-    let opening = window.max_radius_mm();
-    if opening >= recess.min_element() {
-        return Err(PartError::Infeasible {
-            part: NAME,
-            place: "radius of the window at the seat, at most the recess's half width".into(),
-            value_mm: opening,
-            limit_mm: recess.min_element(),
-            field: "sheet.size_mm".into(),
-        });
+    let need = m.view.half_extent_mm();
+    let within = if upper.rim_height_mm > 0.0 { recess } else { h };
+    if need.cmpge(within).any() {
+        return Err(b.infeasible(
+            "half width of the window where it meets the sheet, less than the recess's",
+            need.max_element(),
+            within.min_element(),
+            "sheet.size_mm",
+        ));
     }
-    c.cut.push(Piece::new("window", Shape::Turned { profile: window, fit: Fit::Outside }));
-    genus += 1;
-
-    for (i, axis) in m.spring_axes_mm.iter().enumerate() {
-        let pocket = m.magnet_pocket(bottom, top + over, over);
-        c.cut.push(Piece::new(format!("magnet pocket {i}"), pocket).at(axis.x, axis.y));
-        // The push-out hole leads up into window, recess or rim: open above.
-        genus += i64::from(m.pockets.push_out_diameter_mm > 0.0);
+    let cone = Feature::new("window", "platforms.window_margin_mm", m.view.cone(over, top + over));
+    b.cut.push(cone);
+    for (i, (shape, placed)) in m.view.beams(over, top + over).into_iter().enumerate() {
+        let beam = Feature::new("marker window", "platforms.window_margin_mm", shape);
+        b.cut.push(beam.numbered(i).placed(placed));
     }
+    b.genus += 1;
 
+    // Their push-out holes lead up into window, recess or rim: open above.
+    m.cut_magnet_pockets(&mut b, bottom, top + over);
     for i in 0..m.leds.list.len() {
-        genus += led_seat(m, i, &mut c);
+        led_seat(m, i, &mut b);
     }
-
-    Ok(Blueprint {
-        name: NAME,
-        summary: "upper platform: sheet seat, window, LED seats, magnet pockets; printed",
-        construction: c,
-        genus,
-        chord: m.chord,
-    })
+    Ok(b)
 }
 
-/// Cuts pit, light channel and wire hole of one LED; returns the handles that
-/// they add.
-fn led_seat(m: &Measures, i: usize, c: &mut Construction) -> i64 {
+/// Cuts pit, light channel and wire hole of one LED.
+fn led_seat(m: &Measures, i: usize, b: &mut Blueprint) {
     let leds = &m.leds;
     let (top, over) = (m.upper_top_z_mm(), m.overcut_mm);
     let platform_from_led = m.platform_from_led(i);
@@ -98,24 +114,24 @@ fn led_seat(m: &Measures, i: usize, c: &mut Construction) -> i64 {
         DVec3::new(-half_width, leds.board_offset_mm - half_height, -back),
         DVec3::new(half_width, out, front),
     );
-    c.cut.push(Piece::new(format!("LED pit {i}"), pit).placed(platform_from_led));
+    b.cut.push(Feature::new("LED pit", "leds.center_radius_mm", pit).numbered(i).placed(platform_from_led));
     if let Some(notch) = rim_notch(m, &platform_from_led, half_width, back, i) {
-        c.cut.push(notch);
+        b.cut.push(notch);
     }
 
     // From the window over the lip into the pit, open above.
     let azimuth = DAffine3::from_rotation_z(leds.list[i].azimuth_deg.to_radians());
     let lip = leds.lip_top_z_mm;
     let inside_window = 0.25 * m.view.radius_mm(lip);
-    let half_channel = half_width + CHANNEL_STEP_MM;
+    let half_channel = half_width * (1.0 + CHANNEL_STEP);
     let channel = Shape::cuboid(
         DVec3::new(inside_window, -half_channel, lip),
         DVec3::new(leds.center_radius_mm, half_channel, top + over),
     );
-    c.cut.push(Piece::new(format!("light channel {i}"), channel).placed(azimuth));
+    b.cut.push(Feature::new("light channel", "leds.lip_top_z_mm", channel).numbered(i).placed(azimuth));
 
     if leds.wire_hole_diameter_mm <= 0.0 {
-        return 0;
+        return;
     }
     // Under the board's foot: behind the emitting face, so that no light goes
     // down it.
@@ -131,8 +147,10 @@ fn led_seat(m: &Measures, i: usize, c: &mut Construction) -> i64 {
         ]),
         fit: Fit::Area,
     };
-    c.cut.push(Piece::new(format!("LED wire hole {i}"), hole).at(foot.x, foot.y));
-    1
+    b.cut.push(
+        Feature::new("LED wire hole", "leds.wire_hole_diameter_mm", hole).numbered(i).at(foot.x, foot.y),
+    );
+    b.genus += 1;
 }
 
 /// Where the pit would leave less of the rim than can be printed, the rim is
@@ -143,7 +161,7 @@ fn rim_notch(
     half_width_mm: f64,
     back_mm: f64,
     i: usize,
-) -> Option<Piece> {
+) -> Option<Feature> {
     if m.platforms.upper.rim_height_mm <= 0.0 {
         return None;
     }
@@ -159,13 +177,13 @@ fn rim_notch(
     if wall >= m.process.min_wall_mm {
         return None;
     }
-    let half = half_width_mm + CHANNEL_STEP_MM;
+    let half = half_width_mm * (1.0 + CHANNEL_STEP);
     let box_out = Shape::cuboid(
         DVec3::new(m.leds.center_radius_mm, -half, seat),
         DVec3::new(2.0 * m.outer_mm.length(), half, top + over),
     );
     let turn = DAffine3::from_rotation_z(m.leds.list.get(i)?.azimuth_deg.to_radians());
-    Some(Piece::new(format!("rim notch {i}"), box_out).placed(turn))
+    Some(Feature::new("rim notch", "leds.center_radius_mm", box_out).numbered(i).placed(turn))
 }
 
 /// Pose of LED `i`: origin at the centre of its emitting face, x across the

@@ -1,105 +1,152 @@
-//! What the camera must be able to see, as a solid of revolution.
+//! What the camera must be able to see through the upper platform.
 
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::PartError;
-use crate::mesh::Profile;
+use crate::camera::Lens;
+use crate::mesh::{Fit, Profile, Shape};
 use crate::numeric::Rigid;
 use crate::optics::SensorOptics;
 
 /// Directions round a rim or marker that are followed.
-const DIRECTIONS: usize = 48;
-/// Heights at which the cone's radius is taken. The cone is the hull of
-/// straight rays, so its radius is a convex function of height, and straight
-/// lines between these heights lie outside it.
-const HEIGHTS: usize = 9;
+const DIRECTIONS: u32 = 48;
+/// Heights at which the dome's cone is taken. It is the hull of straight rays,
+/// so its radius is a convex function of height, and straight lines between
+/// these heights lie outside it.
+const HEIGHTS: u32 = 9;
 
-/// The camera's view of markers and dome below the sheet, at all spring
-/// positions, in the frame of the platform: a radius for each height.
+/// A straight ray of the camera's view in air, in the platform's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SightLine {
+    /// The entrance pupil, mm.
+    pub pupil_mm: DVec3,
+    /// Where the ray enters the sheet, mm.
+    pub sheet_mm: DVec3,
+}
+
+impl SightLine {
+    fn at_height(&self, z_mm: f64) -> DVec2 {
+        let along = self.sheet_mm - self.pupil_mm;
+        (self.pupil_mm + along * ((z_mm - self.pupil_mm.z) / along.z)).truncate()
+    }
+}
+
+/// The chief rays from the rim of a disc on the sheet's top face to the pupil,
+/// at one pose of the platform. A point that the lens cannot see has none;
+/// that the design requires it is checked elsewhere.
+pub(super) fn sight_lines(optics: &SensorOptics, center_mm: DVec2, radius_mm: f64) -> Vec<SightLine> {
+    let bottom_mm = -optics.layers().iter().skip(1).filter_map(|l| l.thickness_mm).sum::<f64>();
+    let sensor_from_camera = optics.sensor_from_camera();
+    (0..DIRECTIONS)
+        .filter_map(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS);
+            let point = (center_mm + radius_mm * DVec2::from_angle(angle)).extend(0.0);
+            let ray = optics.lens().unproject(optics.project(point).ok()?).ok()?;
+            let shift = optics.lens().pupil_shift_mm(Lens::field_angle_rad(ray)).0;
+            let pupil_mm = sensor_from_camera.point(DVec3::Z * shift);
+            let direction = sensor_from_camera.vector(ray);
+            (direction.z > 0.0).then(|| SightLine {
+                pupil_mm,
+                sheet_mm: pupil_mm + direction * ((bottom_mm - pupil_mm.z) / direction.z),
+            })
+        })
+        .collect()
+}
+
+/// The camera's view of dome and markers below the sheet at all positions of
+/// the springs, in the frame of the platform: a cone about the axis for the
+/// dome, and a slanting one for each marker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewCone {
-    /// `(radius, z)` from bottom to top, mm.
-    samples_mm: Vec<DVec2>,
+    /// `(radius, z)` of the dome's cone from bottom to top, mm.
+    cone_mm: Vec<DVec2>,
+    beams: Vec<Beam>,
     margin_mm: f64,
 }
 
+/// Circles round all rays of one marker at the lowest and highest height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Beam {
+    low_mm: DVec2,
+    low_radius_mm: f64,
+    high_mm: DVec2,
+    high_radius_mm: f64,
+}
+
 impl ViewCone {
-    /// Follows the chief rays from the rims of markers and dome, through the
-    /// sheet, down to the pupil; for every pose the largest distance from the
-    /// axis at each height counts.
+    /// Follows the rays from the rim of the dome's base and of the markers,
+    /// through the sheet, down to the pupil.
     ///
-    /// * `targets_mm`: centre on the sheet's top face and radius of each disc
-    ///   that must be seen whole (the dome's base is one of them);
-    /// * `poses`: the poses `rest_from_platform` that the springs allow;
-    /// * `low_z_mm`, `high_z_mm`: the heights between which a platform may
+    /// * `dome_radius_mm`, `markers_mm`, `marker_radius_mm`: what must be seen,
+    ///   on the sheet's top face;
+    /// * `poses`: `rest_from_platform` for every position of the springs that
+    ///   counts;
+    /// * `low_z_mm`, `high_z_mm`: the heights between which the platform may
     ///   stand in the way;
     /// * `margin_mm`: gap kept across the edge ray.
     ///
     /// # Errors
-    /// [`PartError::View`] if a pose is impossible, or nothing at all can be
-    /// seen.
+    /// [`PartError::View`] if a pose is impossible, or the dome's rim cannot be
+    /// seen at any.
     pub fn over(
         optics: &SensorOptics,
-        targets_mm: &[(DVec2, f64)],
+        dome_radius_mm: f64,
+        (markers_mm, marker_radius_mm): (&[DVec2], f64),
         poses: &[Rigid],
-        low_z_mm: f64,
-        high_z_mm: f64,
+        (low_z_mm, high_z_mm): (f64, f64),
         margin_mm: f64,
     ) -> Result<Self, PartError> {
-        let heights: Vec<f64> = (0..HEIGHTS)
-            .map(|i| low_z_mm + (high_z_mm - low_z_mm) * i as f64 / (HEIGHTS - 1) as f64)
-            .collect();
-        let mut samples_mm: Vec<DVec2> = heights.iter().map(|&z| DVec2::new(0.0, z)).collect();
-        let mut seen = 0_usize;
+        let mut rim = Vec::new();
+        let mut markers = vec![Vec::new(); markers_mm.len()];
         for pose in poses {
             let moved = optics.at_pose(pose).map_err(|error| PartError::View {
                 problem: format!("at one of the springs' positions {error}"),
                 field: "camera.position_mm".into(),
             })?;
-            let sensor_from_camera = *moved.sensor_from_camera();
-            for &(center, radius) in targets_mm {
-                for k in 0..DIRECTIONS {
-                    let angle = std::f64::consts::TAU * k as f64 / DIRECTIONS as f64;
-                    let point = (center + radius * DVec2::from_angle(angle)).extend(0.0);
-                    // A point that the lens cannot see needs no window; that
-                    // the design requires it is checked elsewhere.
-                    let Ok(pixel) = moved.project(point) else { continue };
-                    let Ok(ray) = moved.lens().unproject(pixel) else { continue };
-                    let shift = moved.lens().pupil_shift_mm(crate::camera::Lens::field_angle_rad(ray)).0;
-                    let origin = sensor_from_camera.point(DVec3::Z * shift);
-                    let direction = sensor_from_camera.vector(ray);
-                    if direction.z <= 0.0 {
-                        continue;
-                    }
-                    seen += 1;
-                    for sample in &mut samples_mm {
-                        let along = (sample.y - origin.z) / direction.z;
-                        if along > 0.0 {
-                            let p = origin + direction * along;
-                            sample.x = sample.x.max(p.truncate().length());
-                        }
-                    }
-                }
+            rim.extend(sight_lines(&moved, DVec2::ZERO, dome_radius_mm));
+            for (lines, &center) in markers.iter_mut().zip(markers_mm) {
+                lines.extend(sight_lines(&moved, center, marker_radius_mm));
             }
         }
-        if seen == 0 {
+        if rim.is_empty() {
             return Err(PartError::View {
-                problem: "neither the markers nor the dome's rim can be seen at any spring position".into(),
+                problem: "the dome's rim cannot be seen at any position of the springs".into(),
                 field: "camera.position_mm".into(),
             });
         }
-        Ok(Self { samples_mm, margin_mm })
+        let cone_mm: Vec<DVec2> = (0..HEIGHTS)
+            .map(|i| {
+                let z = low_z_mm + (high_z_mm - low_z_mm) * f64::from(i) / f64::from(HEIGHTS - 1);
+                DVec2::new(rim.iter().map(|line| line.at_height(z).length()).fold(0.0, f64::max), z)
+            })
+            .collect();
+        let beam = |lines: &Vec<SightLine>| {
+            // The circle also takes in a point inside the cone, in the same
+            // direction: beam and cone then overlap well, and no thin wall is
+            // left between them.
+            let circle = |z: f64, cone: f64| {
+                let mut points: Vec<DVec2> = lines.iter().map(|line| line.at_height(z)).collect();
+                let mean = points.iter().sum::<DVec2>() / points.len() as f64;
+                points.push(mean.normalize_or_zero() * (0.85 * cone));
+                enclosing_circle(&points)
+            };
+            let ((low_mm, low), (high_mm, high)) = (
+                circle(low_z_mm, cone_mm.first().map_or(0.0, |p| p.x)),
+                circle(high_z_mm, cone_mm.last().map_or(0.0, |p| p.x)),
+            );
+            let slope = (high - low + (high_mm - low_mm).length()) / (high_z_mm - low_z_mm);
+            let margin = margin_mm * (1.0 + slope * slope).sqrt();
+            Beam { low_mm, low_radius_mm: low + margin, high_mm, high_radius_mm: high + margin }
+        };
+        let beams = markers.iter().filter(|lines| !lines.is_empty()).map(beam).collect();
+        Ok(Self { cone_mm, beams, margin_mm })
     }
 
-    /// Radius that must be free at a height, with the margin; beyond the
-    /// sampled heights the last slope goes on.
+    /// Radius of the dome's cone at a height, with the margin; beyond the
+    /// heights that were followed the first or last slope goes on.
     pub fn radius_mm(&self, z_mm: f64) -> f64 {
-        let Some((low, high)) = self
-            .samples_mm
-            .windows(2)
-            .map(|w| (w[0], w[1]))
-            .find(|(_, high)| z_mm <= high.y)
-            .or_else(|| self.samples_mm.windows(2).last().map(|w| (w[0], w[1])))
+        let mut pairs = self.cone_mm.windows(2).map(|w| (w[0], w[1]));
+        let Some((low, high)) = pairs.clone().find(|(_, high)| z_mm <= high.y).or_else(|| pairs.next_back())
         else {
             return 0.0;
         };
@@ -108,21 +155,76 @@ impl ViewCone {
         low.x + slope * (z_mm - low.y) + self.margin_mm * (1.0 + slope * slope).sqrt()
     }
 
-    /// The window to cut into the upper platform, from below its underside to
-    /// above its top.
-    pub(super) fn profile(&self, bottom_z_mm: f64, seat_z_mm: f64, top_z_mm: f64, over_mm: f64) -> Profile {
-        let mut points = vec![];
-        let first = self.radius_mm(bottom_z_mm);
-        let second = self.radius_mm(bottom_z_mm + 0.1 * (seat_z_mm - bottom_z_mm));
-        let slope = (second - first) / (0.1 * (seat_z_mm - bottom_z_mm));
-        // Below the underside the first slope goes on, but not past the axis.
-        points.push(((first - slope * over_mm).max(0.5 * first), bottom_z_mm - over_mm));
-        let inner = self.samples_mm.iter().filter(|s| s.y > bottom_z_mm && s.y < seat_z_mm).map(|s| s.y);
-        for z in std::iter::once(bottom_z_mm).chain(inner).chain([seat_z_mm]) {
-            points.push((self.radius_mm(z), z));
-        }
-        let at_seat = self.radius_mm(seat_z_mm);
-        points.push((at_seat, top_z_mm + over_mm));
-        Profile::lines(&points)
+    /// Largest distance from the axis that the view needs, with the margin, mm.
+    pub fn max_radius_mm(&self) -> f64 {
+        let cone = self.cone_mm.last().map_or(0.0, |p| self.radius_mm(p.y));
+        self.beams.iter().map(|b| b.high_mm.length() + b.high_radius_mm).fold(cone, f64::max)
     }
+
+    /// Largest x and y that the view needs at the sheet, with the margin, mm.
+    pub(super) fn half_extent_mm(&self) -> DVec2 {
+        let cone = self.cone_mm.last().map_or(0.0, |p| self.radius_mm(p.y));
+        self.beams
+            .iter()
+            .map(|b| b.high_mm.abs() + DVec2::splat(b.high_radius_mm))
+            .fold(DVec2::splat(cone), DVec2::max)
+    }
+
+    /// The dome's cone, to cut out of the platform from `over_mm` below the
+    /// lowest height to `top_z_mm`.
+    pub(super) fn cone(&self, over_mm: f64, top_z_mm: f64) -> Shape {
+        let mut points: Vec<(f64, f64)> = self.cone_mm.iter().map(|p| (self.radius_mm(p.y), p.y)).collect();
+        if let [first, second, ..] = points[..] {
+            let slope = (second.0 - first.0) / (second.1 - first.1);
+            // Below the underside the first slope goes on, but not past the axis.
+            points.insert(0, ((first.0 - slope * over_mm).max(0.5 * first.0), first.1 - over_mm));
+        }
+        if let Some(&last) = points.last() {
+            points.push((last.0, top_z_mm));
+        }
+        Shape::Turned { profile: Profile::lines(&points), fit: Fit::Outside }
+    }
+
+    /// The markers' beams as slanting cones: a shape about its own axis, and
+    /// the shear that slants it. They end at `top_z_mm`, straight above the
+    /// sheet's seat.
+    pub(super) fn beams(&self, over_mm: f64, top_z_mm: f64) -> Vec<(Shape, DAffine3)> {
+        let (Some(low), Some(high)) = (self.cone_mm.first(), self.cone_mm.last()) else { return Vec::new() };
+        let height = high.y - low.y;
+        self.beams
+            .iter()
+            .map(|b| {
+                let slope = (b.high_radius_mm - b.low_radius_mm) / height;
+                let shift = (b.high_mm - b.low_mm) / height;
+                let first = (b.low_radius_mm - slope * over_mm).max(0.5 * b.low_radius_mm);
+                // Past the seat the slant goes on for a little, inside the recess.
+                let above = (0.02 * height).min(top_z_mm - high.y).max(1e-3 * height);
+                let points = [
+                    (first, low.y - over_mm),
+                    (b.low_radius_mm, low.y),
+                    (b.high_radius_mm, high.y),
+                    (b.high_radius_mm + slope * above, high.y + above),
+                ];
+                let shape = Shape::Turned { profile: Profile::lines(&points), fit: Fit::Outside };
+                // x, y move with z; circles stay circles.
+                let shear = DMat3::from_cols(DVec3::X, DVec3::Y, shift.extend(1.0));
+                let origin = b.low_mm - shift * low.y;
+                (shape, DAffine3 { matrix3: shear, translation: origin.extend(0.0) })
+            })
+            .collect()
+    }
+}
+
+/// A circle round all points, close to the smallest: its centre is moved
+/// towards the farthest point in shrinking steps (Badoiu and Clarkson 2003),
+/// its radius is then exact for that centre.
+fn enclosing_circle(points: &[DVec2]) -> (DVec2, f64) {
+    let farthest = |c: DVec2| points.iter().copied().max_by(|p, q| c.distance(*p).total_cmp(&c.distance(*q)));
+    let mut center = points.iter().sum::<DVec2>() / points.len().max(1) as f64;
+    for step in 1..200 {
+        if let Some(p) = farthest(center) {
+            center += (p - center) / f64::from(step + 1);
+        }
+    }
+    (center, farthest(center).map_or(0.0, |p| center.distance(p)))
 }

@@ -1,12 +1,21 @@
+mod checks;
+mod exactness;
+mod sweep;
+
 use std::path::Path;
 
 use glam::DVec3;
 
 use super::*;
-use crate::mesh::{Fit, Piece, Shape, Solid};
+use crate::design::Design;
+use crate::mesh::{Fit, Piece, RayTarget, Shape, Solid};
 
 fn thumb24() -> Design {
     crate::design::load(Path::new("designs/thumb24.json")).unwrap()
+}
+
+fn hits() -> Vec<Hit> {
+    vec![Hit::new(0.0, 0.0)]
 }
 
 fn solid(part: &Part) -> Solid {
@@ -18,7 +27,7 @@ fn every_design_gives_sound_parts() {
     for entry in std::fs::read_dir("designs").unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "json") {
-            let parts = build(&crate::design::load(&path).unwrap()).unwrap();
+            let parts = build(&Measures::of(&crate::design::load(&path).unwrap()).unwrap(), &hits()).unwrap();
             assert!(parts.len() >= 4);
             for part in &parts {
                 let found = part.inspect();
@@ -35,7 +44,7 @@ fn parts_are_the_same_bytes_on_any_number_of_threads() {
     let measures = Measures::of(&thumb24()).unwrap();
     let bytes = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let parts = pool.install(|| build_measured(&measures)).unwrap();
+        let parts = pool.install(|| build(&measures, &hits())).unwrap();
         let mut out = Vec::new();
         parts.iter().for_each(|p| p.write_stl(&mut out).unwrap());
         out
@@ -49,8 +58,8 @@ fn parts_are_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn window_lets_the_view_through() {
     let design = thumb24();
-    let parts = build(&design).unwrap();
-    let upper = solid(&parts[0]);
+    let parts = build(&Measures::of(&design).unwrap(), &hits()).unwrap();
+    let upper = RayTarget::new(&parts[0].mesh);
     let optics = design.optics();
     let marker_mm = design.sections().white_markers.diameter_mm;
     let mut rays = 0;
@@ -80,7 +89,7 @@ fn window_lets_the_view_through() {
 fn bought_parts_fit_their_seats() {
     let design = thumb24();
     let m = Measures::of(&design).unwrap();
-    let parts = build_measured(&m).unwrap();
+    let parts = build(&m, &hits()).unwrap();
     let chord = crate::mesh::Chord::new(0.001).unwrap();
     let overlap = |part: &Part, shape: Shape| {
         let tool = Piece::new("stand-in", shape).solid(chord).unwrap();
@@ -115,13 +124,16 @@ fn bought_parts_fit_their_seats() {
 fn mould_casts_the_dome() {
     let design = thumb24();
     let m = Measures::of(&design).unwrap();
-    let cavity = &build_measured(&m).unwrap()[2];
+    let cavity = &build(&m, &hits()).unwrap()[2];
     let radius = m.cavity_radius_mm();
     let expected = design.sections().dome.radius_mm / (1.0 - m.shrinkage) + m.mould.sealer_thickness_mm;
     assert!((radius - expected).abs() < 1e-12);
     // The cavity's lowest point, measured on the mesh by a ray down the axis.
     let depth = -expected - m.mould.sealer_thickness_mm;
-    let hit = solid(cavity).first_hit(DVec3::new(0.01, 0.02, 1.0), DVec3::new(0.01, 0.02, -20.0)).unwrap();
+    let hit = RayTarget::new(&cavity.mesh)
+        .first_hit(DVec3::new(0.01, 0.02, 1.0), DVec3::new(0.01, 0.02, -20.0))
+        .unwrap()
+        .0;
     assert!((1.0 - hit * 21.0 - depth).abs() < m.optical_chord.tolerance_mm(), "{hit}");
 }
 
@@ -129,15 +141,15 @@ fn mould_casts_the_dome() {
 fn contradictions_name_the_field() {
     let good = Measures::of(&thumb24()).unwrap();
     let mut bad = good.clone();
-    bad.sheet_size_mm *= 0.9;
-    let error = build_measured(&bad).unwrap_err().to_string();
+    bad.sheet_size_mm *= 0.8;
+    let error = build(&bad, &hits()).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("sheet.size_mm"), "{error}");
 
     let mut bad = good.clone();
     bad.platforms.lower.clamp.azimuth_deg = vec![90.0];
-    assert!(build_measured(&bad).unwrap_err().to_string().contains("lower_platform"));
+    assert!(build(&bad, &hits()).map(|_| ()).unwrap_err().to_string().contains("lower_platform"));
 
     let mut bad = good;
     bad.mould.pins.chamfer_mm = 5.0;
-    assert!(build_measured(&bad).unwrap_err().to_string().contains("mould.pins.chamfer_mm"));
+    assert!(build(&bad, &hits()).map(|_| ()).unwrap_err().to_string().contains("mould.pins.chamfer_mm"));
 }

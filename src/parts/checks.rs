@@ -1,0 +1,368 @@
+//! Does the assembled sensor work? Interference at every position of the
+//! springs, the camera's clearance and view, stray light, the envelope, the
+//! printer. What concerns one part alone is in [`super::walls`].
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::assembly::{Body, affine};
+use super::measures::Measures;
+use super::view::sight_lines;
+use super::{Assembly, Part, PartError, bought};
+use crate::mesh::{BoundingBox, Chord, MeshError, Piece, RayTarget, Solid, TriMesh};
+use crate::numeric::Rigid;
+
+/// Bodies may share this much before it is called interference, mm^3: faces
+/// that bear on each other are cut from the same numbers and may overlap by
+/// rounding.
+const TOUCHING_MM3: f64 = 1e-4;
+/// Stand-ins in these checks are meshed no finer than this, mm.
+const CHORD_MM: f64 = 0.03;
+
+/// Runs every check of the assembled sensor.
+///
+/// # Errors
+/// The first failure: which parts, where, value, limit, which design field.
+pub fn check_assembly(m: &Measures, parts: &[Part], assembly: &Assembly) -> Result<(), PartError> {
+    process(m, parts)?;
+    envelope(m, assembly)?;
+    let chord = Chord::new(CHORD_MM.max(m.chord.tolerance_mm())).map_err(|e| mesh_error("assembly", e))?;
+    let scene = Scene::of(m, assembly, chord)?;
+    scene.within_bodies()?;
+    m.poses
+        .par_iter()
+        .map(|(name, pose)| {
+            scene.between_bodies(m, name, pose, chord)?;
+            camera_gap(m, name, pose)?;
+            scene.view(m, name, pose)?;
+            scene.stray_light(m, name, pose)
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
+}
+
+fn mesh_error(part: &str, error: MeshError) -> PartError {
+    PartError::Mesh { part: part.to_owned(), error }
+}
+
+fn infeasible(part: &str, place: String, value_mm: f64, limit_mm: f64, field: &str) -> PartError {
+    PartError::Infeasible { part: part.to_owned(), place, value_mm, limit_mm, field: field.to_owned() }
+}
+
+/// The design field that moves an item.
+fn field_of(name: &str) -> &'static str {
+    match name.split(' ').next().unwrap_or(name) {
+        "upper_platform" => "platforms.upper",
+        "lower_platform" => "platforms.lower",
+        "acrylic_sheet" => "sheet",
+        "camera" => "camera.position_mm",
+        "dome" => "dome.radius_mm",
+        "spring" => "springs.places",
+        "LED" => "leds.center_radius_mm",
+        _ => "magnets",
+    }
+}
+
+/// Lengths that the process limits, and the printer's room.
+fn process(m: &Measures, parts: &[Part]) -> Result<(), PartError> {
+    let p = &m.process;
+    let holes = [
+        (
+            "upper_platform",
+            "push-out hole",
+            m.pockets.push_out_diameter_mm,
+            "magnet_pockets.push_out_diameter_mm",
+        ),
+        ("upper_platform", "LED wire hole", m.leds.wire_hole_diameter_mm, "leds.wire_hole_diameter_mm"),
+        (
+            "lower_platform",
+            "wire hole",
+            m.platforms.lower.wire_hole_diameter_mm,
+            "platforms.lower.wire_hole_diameter_mm",
+        ),
+        (
+            "lower_platform",
+            "clamp hole",
+            m.platforms.lower.clamp.hole_diameter_mm,
+            "platforms.lower.clamp.hole_diameter_mm",
+        ),
+        (
+            "lower_platform",
+            "mounting hole",
+            m.platforms.lower.mounting.hole_diameter_mm,
+            "platforms.lower.mounting.hole_diameter_mm",
+        ),
+        ("mould_base", "fill hole", m.mould.fill.diameter_mm, "mould.fill.diameter_mm"),
+        ("mould_base", "vent", m.mould.vents.diameter_mm, "mould.vents.diameter_mm"),
+        ("marker_stencil", "marker hole", 2.0 * m.marker_radius_mm, "white_markers.diameter_mm"),
+    ];
+    for (part, what, diameter, field) in holes {
+        // Zero stands for no such hole.
+        if diameter > 0.0 && diameter < p.min_hole_diameter_mm {
+            return Err(infeasible(
+                part,
+                format!("diameter of the {what}"),
+                diameter,
+                p.min_hole_diameter_mm,
+                field,
+            ));
+        }
+    }
+    let pins = &m.mould.pins;
+    if pins.diameter_mm < p.min_pin_diameter_mm {
+        let place = "diameter of the register pins".to_owned();
+        return Err(infeasible(
+            "mould_base",
+            place,
+            pins.diameter_mm,
+            p.min_pin_diameter_mm,
+            "mould.pins.diameter_mm",
+        ));
+    }
+    let gaps = [
+        ("mould_base", "gap round the register pins", pins.clearance_mm, "mould.pins.clearance_mm"),
+        (
+            "lower_platform",
+            "gap round the camera",
+            m.camera_body.bore_clearance_mm,
+            "camera_body.bore_clearance_mm",
+        ),
+        ("upper_platform", "gap round the sheet", m.sheet.clearance_mm, "sheet.clearance_mm"),
+        ("upper_platform", "gap round the LED boards", m.leds.clearance_mm, "leds.clearance_mm"),
+        ("print_jig", "gap round the sheet", m.jig.clearance_mm, "jig.clearance_mm"),
+    ];
+    for (part, place, gap, field) in gaps {
+        if gap < p.min_gap_mm * (1.0 - 1e-9) {
+            return Err(infeasible(part, place.to_owned(), gap, p.min_gap_mm, field));
+        }
+    }
+    for part in parts {
+        // A part may lie on any of its sides in the printer.
+        let mut size = part.bounds.size_mm().to_array();
+        let mut room = p.build_volume_mm;
+        size.sort_by(f64::total_cmp);
+        room.sort_by(f64::total_cmp);
+        for (length, limit) in size.into_iter().zip(room) {
+            if length > limit {
+                let place = "side length, at most the printer's".to_owned();
+                return Err(infeasible(&part.name, place, length, limit, "process.build_volume_mm"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The whole stack at rest, the membrane included, fits its envelope.
+fn envelope(m: &Measures, assembly: &Assembly) -> Result<(), PartError> {
+    let membrane = bought::membrane(m);
+    let membrane = membrane.shape.triangulate("membrane", m.chord).map_err(|e| mesh_error("membrane", e))?;
+    let all = assembly.items.iter().filter_map(|item| item.mesh.bounds()).chain(membrane.bounds());
+    let Some(bounds) = all.reduce(|a, b| a.union(&b)) else { return Ok(()) };
+    let size = bounds.size_mm();
+    // Rounding to f32 may add a little to a length that fits exactly.
+    let slack = 1e-6 * size.max_element();
+    for (axis, value, limit) in
+        [("x", size.x, m.envelope_mm.x), ("y", size.y, m.envelope_mm.y), ("z", size.z, m.envelope_mm.z)]
+    {
+        if value > limit + slack {
+            let place = format!("length of the whole sensor along {axis}, at most the envelope's");
+            return Err(infeasible("assembly", place, value, limit, "envelope.size_mm"));
+        }
+    }
+    Ok(())
+}
+
+/// The camera's front keeps its gap to the sheet.
+fn camera_gap(m: &Measures, when: &str, pose: &Rigid) -> Result<(), PartError> {
+    // In full travel the sheet may come down to the camera, which is then the
+    // stop; the gap is promised for rest and the claimed loads.
+    if when.starts_with("at ") && when != "at rest" {
+        return Ok(());
+    }
+    let platform_from_rest = pose.inverse();
+    let radius = 0.5 * m.camera_body.diameter_mm;
+    let gap = (0..32)
+        .map(|k| {
+            let rim = radius * DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / 32.0);
+            let front = m.sensor_from_camera.transform_point3(rim.extend(m.camera_body.front_from_pupil_mm));
+            m.seat_z_mm() - platform_from_rest.point(front).z
+        })
+        .fold(f64::INFINITY, f64::min);
+    let limit = m.camera_body.min_sheet_gap_mm;
+    if gap < limit {
+        let place = format!("gap between the camera's front and the sheet {when}");
+        return Err(infeasible("camera", place, gap, limit, "camera_body.min_sheet_gap_mm"));
+    }
+    Ok(())
+}
+
+struct Thing {
+    name: String,
+    solid: Solid,
+    bounds: BoundingBox,
+}
+
+impl Thing {
+    fn new(name: &str, solid: Solid) -> Option<Self> {
+        let bounds = solid.to_mesh().bounds()?;
+        Some(Self { name: name.to_owned(), solid, bounds })
+    }
+
+    /// Refuses a shared volume; says where its middle is.
+    fn apart_from(&self, other: &Self, when: &str) -> Result<(), PartError> {
+        if self.bounds.is_apart_from(&other.bounds) {
+            return Ok(());
+        }
+        let shared = self.solid.intersection(&other.solid).map_err(|e| mesh_error(&self.name, e))?;
+        let Some(shared) = shared else { return Ok(()) };
+        let volume = shared.volume_mm3();
+        if volume <= TOUCHING_MM3 {
+            return Ok(());
+        }
+        let middle = shared.to_mesh().bounds().map_or(DVec3::ZERO, |b| 0.5 * (b.min_mm + b.max_mm));
+        let place = format!(
+            "shares {volume:.4} mm3 with {} {when}, about ({:.2}, {:.2}, {:.2}); depth",
+            other.name, middle.x, middle.y, middle.z
+        );
+        let depth = shared.to_mesh().bounds().map_or(0.0, |b| b.size_mm().min_element());
+        let field = format!("{} or {}", field_of(&self.name), field_of(&other.name));
+        Err(PartError::Infeasible { part: self.name.clone(), place, value_mm: depth, limit_mm: 0.0, field })
+    }
+}
+
+struct Scene {
+    fixed: Vec<Thing>,
+    moving: Vec<Thing>,
+    /// The upper platform, which could stand in a ray.
+    upper: RayTarget,
+}
+
+impl Scene {
+    fn of(m: &Measures, assembly: &Assembly, chord: Chord) -> Result<Self, PartError> {
+        let coarse = |piece: &Piece| piece.solid(chord).map_err(|e| mesh_error(&piece.name, e));
+        let mut scene =
+            Self { fixed: Vec::new(), moving: Vec::new(), upper: RayTarget::new(&TriMesh::default()) };
+        for item in &assembly.items {
+            let solid = match item.name.as_str() {
+                "dome" => coarse(&bought::dome(m))?,
+                "camera" => coarse(&bought::camera(m))?,
+                _ if item.body == Body::Spring => continue,
+                _ => item.solid().map_err(|e| mesh_error(&item.name, e))?,
+            };
+            if item.name == "upper_platform" {
+                scene.upper = RayTarget::new(&item.mesh);
+            }
+            let list = if item.body == Body::Fixed { &mut scene.fixed } else { &mut scene.moving };
+            list.extend(Thing::new(&item.name, solid));
+        }
+        Ok(scene)
+    }
+
+    /// Things of one body never move against each other: once is enough.
+    fn within_bodies(&self) -> Result<(), PartError> {
+        for list in [&self.fixed, &self.moving] {
+            for (i, one) in list.iter().enumerate() {
+                for other in &list[i + 1..] {
+                    one.apart_from(other, "always")?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn between_bodies(&self, m: &Measures, when: &str, pose: &Rigid, chord: Chord) -> Result<(), PartError> {
+        let rest_from_platform = affine(pose);
+        let moved = |thing: &Thing| {
+            let solid = thing.solid.moved(&rest_from_platform).map_err(|e| mesh_error(&thing.name, e))?;
+            Ok(Thing::new(&thing.name, solid))
+        };
+        // Boxes first: most things are far apart, and moving a solid costs.
+        for thing in &self.moving {
+            let bounds = thing.bounds.transformed(&rest_from_platform);
+            let near: Vec<&Thing> = self.fixed.iter().filter(|t| !t.bounds.is_apart_from(&bounds)).collect();
+            if let (false, Some(one)) = (near.is_empty(), moved(thing)?) {
+                near.into_iter().try_for_each(|other| one.apart_from(other, when))?;
+            }
+        }
+        for i in 0..m.spring_axes_mm.len() {
+            let tube = bought::spring_envelope(m, i, pose);
+            let solid = tube.solid(chord).map_err(|e| mesh_error(&tube.name, e))?;
+            let Some(spring) = Thing::new(&tube.name, solid) else { continue };
+            // A tilted tube digs into the magnets and platforms that it bears
+            // on; what counts is what it may not touch.
+            let bears_on = |t: &&Thing| t.name.contains("magnet") || t.name.ends_with("_platform");
+            for other in self.fixed.iter().filter(|t| !bears_on(t)) {
+                spring.apart_from(other, when)?;
+            }
+            for thing in self.moving.iter().filter(|t| !bears_on(t)) {
+                if thing.bounds.transformed(&rest_from_platform).is_apart_from(&spring.bounds) {
+                    continue;
+                }
+                if let Some(other) = moved(thing)? {
+                    spring.apart_from(&other, when)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Every ray of dome's rim and markers that the lens can see reaches it.
+    fn view(&self, m: &Measures, when: &str, pose: &Rigid) -> Result<(), PartError> {
+        let moved = m.optics.at_pose(pose).map_err(|error| PartError::View {
+            problem: format!("{when}: {error}"),
+            field: "camera.position_mm".into(),
+        })?;
+        let discs = m.markers_mm.iter().map(|&at| ("a white marker", at, m.marker_radius_mm));
+        for (what, center, radius) in discs.chain([("the dome's rim", DVec2::ZERO, m.dome_radius_mm)]) {
+            for line in sight_lines(&moved, center, radius) {
+                let under = line.pupil_mm.lerp(line.sheet_mm, 1.0 - 1e-6);
+                if let Some((fraction, _)) = self.upper.first_hit(line.pupil_mm, under) {
+                    let at = line.pupil_mm.lerp(under, fraction);
+                    let place = format!(
+                        "stands before {what} {when}, at ({:.2}, {:.2}, {:.2}) of the platform; depth",
+                        at.x, at.y, at.z
+                    );
+                    return Err(infeasible("upper_platform", place, 0.0, 0.0, "platforms.window_margin_mm"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// No straight way leads from an LED's emitting face to the lens.
+    fn stray_light(&self, m: &Measures, when: &str, pose: &Rigid) -> Result<(), PartError> {
+        let platform_from_rest = pose.inverse();
+        let lens_points: Vec<DVec3> = [0.0, 0.5, 1.0]
+            .into_iter()
+            .flat_map(|share| (0..12).map(move |k| (share, std::f64::consts::TAU * f64::from(k) / 12.0)))
+            .map(|(share, angle)| {
+                let flat = 0.5 * share * m.camera_body.lens_diameter_mm * DVec2::from_angle(angle);
+                let front =
+                    m.sensor_from_camera.transform_point3(flat.extend(m.camera_body.front_from_pupil_mm));
+                platform_from_rest.point(front)
+            })
+            .collect();
+        let h = 0.5 * m.leds.emitter_mm;
+        for i in 0..m.leds.list.len() {
+            let led = m.platform_from_led(i);
+            for (x, y) in [-1.0, 0.0, 1.0].into_iter().flat_map(|x| [-1.0, 0.0, 1.0].map(|y| (x * h, y * h)))
+            {
+                let from = led.transform_point3(DVec3::new(x, y, 1e-3 * h));
+                for &to in &lens_points {
+                    let faces_away = (to - from).dot(led.matrix3.z_axis) <= 0.0;
+                    if faces_away || self.upper.first_hit(from, to).is_some() {
+                        continue;
+                    }
+                    let place = format!(
+                        "LED {i} shines straight into the lens {when}, from ({:.2}, {:.2}, {:.2}); height of the lip",
+                        from.x, from.y, from.z
+                    );
+                    let lip = m.leds.lip_top_z_mm;
+                    return Err(infeasible("upper_platform", place, lip, lip + h, "leds.lip_top_z_mm"));
+                }
+            }
+        }
+        Ok(())
+    }
+}

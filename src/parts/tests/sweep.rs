@@ -1,0 +1,222 @@
+//! Random designs: parts that pass, or a refusal that names a field.
+
+use proptest::prelude::RngExt;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use serde_json::{Value, json};
+
+use super::*;
+
+/// Multiplies every length of a section tree by `scale`.
+fn scale_lengths(value: &mut Value, scale: f64, is_length: bool) {
+    match value {
+        Value::Object(map) => {
+            for (key, inner) in map.iter_mut() {
+                let named = key.ends_with("_mm");
+                scale_lengths(inner, scale, named || (is_length && inner.is_array()));
+            }
+        }
+        Value::Array(list) => list.iter_mut().for_each(|inner| scale_lengths(inner, scale, is_length)),
+        Value::Number(number) if is_length => *value = json!(number.as_f64().unwrap() * scale),
+        _ => {}
+    }
+}
+
+fn random_design(rng: &mut TestRng, index: usize) -> Value {
+    let text = std::fs::read_to_string("designs/thumb24.json").unwrap();
+    let mut d: Value = serde_json::from_str(&text).unwrap();
+    let size_mm = rng.random_range(12.0..60.0_f64);
+    let scale = size_mm / 24.0;
+    scale_lengths(&mut d, scale, false);
+    d["name"] = json!(format!("random-{index}"));
+    // Loads that press the springs as far as the scaled original's.
+    for claim in d["loads"]["claims"].as_array_mut().unwrap() {
+        for x in claim["force_n"].as_array_mut().unwrap() {
+            *x = json!(x.as_f64().unwrap() * scale * scale * 0.8);
+        }
+        claim.as_object_mut().unwrap().remove("moment_nmm");
+    }
+    let n = rng.random_range(3..=8_u32);
+    let step = 360.0 / f64::from(n);
+    // Gaps between springs at multiples of the step; with four springs off
+    // the markers' diagonals half of the time.
+    let first = if n == 4 && rng.random_bool(0.5) { 0.0 } else { 0.5 * step };
+    d["springs"]["places"]["ring"]["count"] = json!(n);
+    d["springs"]["places"]["ring"]["first_azimuth_deg"] = json!(first);
+    let gaps: Vec<f64> = (0..n).map(|k| (first + step * (f64::from(k) + 0.5)) % 360.0).collect();
+    // LEDs where there is room behind them, clamps and cable in other gaps.
+    let (mut lit, mut free): (Vec<f64>, Vec<f64>) = gaps.iter().partition(|gap| {
+        n <= 6 && [0.0, 90.0, 120.0, 180.0, 240.0, 270.0].iter().any(|good| (*gap - good).abs() < 1e-9)
+    });
+    while lit.len() > rng.random_range(0..5_usize) {
+        free.extend(lit.pop());
+    }
+    let colors = ["red", "green", "blue", "white"];
+    d["leds"]["list"] =
+        lit.iter().enumerate().map(|(k, gap)| json!({"color": colors[k % 4], "azimuth_deg": gap})).collect();
+    d["leds"]["tilt_deg"] = json!(rng.random_range(84.0..88.0_f64));
+    let lower = &mut d["platforms"]["lower"];
+    match free.pop() {
+        Some(gap) => lower["cable_exit"]["azimuth_deg"] = json!(gap),
+        None => lower["cable_exit"]["width_mm"] = json!(0.0),
+    }
+    free.truncate(rng.random_range(0..3_usize));
+    lower["clamp"]["azimuth_deg"] = json!(free);
+    if rng.random_bool(0.3) {
+        lower["cable_exit"]["width_mm"] = json!(0.0);
+    }
+    if rng.random_bool(0.3) {
+        lower["wire_hole_diameter_mm"] = json!(0.0);
+        d["leds"]["wire_hole_diameter_mm"] = json!(0.0);
+    }
+    if rng.random_bool(0.3) {
+        d["magnet_pockets"]["push_out_diameter_mm"] = json!(0.0);
+    }
+    if rng.random_bool(0.2) {
+        d["platforms"]["upper"]["rim_height_mm"] = json!(0.0);
+    }
+    d["mould"]["vents"]["count"] = json!(rng.random_range(0..9_u32));
+    d["mould"]["vents"]["first_azimuth_deg"] = json!(rng.random_range(0.0..90.0_f64));
+    d["coupon"]["steps"] = json!(rng.random_range(1..5_u32));
+    d["mesh"]["chord_tolerance_mm"] = json!(rng.random_range(0.01..0.1_f64));
+    d["mesh"]["optical_chord_tolerance_mm"] = json!(rng.random_range(0.01..0.1_f64));
+    // Every third keeps the real printer's limits, which small ones must fail.
+    if index.is_multiple_of(3) {
+        d["process"]["min_wall_mm"] = json!(0.6);
+        d["process"]["min_hole_diameter_mm"] = json!(0.5);
+    }
+    d["process"]["build_volume_mm"] = json!([400.0, 400.0, 200.0]);
+    d
+}
+
+fn sweep(count: usize) -> (usize, Vec<String>) {
+    let mut runner =
+        TestRunner::new_with_rng(Config::default(), TestRng::from_seed(RngAlgorithm::ChaCha, &[7; 32]));
+    let mut rng = runner.new_rng();
+    let (mut sound, mut refused) = (0, Vec::new());
+    for index in 0..count {
+        let text = random_design(&mut rng, index).to_string();
+        let design = match crate::design::from_text(&text) {
+            Ok(design) => design,
+            Err(error) => {
+                assert!(!error.field.is_empty(), "{error}");
+                refused.push(format!("design: {}", error.field));
+                continue;
+            }
+        };
+        let made = Measures::of(&design).and_then(|m| {
+            let hits = [Hit::new(0.0, 0.0), Hit::new(0.02 * (index % 40) as f64, index as f64)];
+            let parts = build(&m, &hits)?;
+            let assembly = Assembly::of(&m, &parts)?;
+            check_assembly(&m, &parts, &assembly)?;
+            Ok(parts)
+        });
+        match made {
+            Ok(parts) => {
+                sound += 1;
+                for part in parts {
+                    let found = part.inspect();
+                    assert!(
+                        found.is_one_solid() && found.genus() == Some(part.genus),
+                        "{index}: {}",
+                        part.name
+                    );
+                    assert!((found.volume_mm3 / part.volume_mm3 - 1.0).abs() < 1e-5);
+                }
+            }
+            Err(PartError::Infeasible { field, place, .. }) => {
+                assert!(!field.is_empty());
+                refused.push(format!("{field}: {place}"));
+            }
+            Err(PartError::View { field, problem }) => refused.push(format!("{field}: {problem}")),
+            Err(other) => panic!("design {index} is neither made nor refused by field: {other}\n{text}"),
+        }
+    }
+    (sound, refused)
+}
+
+#[test]
+fn random_designs_pass_or_are_refused_by_field() {
+    let (sound, refused) = sweep(10);
+    assert!(sound >= 2, "only {sound} designs were made; refused: {refused:#?}");
+}
+
+#[test]
+fn long_two_hundred_random_designs() {
+    let (sound, refused) = sweep(220);
+    println!("{sound} made, {} refused", refused.len());
+    for reason in &refused {
+        println!("  {reason}");
+    }
+    assert!(sound >= 50, "only {sound} designs were made; refused: {refused:#?}");
+}
+
+/// Shapes that kernels stumble over: pockets that touch the window, flush
+/// faces, a pocket almost through, tiny and huge parts.
+#[test]
+fn awkward_parts_are_sound_or_refused() {
+    let base = Measures::of(&thumb24()).unwrap();
+    let outcomes: Vec<(&str, Measures)> = vec![
+        ("pocket tangent to the bore", {
+            let mut m = base.clone();
+            let touch = m.bore_radius_mm() + m.pocket_mm().0;
+            m.spring_axes_mm[0] = glam::DVec2::new(0.0, touch);
+            m
+        }),
+        ("pocket as deep as the plate less a micrometre", {
+            let mut m = base.clone();
+            m.magnets.thickness_mm = m.lower_top_z_mm - m.platforms.lower.underside_z_mm - 0.001;
+            m.pockets.depth_clearance_mm = 0.0;
+            m.pockets.push_out_diameter_mm = 0.0;
+            m
+        }),
+        ("cable exit flush with the top", {
+            let mut m = base.clone();
+            m.platforms.lower.cable_exit.height_mm = m.lower_top_z_mm - m.platforms.lower.underside_z_mm;
+            m
+        }),
+        ("rim flush with the seat", {
+            let mut m = base.clone();
+            m.platforms.upper.rim_height_mm = 0.0;
+            m
+        }),
+        ("lip flush with the seat", {
+            let mut m = base.clone();
+            m.leds.lip_top_z_mm = m.seat_z_mm();
+            m
+        }),
+    ];
+    for limit in [0.6, 0.0] {
+        for (name, m) in &outcomes {
+            let mut m = m.clone();
+            m.process.min_wall_mm = limit;
+            match build(&m, &hits()) {
+                Ok(parts) => parts.iter().for_each(|part| part.check().unwrap()),
+                Err(PartError::Infeasible { field, .. }) => assert!(!field.is_empty(), "{name}"),
+                // Without a limit for walls, touching features are let
+                // through to the mesh, which must then be refused as such.
+                Err(PartError::Broken { .. }) if limit == 0.0 => {}
+                Err(other) => panic!("{name}: {other}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn parts_of_a_millimetre_and_of_two_hundred_are_sound() {
+    for size_mm in [1.0, 200.0] {
+        let text = std::fs::read_to_string("designs/thumb24.json").unwrap();
+        let mut d: Value = serde_json::from_str(&text).unwrap();
+        let scale = size_mm / 24.0;
+        scale_lengths(&mut d, scale, false);
+        d["loads"]["claims"] = json!([]);
+        d["sheet"]["kerf_mm"] = json!(0.1);
+        // The same number of triangles at every size.
+        d["mesh"]["chord_tolerance_mm"] = json!((0.03 * scale).max(1e-3));
+        d["mesh"]["optical_chord_tolerance_mm"] = json!((0.03 * scale).max(1e-3));
+        let design = crate::design::from_text(&d.to_string()).unwrap();
+        let m = Measures::of(&design).unwrap();
+        for part in build(&m, &hits()).unwrap() {
+            part.check().unwrap();
+        }
+    }
+}

@@ -53,10 +53,12 @@ pub(super) struct BrownConrady {
     end: f64,
     /// Bound on the second derivative of the tangential terms.
     tangential_bend: f64,
+    max_radius: f64,
     inverse: RadialInverse,
 }
 
 /// `L`, and its derivative by `u`.
+#[inline]
 fn factor(n: &[f64; 3], d: &[f64; 3], u: f64) -> (f64, f64) {
     let top = 1.0 + u * (n[0] + u * (n[1] + u * n[2]));
     let top_slope = n[0] + u * (2.0 * n[1] + u * 3.0 * n[2]);
@@ -70,6 +72,7 @@ fn factor(n: &[f64; 3], d: &[f64; 3], u: f64) -> (f64, f64) {
 }
 
 /// `rho = r L` and its derivative by `r`.
+#[inline]
 fn radius(n: &[f64; 3], d: &[f64; 3], r: f64) -> (f64, f64) {
     let u = r * r;
     let (value, slope) = factor(n, d, u);
@@ -92,7 +95,8 @@ impl BrownConrady {
         };
         let inverse = RadialInverse::new(|r| radius(&numerator, &denominator, r), end)?;
         let tangential_bend = 6.0 * q.length();
-        Some(Self { numerator, denominator, q, domain, end, tangential_bend, inverse })
+        let max_radius = inverse.end_image() + 3.0 * q.length() * end * end;
+        Some(Self { numerator, denominator, q, domain, end, tangential_bend, max_radius, inverse })
     }
 
     pub fn domain(&self) -> &Domain {
@@ -102,7 +106,7 @@ impl BrownConrady {
     /// Largest image radius: `|f|^2` on a circle is convex in the cosine of
     /// the azimuth from `q`, and largest along `q`.
     pub fn max_radius(&self) -> f64 {
-        self.inverse.end_image() + 3.0 * self.q.length() * self.end * self.end
+        self.max_radius
     }
 
     fn image(&self, x: DVec2) -> DVec2 {
@@ -111,6 +115,7 @@ impl BrownConrady {
         x * (l + 2.0 * self.q.dot(x)) + self.q * u
     }
 
+    #[inline]
     fn image_with_slope(&self, x: DVec2) -> (DVec2, DMat2) {
         let u = x.length_squared();
         let (l, slope) = factor(&self.numerator, &self.denominator, u);
@@ -132,6 +137,7 @@ impl BrownConrady {
         Ok((image, plane_by_ray(ray, point, slope)))
     }
 
+    #[inline]
     pub fn unproject(&self, image: DVec2) -> Result<DVec3, LensLimit> {
         Ok(ray_of(self.plane_of(image)?))
     }
@@ -143,6 +149,7 @@ impl BrownConrady {
     }
 
     /// The point of the domain that `f` sends to `image`.
+    #[inline]
     fn plane_of(&self, image: DVec2) -> Result<DVec2, LensLimit> {
         let limit = self.domain.limit;
         let distance = image.length();
@@ -178,19 +185,28 @@ impl BrownConrady {
     /// Newton's method without damping, from the radial inverse corrected for
     /// the tangential terms to first order. It gives up (and leaves the work
     /// to the damped solve) unless the steps shrink as they should.
+    #[inline]
     fn quick_plane_of(&self, image: DVec2, distance: f64) -> Option<DVec2> {
-        let Start { x: start, slope, bend } = self.inverse.start(distance);
+        let Start { x: r, slope, bend_value, bend } = self.inverse.start(distance);
         // Second derivative of f: rho'' along the radius, 2 r L' across, both
         // bounded by the bend; 6 |q| from the tangential terms.
         let bend = 3.0 * bend + self.tangential_bend;
+        // At the radial inverse f is off by the tangential terms alone. In
+        // polar coordinates everything is known from the table: a first step,
+        // then the curvature's share of it.
         let e = image * (1.0 / distance);
-        let mut x = e * start;
-        // Along e the inverse of the Jacobian is the table's slope, across it
-        // r / rho.
-        let offset = self.q * (start * start) + x * (2.0 * self.q.dot(x));
-        let along = e.dot(offset);
-        let across = offset - e * along;
-        x -= e * (along * slope) + across * (start / distance);
+        let per_r = 1.0 / r;
+        let (q_r, q_t) = (self.q.dot(e), self.q.dot(e.perp()));
+        let (rho_slope, level) = (1.0 / slope, distance * per_r);
+        let (a, b, c) = (rho_slope + 6.0 * q_r * r, 2.0 * q_t * r, level + 2.0 * q_r * r);
+        let scale = 1.0 / (a * c - b * b);
+        let solve =
+            |along: f64, across: f64| ((c * along - b * across) * scale, (a * across - b * along) * scale);
+        let (d_r, d_t) = solve(3.0 * q_r * r * r, q_t * r * r);
+        let level_slope = (rho_slope - level) * per_r;
+        let (c_r, c_t) =
+            solve(0.5 * (bend_value * d_r * d_r + level_slope * d_t * d_t), level_slope * d_r * d_t);
+        let mut x = e * (r - d_r - c_r) - e.perp() * (d_t + c_t);
         for _ in 0..QUICK_PLANE_STEPS {
             let (value, j) = self.image_with_slope(x);
             let error = value - image;

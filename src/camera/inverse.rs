@@ -47,6 +47,7 @@ impl Spread {
     }
 
     /// `s^2` and its derivative by the image radius.
+    #[inline]
     fn square(&self, image: f64) -> (f64, f64) {
         if self.knee == 0.0 {
             return (1.0 - image * self.per_end, -self.per_end);
@@ -72,6 +73,8 @@ pub(super) struct Start {
     /// Its derivative by the image radius, infinite or far off only at the
     /// domain's very end.
     pub slope: f64,
+    /// f'' there, roughly.
+    pub bend_value: f64,
     /// Largest |f''| around.
     pub bend: f64,
 }
@@ -138,16 +141,26 @@ impl RadialInverse {
     }
 
     /// A first guess for `image` in `[0, f(end)]`.
+    #[inline]
     pub fn start(&self, image: f64) -> Start {
         let (square, square_slope) = self.spread.square(image);
         let s = square.max(0.0).sqrt() * PIECES as f64;
         let i = (s as usize).min(PIECES - 1);
         let t = s - i as f64;
         let [x0, c1, c2, c3] = self.pieces[i];
-        let by_t = c1 + t * (2.0 * c2 + t * (3.0 * c3));
+        let by_s = c1 + t * (2.0 * c2 + t * (3.0 * c3));
+        let by_s_twice = 2.0 * c2 + t * (6.0 * c3);
+        // s^2 = PIECES^2 square, so s' = PIECES^2 square' / (2 s) and
+        // s'' = -s'^2 / s + PIECES^2 square'' / (2 s); the last is zero or
+        // small enough to leave out of a guess.
+        let s_slope = (0.5 * (PIECES * PIECES) as f64) * square_slope / s;
+        let slope = by_s * s_slope;
+        let twice = s_slope * s_slope * (by_s_twice - by_s / s);
         Start {
             x: x0 + t * (c1 + t * (c2 + t * c3)),
-            slope: by_t * (0.5 * (PIECES * PIECES) as f64) * square_slope / s,
+            slope,
+            // f'' of the inverse function: -x'' / x'^3.
+            bend_value: -twice / (slope * slope * slope),
             bend: self.bends[i],
         }
     }
@@ -155,6 +168,7 @@ impl RadialInverse {
     /// The `x` in `[0, end]` with `f(x) = image`; `f` as in [`Self::new`].
     /// `None` past the end. Bounded by `QUICK_STEPS` Newton steps plus
     /// [`crate::numeric::MAX_ITERATIONS`] in a bracket.
+    #[inline]
     pub fn solve(&self, image: f64, f: impl Fn(f64) -> (f64, f64)) -> Option<f64> {
         if image > self.end_image {
             let rounding = self.end_image * super::limit::END_ROUNDING;

@@ -87,10 +87,12 @@ impl KannalaBrandt {
         Ok((DVec2::new(ray.x, ray.y) * around, jacobian))
     }
 
+    #[inline]
     fn angle(&self, image_radius: f64) -> Result<f64, LensLimit> {
         self.inverse.solve(image_radius, |theta| radius(&self.k, theta)).ok_or(self.domain.limit)
     }
 
+    #[inline]
     pub fn unproject(&self, image: DVec2) -> Result<DVec3, LensLimit> {
         let image_radius = image.length();
         let theta = self.angle(image_radius)?;
@@ -121,6 +123,7 @@ impl KannalaBrandt {
 }
 
 /// Image radius and its derivative by the field angle.
+#[inline]
 fn radius(k: &[f64; 4], theta: f64) -> (f64, f64) {
     let u = theta * theta;
     let value = theta * (1.0 + u * (k[0] + u * (k[1] + u * (k[2] + u * k[3]))));
@@ -150,6 +153,7 @@ impl Turns {
         Self { per_step: 1.0 / step, step, table: (0..=TURNS).map(at).collect() }
     }
 
+    #[inline]
     fn sin_cos(&self, angle: f64) -> (f64, f64) {
         let i = ((angle * self.per_step + 0.5) as usize).min(TURNS);
         let [sin, cos] = self.table[i];

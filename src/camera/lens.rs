@@ -22,6 +22,8 @@ pub struct Lens {
     spec: LensSpec,
     formula: Formula,
     pupil: PupilShift,
+    /// Reciprocals of the focal lengths: a product costs a quarter of a quotient.
+    per_focal: DVec2,
 }
 
 #[derive(Debug, Clone)]
@@ -61,7 +63,8 @@ impl Lens {
         .ok_or_else(LensSpec::no_domain)?;
         let end_rad = each!(&formula, model => model.domain().end_rad);
         let pupil = PupilShift::new(&spec.pupil_shift_mm, end_rad);
-        Ok(Self { spec, formula, pupil })
+        let per_focal = DVec2::new(1.0 / spec.matrix[0][0], 1.0 / spec.matrix[1][1]);
+        Ok(Self { spec, formula, pupil, per_focal })
     }
 
     /// What the lens was made from.
@@ -107,8 +110,8 @@ impl Lens {
     }
 
     fn image_of(&self, pixel: DVec2) -> DVec2 {
-        let [[fx, _, cx], [_, fy, cy], _] = self.spec.matrix;
-        DVec2::new((pixel.x - cx) / fx, (pixel.y - cy) / fy)
+        let [[_, _, cx], [_, _, cy], _] = self.spec.matrix;
+        DVec2::new((pixel.x - cx) * self.per_focal.x, (pixel.y - cy) * self.per_focal.y)
     }
 
     /// The pixel that sees a ray of this direction (any length).

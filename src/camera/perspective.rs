@@ -37,6 +37,7 @@ pub(super) fn plane_by_ray(ray: DVec3, point: DVec2, inner: DMat2) -> Matrix2x3<
 }
 
 /// The unit ray through a point of the plane `z = 1`.
+#[inline]
 pub(super) fn ray_of(point: DVec2) -> DVec3 {
     let w = 1.0 / (1.0 + point.length_squared()).sqrt();
     DVec3::new(point.x * w, point.y * w, w)

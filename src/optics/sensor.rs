@@ -198,6 +198,7 @@ impl SensorOptics {
     }
 
     /// A ray of the camera, through the layers and on to the dome.
+    #[inline]
     pub(super) fn meet(&self, ray: DVec3, field_angle_rad: f64) -> Result<Hit, Limit> {
         let direction = self.sensor_from_camera.vector(ray);
         let origin = if self.lens.is_central() {

@@ -186,6 +186,7 @@ fn finite(value: f64) -> Result<f64, Limit> {
 
 /// Sideways travel of a ray through whole plates, per unit of its momentum
 /// along them (the sine in air); `cos` is the cosine in air.
+#[inline]
 pub(super) fn travel(plates: &[Plate], cos: f64) -> f64 {
     let square = cos * cos;
     let mut by_p = 0.0;

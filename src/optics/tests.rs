@@ -306,3 +306,52 @@ fn project_jacobians_are_the_derivatives() {
         }
     }
 }
+
+proptest::proptest! {
+    /// Snell's law with angles, as a textbook has it: every layer adds its
+    /// thickness times the tangent of its own angle.
+    #[test]
+    fn points_are_seen_by_snells_law(
+        indices in proptest::collection::vec(1.0..2.4f64, 1..6),
+        thickness in 0.0..2.0f64,
+        gap in 1e-3..20.0f64,
+        across in 0.0..9.9f64,
+        azimuth in -3.2..3.2f64,
+        height in 0.0..1.0f64,
+    ) {
+        let mut spec = spec(Model::KannalaBrandt, &[0.0; 4]);
+        spec.lens.field_of_view_rad = 179_f64.to_radians();
+        spec.layers = indices
+            .iter()
+            .enumerate()
+            .map(|(i, &n)| Layer {
+                name: i.to_string(),
+                index: [n; 3],
+                thickness_mm: (i + 1 < indices.len()).then_some(thickness),
+            })
+            .collect();
+        let sheet = thickness * (indices.len() - 1) as f64;
+        spec.sensor_from_camera = Rigid::from_translation(DVec3::new(0.0, 0.0, -sheet - gap));
+        let optics = SensorOptics::new(&spec).unwrap();
+        let z = height * (100.0 - across * across).sqrt();
+        let point = DVec3::new(across * azimuth.cos(), across * azimuth.sin(), z);
+        if let Ok(pixel) = optics.project(point) {
+            let ray = optics.lens().unproject(pixel).unwrap();
+            let sine = ray.x.hypot(ray.y);
+            let tangent = |n: f64| (sine / n).asin().tan();
+            let fill = indices[indices.len() - 1];
+            let within: f64 = indices[..indices.len() - 1].iter().map(|&n| thickness * tangent(n)).sum();
+            let reach = gap * sine / ray.z + within + z * tangent(fill);
+            let allowed = 1e-9 * (1.0 + gap / (ray.z * ray.z));
+            proptest::prop_assert!((reach - across).abs() < allowed, "{reach} is not {across}");
+            if across > 0.0 {
+                let turned = (ray.x * azimuth.sin() - ray.y * azimuth.cos()).abs();
+                proptest::prop_assert!(turned < 1e-12);
+            }
+        } else {
+            // Only a ray past the field of view is not seen.
+            let steepest = 89.4_f64.to_radians().tan() * gap;
+            proptest::prop_assert!(across > steepest, "{across} is within {steepest}");
+        }
+    }
+}

@@ -118,25 +118,19 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     let springs = constants::springs_of(design)?;
     let constants = constants::with_springs(design, &layout, &springs)?;
     tree.add("constants/constants.json", constants.to_json().into_bytes());
-    step("drawing the artwork");
+    // four pieces of work that share nothing but what they read, on as many threads as there are
+    step("drawing the artwork, making the parts, driving the loads to their limits");
     let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
-    for file in artwork::files(&spec, &layout, &label)? {
+    let ((films, judged), (parts, forces)) = rayon::join(
+        || rayon::join(|| artwork::files(&spec, &layout, &label), || judge(design, &spec, &layout)),
+        || rayon::join(|| make_parts(design, &layout), || constants::force_report(design, &springs)),
+    );
+    for file in films? {
         tree.add(file.path, file.bytes);
     }
-    step("judging the layout");
-    // numbers, strings and lists only: nothing here can fail to be written
-    let mut text =
-        serde_json::to_string_pretty(&LayoutReport::new(design, &spec, &layout)).unwrap_or_default();
-    text.push('\n');
-    tree.add("artwork/layout.json", text.into_bytes());
-    step("making the parts");
-    let measures = parts::Measures::of(design)?;
-    let made = parts::build(&measures, &layout.hits)?;
-    step("checking the assembly");
-    let assembly = parts::Assembly::of(&measures, &made)?;
-    parts::check_assembly(&measures, &made, &assembly)?;
-    step("writing the parts");
-    for file in parts::files(design, &measures, &made, &assembly)? {
+    tree.add("artwork/layout.json", judged);
+    let (made, files) = parts?;
+    for file in files {
         tree.add(file.path, file.bytes);
     }
     let records = made
@@ -149,6 +143,9 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
             bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
         })
         .collect();
+    for (path, text) in forces?.files() {
+        tree.add(path, text.into_bytes());
+    }
     step("writing what other programs read");
     tree.add("constants/constants.schema.json", constants::Constants::schema().into_bytes());
     let forms = constants::formats::format_files(design, &constants, &made, &Default::default());
@@ -156,10 +153,6 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
         tree.add(path, text.into_bytes());
     }
     warnings.extend(forms.left_out.into_iter().map(|message| Warning { field: "constants".into(), message }));
-    step("driving the loads to their limits");
-    for (path, text) in constants::force_report(design, &springs)?.files() {
-        tree.add(path, text.into_bytes());
-    }
     warnings.extend(
         layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
     );
@@ -171,6 +164,27 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     text.push('\n');
     tree.add(MANIFEST_NAME, text.into_bytes());
     Ok(Build { tree, manifest, dot_count: layout.dots.len() })
+}
+
+/// The figures of the layout, as a file.
+fn judge(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<u8> {
+    // numbers, strings and lists only: nothing here can fail to be written
+    let mut text = serde_json::to_string_pretty(&LayoutReport::new(design, spec, layout)).unwrap_or_default();
+    text.push('\n');
+    text.into_bytes()
+}
+
+/// The parts, checked in their assembly, and their files.
+fn make_parts(
+    design: &Design,
+    layout: &Layout,
+) -> Result<(Vec<parts::Part>, Vec<parts::PartFile>), PartError> {
+    let measures = parts::Measures::of(design)?;
+    let made = parts::build(&measures, &layout.hits)?;
+    let assembly = parts::Assembly::of(&measures, &made)?;
+    parts::check_assembly(&measures, &made, &assembly)?;
+    let files = parts::files(design, &measures, &made, &assembly)?;
+    Ok((made, files))
 }
 
 /// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight.

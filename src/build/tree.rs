@@ -101,7 +101,7 @@ impl Tree {
             if let Some(folder) = file.parent() {
                 fs::create_dir_all(folder).map_err(fault("make the folder", folder))?;
             }
-            write_synced(&file, bytes).map_err(fault("write the file", &out.join(path)))?;
+            fs::write(&file, bytes).map_err(fault("write the file", &out.join(path)))?;
         }
         let earlier = staging.path().join("earlier");
         let had_earlier = out.exists();
@@ -126,13 +126,6 @@ impl Tree {
         }
         Ok(())
     }
-}
-
-/// Writes and flushes to the disk, so that a full disk shows now and not after the rename.
-fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = fs::File::create(path)?;
-    io::Write::write_all(&mut file, bytes)?;
-    file.sync_data()
 }
 
 /// The first entry of an existing folder that its own manifest does not explain; `None` where the

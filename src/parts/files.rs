@@ -78,15 +78,18 @@ pub fn files(
         let [r, g, b, _] = item.color;
         [r, g, b]
     };
-    for (name, exploded) in [("assembly-closed", 0.0), ("assembly-exploded", 1.0)] {
+    let picture = |name: &str, exploded: f64| {
         let items: Vec<PictureItem<'_>> = assembly
             .items
             .iter()
             .map(|i| PictureItem { mesh: &i.mesh, shift_mm: exploded * i.explode_mm, color: item(i) })
             .collect();
         let view = View { elevation_deg: 22.0, ..VIEW };
-        out.push(png(format!("report/{name}.png"), &items, view)?);
-    }
+        png(format!("report/{name}.png"), &items, view)
+    };
+    let (closed, exploded) =
+        rayon::join(|| picture("assembly-closed", 0.0), || picture("assembly-exploded", 1.0));
+    out.extend([closed?, exploded?]);
     Ok(out)
 }
 

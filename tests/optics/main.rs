@@ -4,6 +4,9 @@
 //! Tests whose names begin with `long_` belong to the long suite
 //! (`scripts/test --all`).
 
+// a broken fixture should stop the test
+#![allow(clippy::unwrap_used)]
+
 mod batch;
 mod cases;
 mod dd;

@@ -1,7 +1,7 @@
 //! The sections of a design file, as they are written.
 //!
 //! Their doc comments are the descriptions in the JSON schema, and the bounds given here are the
-//! bounds of a single field; rules between fields are in [`super::resolve`].
+//! bounds of a single field; rules between fields are checked when the design is resolved.
 
 mod camera;
 mod loads;

@@ -16,7 +16,7 @@ pub struct MarkerSight {
     markers: Vec<Marker>,
     undistorted_matrix: [[f64; 3]; 3],
     mask_radius_px: f64,
-    /// The window's free radius, and the heights between which it stands, mm; `None`: not checked.
+    /// The window, and the heights between which it stands, mm; `None`: not checked.
     window: Option<(ViewCone, [f64; 2])>,
 }
 
@@ -110,16 +110,15 @@ impl MarkerSight {
     }
 }
 
-/// Largest part of the window's radius that a ray uses between two heights of the platform.
-fn window_use(optics: &SensorOptics, ray: DVec3, angle: f64, cone: &ViewCone, heights: [f64; 2]) -> f64 {
+/// Largest part of the window that a ray uses between two heights of the platform.
+fn window_use(optics: &SensorOptics, ray: DVec3, angle: f64, window: &ViewCone, heights: [f64; 2]) -> f64 {
     let sensor_from_camera = optics.sensor_from_camera();
     let origin = sensor_from_camera.point(DVec3::Z * optics.lens().pupil_shift_mm(angle).0);
     let direction = sensor_from_camera.vector(ray);
     let at = |part: f64| {
         let z = heights[0] + part * (heights[1] - heights[0]);
         let along = (z - origin.z) / direction.z;
-        let free = cone.radius_mm(z);
-        if along > 0.0 && free > 0.0 { (origin + direction * along).truncate().length() / free } else { 0.0 }
+        if along > 0.0 { window.used(origin + direction * along) } else { 0.0 }
     };
     [0.0, 0.25, 0.5, 0.75, 1.0].map(at).into_iter().fold(0.0, f64::max)
 }

@@ -69,7 +69,7 @@ fn write_zip(files: &[(&str, &[u8])], writer: &mut impl Write) -> io::Result<()>
     let mut body: Vec<u8> = Vec::new();
     let mut directory: Vec<u8> = Vec::new();
     for (name, data) in files {
-        let mut encoder = DeflateEncoder::new(Vec::new(), Compression::default());
+        let mut encoder = DeflateEncoder::new(Vec::new(), Compression::fast());
         encoder.write_all(data)?;
         let packed = encoder.finish()?;
         let mut crc = flate2::Crc::new();

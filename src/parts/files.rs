@@ -20,7 +20,7 @@ pub struct PartFile {
 }
 
 /// Size of the pictures, px.
-const PICTURE: (u32, u32) = (640, 480);
+const PICTURE: (u32, u32) = (480, 360);
 const VIEW: View = View { azimuth_deg: -60.0, elevation_deg: 35.0 };
 
 /// Whether a part's STEP has exact faces or triangles.

@@ -155,6 +155,24 @@ impl ViewCone {
         low.x + slope * (z_mm - low.y) + self.margin_mm * (1.0 + slope * slope).sqrt()
     }
 
+    /// How near a point of a ray comes to the window's edge at its height: the distance from the middle of the
+    /// opening that it is in (the dome's cone or a marker's beam) over that opening's radius; above 1 it is
+    /// behind the edge.
+    pub fn used(&self, point_mm: DVec3) -> f64 {
+        let at = point_mm.truncate();
+        let share = |middle: DVec2, radius_mm: f64| {
+            if radius_mm > 0.0 { at.distance(middle) / radius_mm } else { f64::MAX }
+        };
+        let dome = share(DVec2::ZERO, self.radius_mm(point_mm.z));
+        let (Some(low), Some(high)) = (self.cone_mm.first(), self.cone_mm.last()) else { return dome };
+        let part = (point_mm.z - low.y) / (high.y - low.y);
+        let beam = |b: &Beam| {
+            let radius_mm = b.low_radius_mm + part * (b.high_radius_mm - b.low_radius_mm);
+            share(b.low_mm.lerp(b.high_mm, part), radius_mm)
+        };
+        self.beams.iter().map(beam).fold(dome, f64::min)
+    }
+
     /// Largest distance from the axis that the view needs, with the margin, mm.
     pub fn max_radius_mm(&self) -> f64 {
         let cone = self.cone_mm.last().map_or(0.0, |p| self.radius_mm(p.y));

@@ -177,8 +177,8 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &Hit) -> Result<Blueprint, Part
     );
     b.cut.push(Feature::new("finger slot", "jig.clearance_mm", finger).placed(jig_from_sensor));
     for (i, side) in [-0.5, 0.5].into_iter().enumerate() {
-        let hole =
-            Shape::cylinder(0.5 * j.pin_diameter_mm, -j.base_thickness_mm - over, over + reach, Fit::Outside);
+        // Through the base only: the block of a tilted hit may hang over the hole, and needs none.
+        let hole = Shape::cylinder(0.5 * j.pin_diameter_mm, -j.base_thickness_mm - over, over, Fit::Outside);
         b.cut.push(
             Feature::new("pin hole", "jig.pin_distance_mm", hole)
                 .numbered(i)

@@ -177,8 +177,9 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &Hit) -> Result<Blueprint, Part
     );
     b.cut.push(Feature::new("finger slot", "jig.clearance_mm", finger).placed(jig_from_sensor));
     for (i, side) in [-0.5, 0.5].into_iter().enumerate() {
-        // Through the base only: the block of a tilted hit may hang over the hole, and needs none.
-        let hole = Shape::cylinder(0.5 * j.pin_diameter_mm, -j.base_thickness_mm - over, over, Fit::Outside);
+        // Upwards through everything, so that a pin is never in the way of a tilted block.
+        let hole =
+            Shape::cylinder(0.5 * j.pin_diameter_mm, -j.base_thickness_mm - over, over + reach, Fit::Outside);
         b.cut.push(
             Feature::new("pin hole", "jig.pin_distance_mm", hole)
                 .numbered(i)
@@ -186,5 +187,8 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &Hit) -> Result<Blueprint, Part
         );
         b.genus += 1;
     }
+    // The block of a tilted hit may hang over a hole, which then goes through it once more: whether it does
+    // is a question of angles, and the mesh answers it.
+    b.genus_is_least = hit.tilt_rad != 0.0;
     Ok(b)
 }

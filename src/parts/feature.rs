@@ -57,6 +57,8 @@ pub(crate) struct Blueprint {
     pub may_meet: &'static [(&'static str, &'static str)],
     /// Handles, by the count of holes.
     pub genus: i64,
+    /// Whether there may be more handles than that, which the mesh then tells.
+    pub genus_is_least: bool,
     /// Tolerance of ordinary faces.
     pub chord: Chord,
     /// Whether it is printed, so that the process limits hold for it.
@@ -72,6 +74,7 @@ impl Blueprint {
             cut: Vec::new(),
             may_meet: &[],
             genus: 0,
+            genus_is_least: false,
             chord,
             printed: true,
         }

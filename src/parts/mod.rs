@@ -81,6 +81,10 @@ impl Blueprint {
         let mesh = in_f64.welded_f32();
         let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
+        let genus = match inspect(&mesh).genus() {
+            Some(found) if self.genus_is_least => found.max(self.genus),
+            _ => self.genus,
+        };
         let part = Part {
             name: self.name.clone(),
             summary: self.summary,
@@ -88,7 +92,7 @@ impl Blueprint {
             chord_tolerance_mm: self.chord.tolerance_mm(),
             volume_mm3: in_f64.volume_mm3(),
             area_mm2: in_f64.area_mm2(),
-            genus: self.genus,
+            genus,
             bounds,
             mesh,
         };

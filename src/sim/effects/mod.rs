@@ -1,10 +1,39 @@
 //! The effects, one file each.
 
+mod bayer;
+mod compression;
+mod defocus;
+mod diffuser;
+mod direct_light;
+mod falloff;
+mod fresnel;
+mod interreflection;
 mod lens_distortion;
+mod motion_blur;
+mod noise;
+mod platform_shadow;
+mod rolling_shutter;
+mod speed;
+mod vignetting;
 
 use super::effect::Effect;
 
 /// All effects, in the order of their names.
 pub fn all() -> &'static [&'static dyn Effect] {
-    &[&lens_distortion::LensDistortion]
+    &[
+        &lens_distortion::LensDistortion,
+        &direct_light::DirectLight,
+        &falloff::Falloff,
+        &diffuser::Diffuser,
+        &fresnel::Fresnel,
+        &platform_shadow::PlatformShadow,
+        &interreflection::Interreflection,
+        &vignetting::Vignetting,
+        &defocus::Defocus,
+        &motion_blur::MotionBlur,
+        &rolling_shutter::RollingShutter,
+        &bayer::Bayer,
+        &noise::Noise,
+        &compression::Compression,
+    ]
 }

@@ -5,14 +5,20 @@ mod compression;
 mod defocus;
 mod diffuser;
 mod direct_light;
+mod dispersion;
+mod dots;
 mod falloff;
 mod fresnel;
+mod gap_change;
 mod interreflection;
 mod lens_distortion;
 mod motion_blur;
 mod noise;
 mod platform_shadow;
+mod pupil_shift;
+mod refraction;
 mod rolling_shutter;
+mod sheet_motion;
 mod speed;
 mod vignetting;
 
@@ -22,6 +28,12 @@ use super::effect::Effect;
 pub fn all() -> &'static [&'static dyn Effect] {
     &[
         &lens_distortion::LensDistortion,
+        &pupil_shift::PupilShift,
+        &refraction::Refraction,
+        &dispersion::Dispersion,
+        &sheet_motion::SheetMotion,
+        &gap_change::GapChange,
+        &dots::Dots,
         &direct_light::DirectLight,
         &falloff::Falloff,
         &diffuser::Diffuser,

@@ -62,7 +62,7 @@ impl Effect for Defocus {
         let (width, height) = scene.image_size();
         let steps = steps_for(Widths::of(scene, focus).largest()) as u64;
         let pixels = (width * height * scene.planes()) as u64;
-        Cost { once: (width * height) as u64, per_frame: 2 * steps * pixels / PIXELS_PER_UNIT }
+        Cost { once: 0, per_frame: 2 * steps * pixels / PIXELS_PER_UNIT }
     }
 
     fn apply(&self, scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {

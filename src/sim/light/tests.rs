@@ -190,6 +190,19 @@ fn a_narrow_lobe_changes_nothing_and_a_full_lambert_share_forgets_all() {
 }
 
 #[test]
+fn a_diffuser_at_most_doubles_the_densest_direction() {
+    for exponent in [1.0, 2.0, 8.0] {
+        let bare = Lobe::cosine_power(exponent);
+        for width_deg in [4.0_f64, 15.0, 40.0, 90.0] {
+            let lobe_width_rad = width_deg.to_radians();
+            let lobe = bare.behind(&Diffuser { lambert_fraction: 0.0, lobe_width_rad, transmittance: 1.0 });
+            let densest = (1..=100).map(|i| lobe.per_sr(f64::from(i) / 100.0)).fold(0.0, f64::max);
+            assert!(densest < 2.0 * (exponent + 1.0) / TAU, "{exponent} {width_deg}: {densest}");
+        }
+    }
+}
+
+#[test]
 fn fresnel_splits_without_loss_and_stops_at_the_critical_angle() {
     // normal incidence: ((n - 1) / (n + 1))^2
     let [s, p] = fresnel::transmitted(1.0, 1.5, 0.0);

@@ -28,6 +28,7 @@
 mod brown_conrady;
 mod inverse;
 mod kannala_brandt;
+mod lanes;
 mod lens;
 mod limit;
 mod perspective;
@@ -35,7 +36,7 @@ mod pinhole;
 mod pupil;
 mod spec;
 
-pub use lens::Lens;
+pub use lens::{Lens, Solved};
 pub use limit::LensLimit;
 pub use spec::{LensError, LensSpec, Model};
 

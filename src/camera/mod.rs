@@ -26,6 +26,7 @@
 #![doc = include_str!("lenses.md")]
 
 mod brown_conrady;
+mod brown_formula;
 mod inverse;
 mod kannala_brandt;
 mod lanes;

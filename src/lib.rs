@@ -4,6 +4,7 @@ pub mod build;
 pub mod calibrate;
 pub mod camera;
 pub mod cli;
+pub mod compare;
 pub mod constants;
 pub mod design;
 pub mod layout;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the ground up; modules in one row do not import each other.
-const ROWS: [&[&str]; 12] = [
+const ROWS: [&[&str]; 13] = [
     &["numeric"],
     &["camera", "mesh"],
     &["optics"],
@@ -16,6 +16,7 @@ const ROWS: [&[&str]; 12] = [
     &["sim", "track", "calibrate"],
     &["accuracy", "report"],
     &["build"],
+    &["compare"],
     &["cli"],
 ];
 

@@ -90,13 +90,29 @@ pub struct Build {
     pub dot_count: usize,
 }
 
+impl Build {
+    /// Lets an open page see that it is out of date: adds the script that asks, and what it asks for. The files
+    /// of a watched build differ from those of a plain one in this alone.
+    pub fn keep_fresh(&mut self) {
+        const PAGE: &str = "report/index.html";
+        const STAMP: &str = "report/fresh-stamp.js";
+        let page = self.tree.files().find(|(path, _)| *path == PAGE).map(|(_, bytes)| bytes.to_vec());
+        let Some(page) = page.and_then(|bytes| String::from_utf8(bytes).ok()) else { return };
+        self.tree.add(PAGE, report::watched(&page).into_bytes());
+        self.tree.add(STAMP, report::stamp(&self.manifest.design.sha256).into_bytes());
+        let Manifest { design, parts, warnings, .. } = self.manifest.clone();
+        self.manifest = Manifest::new(design, parts, warnings, &self.tree);
+        self.tree.add(MANIFEST_NAME, pretty(&self.manifest));
+    }
+}
+
 /// Makes everything; `step` is told what is being made. Nothing is written to the disk.
 ///
 /// # Errors
 /// The first fault of the design that only shows when it is laid out, loaded or made.
 pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
     make(design, step).map_err(|error| match error {
-        BuildError::Design(error) => with_value(design, *error).into(),
+        BuildError::Design(error) => design.beside_suspicions(with_value(design, *error)).into(),
         ours @ BuildError::Ours(_) => ours,
     })
 }

@@ -55,4 +55,5 @@ pub mod optics;
 pub mod parts;
 pub mod pose;
 pub mod report;
+pub mod sim;
 pub mod transfer;

@@ -100,6 +100,8 @@ impl Build {
         let Some(page) = page.and_then(|bytes| String::from_utf8(bytes).ok()) else { return };
         self.tree.add(PAGE, report::watched(&page).into_bytes());
         self.tree.add(STAMP, report::stamp(&self.manifest.design.sha256).into_bytes());
+        // the manifest lists all files but itself
+        self.tree.remove(MANIFEST_NAME);
         let Manifest { design, parts, warnings, .. } = self.manifest.clone();
         self.manifest = Manifest::new(design, parts, warnings, &self.tree);
         self.tree.add(MANIFEST_NAME, pretty(&self.manifest));

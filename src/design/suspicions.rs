@@ -12,7 +12,7 @@ use crate::optics::SensorOptics;
 /// Tangential coefficients of real lenses stay far below this; k3 in their place does not.
 const LARGEST_TANGENTIAL: f64 = 0.005;
 /// Share of the stated field of view below which what the frame shows belongs to another lens model.
-const LEAST_OF_VIEW: f64 = 0.72;
+const LEAST_OF_VIEW: f64 = 0.8;
 /// A part of the sensor this many times smaller or larger than its neighbour is in another unit.
 const OTHER_UNIT: f64 = 50.0;
 
@@ -155,7 +155,7 @@ fn tangential(file: &DesignFile) -> Option<DesignWarning> {
 /// A wide lens whose frame ends long before its field of view does: its coefficients are another model's.
 fn other_model(file: &DesignFile, optics: &SensorOptics) -> Option<DesignWarning> {
     let half_deg = 0.5 * file.camera.field_of_view_deg;
-    if file.camera.model == ModelName::KannalaBrandt || half_deg < 50.0 {
+    if file.camera.model != ModelName::BrownConrady || half_deg < 50.0 {
         return None;
     }
     let lens = optics.lens();

@@ -147,7 +147,12 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
                 || LayoutReport::new(design, &spec, &layout),
             )
         },
-        || rayon::join(|| make_parts(design, &layout), || constants::force_report(design, &springs)),
+        || {
+            rayon::join(
+                || make_parts(design, &layout, &springs),
+                || constants::force_report(design, &springs),
+            )
+        },
     );
     for file in films? {
         tree.add(file.path, file.bytes);
@@ -221,13 +226,17 @@ struct MadeParts {
     poses: Vec<String>,
 }
 
-fn make_parts(design: &Design, layout: &Layout) -> Result<MadeParts, PartError> {
-    let measures = parts::Measures::of(design)?;
-    let made = parts::build(&measures, &layout.hits)?;
-    let assembly = parts::Assembly::of(&measures, &made)?;
-    parts::check_assembly(&measures, &made, &assembly)?;
-    let files = parts::files(design, &measures, &made, &assembly)?;
-    let poses = measures.poses.iter().map(|(name, _)| name.clone()).collect();
+fn make_parts(
+    design: &Design,
+    layout: &Layout,
+    springs: &constants::DesignSprings,
+) -> Result<MadeParts, PartError> {
+    let measures = springs.sight.measures()?;
+    let made = parts::build(measures, &layout.hits)?;
+    let assembly = parts::Assembly::of(measures, &made)?;
+    parts::check_assembly(measures, &made, &assembly)?;
+    let files = parts::files(design, measures, &made, &assembly)?;
+    let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
     Ok(MadeParts { made, files, poses })
 }
 

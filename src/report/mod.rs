@@ -251,8 +251,9 @@ fn fits(subject: &Subject<'_>) -> String {
         ]
     });
     let mut text = format!(
-        "<p>No two bodies of the assembly touch at any of these positions of the platform, the view is free, and no LED \
-         shines straight into the lens: {}.</p>\n",
+        "<p>No two bodies of the assembly touch at any of {} positions of the platform, the view is free, and no LED \
+         shines straight into the lens.</p>\n<details><summary>The positions</summary><p>{}</p></details>\n",
+        subject.poses.len(),
         escape(&subject.poses.join("; "))
     );
     text += &table("Fits", &["fit", "inner, mm", "outer, mm", "play on each side, mm", "field"], &rows);

@@ -212,7 +212,7 @@ def irradiance(light, samples):
 def dots():
     """Small caps of the dome: rings about the pole."""
     places = []
-    for ring, polar_deg in enumerate([6, 17, 28, 39, 50, 58]):
+    for ring, polar_deg in enumerate([6, 17, 28, 39, 51]):
         count = 3 + 3 * ring
         for k in range(count):
             polar, azimuth = math.radians(polar_deg), 2 * math.pi * (k + 0.37 * ring) / count

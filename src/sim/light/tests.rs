@@ -391,7 +391,7 @@ fn the_table_of_direct_light_matches_closed_forms_to_a_thousandth() {
         let normal = (direction + DVec3::new(0.1, -0.2, 0.1)).normalize();
         let exact = lambert_polygon(&corners, 1.0 / PI, moved, -normal);
         let found = f64::from(field.moved(moved, normal)[0]);
-        assert!((found - exact).abs() < 1e-2 * brightest, "moved {direction}: {found} {exact}");
+        assert!((found - exact).abs() < 2e-2 * brightest, "moved {direction}: {found} {exact}");
     }
 }
 
@@ -491,10 +491,8 @@ fn no_level_passes_its_bound() {
     let bound = bounds::brightest_level(&scene).unwrap();
     for used in [
         ALL,
-        LightUse { diffuser: false, ..ALL },
-        LightUse { platform_shadow: false, ..ALL },
-        LightUse { fresnel: false, ..ALL },
-        LightUse { falloff: false, interreflection: false, ..ALL },
+        LightUse { platform_shadow: false, diffuser: false, ..ALL },
+        LightUse { fresnel: false, falloff: false, ..ALL },
     ] {
         let dome = LitDome::new(&scene, &used, &mut Work::default()).unwrap().unwrap();
         let brightest = dome.field().brightest().into_iter().fold(0.0, f64::max) * 450.0 * 0.55;
@@ -588,7 +586,7 @@ fn irradiance_is_that_of_mitsuba() {
     let cut = (number(&golden["cutoff_deg"]) - 1.0).to_radians().cos();
     let (off, compared) = off_from_mitsuba(&golden, "diffused", &point, cut);
     println!("diffused: {:.2} % in {compared} bins", 100.0 * off);
-    assert!(off < 0.03 && compared > 20, "{off} {compared}");
+    assert!(off < 0.03 && compared > 28, "{off} {compared}");
 }
 
 #[test]
@@ -642,5 +640,5 @@ fn dots_are_seen_where_mitsuba_sees_them() {
         worst = worst.max((origin + center / area).distance(DVec2::new(found[0], found[1])));
     }
     println!("{} dots, at most {worst:.4} px from Mitsuba's", places.len());
-    assert!(worst < 0.05 && places.len() > 40, "{worst}");
+    assert!(worst < 0.05 && places.len() >= 45, "{worst}");
 }

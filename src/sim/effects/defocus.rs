@@ -108,7 +108,8 @@ impl Widths {
 
     /// Largest slope, px^2 per px.
     fn steepest(&self) -> f64 {
-        let along = self.values.chunks(self.columns).flat_map(|row| row.windows(2).map(|w| (w[1] - w[0]).abs()));
+        let along =
+            self.values.chunks(self.columns).flat_map(|row| row.windows(2).map(|w| (w[1] - w[0]).abs()));
         let down = self.values.iter().zip(self.values.iter().skip(self.columns)).map(|(a, b)| (a - b).abs());
         std::f64::consts::SQRT_2 * along.chain(down).fold(0.0, f64::max) / STEP as f64
     }

@@ -8,7 +8,7 @@ use crate::sim::render::Renderer;
 use crate::sim::{Image8, Scene, Work};
 
 const ELECTRONICS: &str = r#", "electronics": { "vignetting_exponent": 0.4,
-    "focus": { "pupil_diameter_mm": 0.05, "distance_mm": 15.5 } }"#;
+    "focus": { "pupil_diameter_mm": 0.3, "distance_mm": 15.5 } }"#;
 
 fn scene(level: f64, more: &str) -> Scene {
     let text = format!(

@@ -129,7 +129,8 @@ fn light_bent_by_the_sheet_keeps_its_flux() {
         for k in 0..200 {
             let azimuth = TAU * (k as f64 + 0.5) / 200.0;
             let direction = (DVec2::from_angle(azimuth) * (1.0 - z * z).sqrt()).extend(z);
-            let found = light(&optics).vector_irradiance(&source, direction * 10.0, &EmitterRule::with_places(1));
+            let found =
+                light(&optics).vector_irradiance(&source, direction * 10.0, &EmitterRule::with_places(1));
             flux += found.dot(direction) * weight / 200.0;
         }
     }
@@ -160,11 +161,8 @@ fn diffusers_keep_the_energy() {
         let bare = Lobe::cosine_power(exponent);
         assert!((bare.integral() - 1.0).abs() < 2e-4, "{exponent}: {}", bare.integral());
         for (lambert_fraction, width_deg) in [(1.0, 30.0), (0.0, 12.0), (0.3, 25.0), (0.6, 60.0)] {
-            let diffuser = Diffuser {
-                lambert_fraction,
-                lobe_width_rad: f64::to_radians(width_deg),
-                transmittance: 0.8,
-            };
+            let diffuser =
+                Diffuser { lambert_fraction, lobe_width_rad: f64::to_radians(width_deg), transmittance: 0.8 };
             let found = bare.behind(&diffuser);
             assert!((found.flux() - 0.8).abs() < 1e-12);
             assert!(
@@ -179,8 +177,7 @@ fn diffusers_keep_the_energy() {
 #[test]
 fn a_narrow_lobe_changes_nothing_and_a_full_lambert_share_forgets_all() {
     let bare = Lobe::cosine_power(2.0);
-    let narrow =
-        bare.behind(&Diffuser { lambert_fraction: 0.0, lobe_width_rad: 0.03, transmittance: 1.0 });
+    let narrow = bare.behind(&Diffuser { lambert_fraction: 0.0, lobe_width_rad: 0.03, transmittance: 1.0 });
     let lambert = bare.behind(&Diffuser { lambert_fraction: 1.0, lobe_width_rad: 0.3, transmittance: 1.0 });
     for cos in [0.3, 0.6, 0.9, 0.99] {
         assert!((narrow.per_sr(cos) / bare.per_sr(cos) - 1.0).abs() < 0.01, "{cos}");
@@ -423,7 +420,8 @@ fn shadows_only_darken_and_a_clear_platform_throws_none() {
     let mut darkened = 0;
     for direction in directions(20) {
         for (i, source) in shaded.sources.iter().enumerate() {
-            let (dark, light) = (shaded.still(source, direction, &rule), open.still(source, direction, &rule));
+            let (dark, light) =
+                (shaded.still(source, direction, &rule), open.still(source, direction, &rule));
             assert!(dark <= light * (1.0 + 1e-2) + 1e-9, "{direction}: {dark} {light}");
             darkened += usize::from(dark < 0.9 * light);
             let through = clear.still(&clear.sources[i], direction, &rule);
@@ -531,7 +529,12 @@ fn golden_emitter(golden: &serde_json::Value, side_mm: f64) -> Emitter {
 
 /// Largest difference of a map of irradiance from Mitsuba's, of each bin's value or a tenth of the largest; a bin
 /// that the light reaches at a cosine below the cut is left out.
-fn off_from_mitsuba(golden: &serde_json::Value, map: &str, emitter: &Emitter, least_cos: f64) -> (f64, usize) {
+fn off_from_mitsuba(
+    golden: &serde_json::Value,
+    map: &str,
+    emitter: &Emitter,
+    least_cos: f64,
+) -> (f64, usize) {
     let optics = sensor(&[number(&golden["acrylic_index"])], number(&golden["silicone_index"]));
     let light = DirectLight { fresnel: true, ..light(&optics) };
     let edges: Vec<f64> =

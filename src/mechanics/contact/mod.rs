@@ -189,7 +189,7 @@ impl Contact {
         self.above_sheet(indenter, sensor_from_object)?;
         let history = before.map(|state| &state.history);
         let elastomer = &self.elastomer;
-        match &self.prepared {
+        let state = match &self.prepared {
             Prepared::Compliance(compliance) => {
                 linear::linear(elastomer, compliance, indenter, sensor_from_object, before)
             }
@@ -200,7 +200,15 @@ impl Contact {
                 local::geometric(elastomer, indenter, sensor_from_object, history)
             }
             Prepared::Nothing => local::closed_form(elastomer, indenter, sensor_from_object, history),
+        }?;
+        // Nothing touches the surface: then the object is outside, or all of it within.
+        let any = sensor_from_object.point(indenter.solid.support(glam::DVec3::Z));
+        let inside_mm = elastomer.dome_radius_mm - any.length();
+        if state.status == Status::Free && inside_mm > 1e-9 * elastomer.dome_radius_mm {
+            let limit_mm = local::DEEPEST * elastomer.dome_radius_mm;
+            return Err(ContactError::TooDeep { depth_mm: inside_mm, limit_mm });
         }
+        Ok(state)
     }
 
     /// The object may not reach below the base plane: there is the sheet.

@@ -143,7 +143,8 @@ impl Candidate {
             outward += n;
         }
         // Opposite faces leave no mean direction: the middle's then.
-        let outward = if outward.length() > 0.4 { outward } else { placed.distance(self.at_mm + self.u_mm).1 };
+        let outward =
+            if outward.length() > 0.4 { outward } else { placed.distance(self.at_mm + self.u_mm).1 };
         (distance, outward.normalize_or(DVec3::Z))
     }
 }
@@ -240,7 +241,11 @@ impl<'a> Touch<'a> {
                 a.values[i * n + j] =
                     combined[3 * j] * nj.x + combined[3 * j + 1] * nj.y + combined[3 * j + 2] * nj.z;
             }
-            c.push(self.candidates[i].rest_gap_mm + ni.dot(self.candidates[i].offset_mm) + dot(&combined, &tangential));
+            c.push(
+                self.candidates[i].rest_gap_mm
+                    + ni.dot(self.candidates[i].offset_mm)
+                    + dot(&combined, &tangential),
+            );
             x.push(self.candidates[i].force_n.dot(ni).max(0.0));
         }
         let tolerance = 0.02 * SETTLED * self.elastomer.dome_radius_mm;
@@ -295,7 +300,7 @@ impl<'a> Touch<'a> {
             }
             radii.push(self.elastomer.friction * pressures[i]);
         }
-        let tolerance = 0.1 * SETTLED * self.elastomer.dome_radius_mm;
+        let tolerance = 0.2 * SETTLED * self.elastomer.dome_radius_mm;
         let ended = solve(&a, &c, Bounds::Discs(&radii), &mut x, tolerance, MOST_STEPS);
         self.work += (24 * n * n) as f64 + f64::from(ended.iterations + 12) * (4 * n * n) as f64;
         for (row, &i) in touched.iter().enumerate() {

@@ -23,12 +23,6 @@ pub(crate) struct Body {
     bulk_mpa: f64,
 }
 
-/// Forces of the elements on the nodes, N, and their energy, N*mm.
-pub(super) struct Inner {
-    pub energy: f64,
-    pub force_n: Vec<DVec3>,
-}
-
 impl Body {
     pub fn new(elastomer: &Elastomer, half: usize) -> Result<Self, ContactError> {
         let mesh = Bricks::new(elastomer.dome_radius_mm, half);
@@ -69,18 +63,17 @@ impl Body {
         self.rows.len()
     }
 
-    /// Elastic forces at a displacement; `None` where a brick has turned inside out.
-    pub(super) fn inner(&self, u_mm: &[DVec3]) -> Option<Inner> {
-        let mut inner = Inner { energy: 0.0, force_n: vec![DVec3::ZERO; self.nodes()] };
+    /// Forces of the elements on the nodes at a displacement, N; `None` where a brick has turned inside out.
+    pub(super) fn inner(&self, u_mm: &[DVec3]) -> Option<Vec<DVec3>> {
+        let mut force_n = vec![DVec3::ZERO; self.nodes()];
         for (brick, points) in self.mesh.bricks.iter().zip(&self.points) {
             let u = brick.map(|n| u_mm[n as usize]);
             let response = respond(points, &u, self.shear_mpa, self.bulk_mpa, false)?;
-            inner.energy += response.energy;
             for (node, force) in brick.iter().zip(response.force) {
-                inner.force_n[*node as usize] += force;
+                force_n[*node as usize] += force;
             }
         }
-        Some(inner)
+        Some(force_n)
     }
 
     /// Factors of the tangent at a displacement; `None` where it is not positive definite.
@@ -110,7 +103,8 @@ impl Body {
         }
         let n = 3 * self.nodes();
         let view = SymbolicSparseColMatRef::new_checked(n, n, &self.columns, None, &self.rows);
-        Llt::try_new_with_symbolic(self.symbolic.clone(), SparseColMatRef::new(view, &values), Side::Lower).ok()
+        Llt::try_new_with_symbolic(self.symbolic.clone(), SparseColMatRef::new(view, &values), Side::Lower)
+            .ok()
     }
 
     /// K^-1 times nodal columns.

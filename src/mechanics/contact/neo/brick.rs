@@ -13,6 +13,7 @@ pub(super) const DOFS: usize = 24;
 
 /// Energy (N*mm), its gradient (N), its second derivative (N/mm).
 pub(super) struct Response {
+    #[cfg_attr(not(test), expect(dead_code, reason = "what force and stiffness are the derivatives of"))]
     pub energy: f64,
     pub force: [DVec3; 8],
     pub stiffness: Option<Box<SMatrix<f64, DOFS, DOFS>>>,

@@ -130,7 +130,7 @@ fn newton(
         // Columns: the balance without contact, then each candidate's three unit forces.
         let columns = 1 + 3 * touch.candidates.len();
         let mut rhs = Mat::<f64>::zeros(3 * nodes, columns);
-        for (node, force) in inner.force_n.iter().enumerate() {
+        for (node, force) in inner.iter().enumerate() {
             if !body.is_fixed(node) {
                 for (axis, value) in force.to_array().into_iter().enumerate() {
                     rhs[(3 * node + axis, 0)] = -value;
@@ -199,8 +199,7 @@ fn condense(touch: &mut Touch<'_>, rhs: &Mat<f64>, u: &[DVec3], body: &Body) {
     let n = touch.candidates.len();
     let width = 3 * n;
     touch.blocks = vec![0.0; width * width];
-    let nodes: Vec<usize> =
-        touch.candidates.iter().map(|c| body.mesh.surface[c.node].1 as usize).collect();
+    let nodes: Vec<usize> = touch.candidates.iter().map(|c| body.mesh.surface[c.node].1 as usize).collect();
     let sharing = touch.sharing;
     for (i, node) in nodes.iter().enumerate() {
         let at = |axis: usize, column: usize| rhs[(3 * node + axis, column)];
@@ -223,8 +222,8 @@ fn condense(touch: &mut Touch<'_>, rhs: &Mat<f64>, u: &[DVec3], body: &Body) {
 fn imbalance(body: &Body, touch: &Touch<'_>, u: &[DVec3], load: &[DVec3]) -> Option<f64> {
     let mut inner = body.inner(u)?;
     for (candidate, force) in touch.candidates.iter().zip(load) {
-        inner.force_n[body.mesh.surface[candidate.node].1 as usize] -= *force;
+        inner[body.mesh.surface[candidate.node].1 as usize] -= *force;
     }
-    let off = inner.force_n.iter().enumerate().filter(|(node, _)| !body.is_fixed(*node));
+    let off = inner.iter().enumerate().filter(|(node, _)| !body.is_fixed(*node));
     Some(off.map(|(_, force)| force.length()).fold(0.0, f64::max))
 }

@@ -39,7 +39,11 @@ fn force_and_tangent_are_derivatives_of_the_energy() {
             let down = respond(&rest, &u, 0.2, 9.0, false).unwrap();
             u[a][axis] += h;
             let slope = (up.energy - down.energy) / (2.0 * h);
-            assert!((slope - here.force[a][axis]).abs() < 1e-7, "{a} {axis}: {slope} {}", here.force[a][axis]);
+            assert!(
+                (slope - here.force[a][axis]).abs() < 1e-7,
+                "{a} {axis}: {slope} {}",
+                here.force[a][axis]
+            );
             for b in 0..8 {
                 for other in 0..3 {
                     let slope = (up.force[b][other] - down.force[b][other]) / (2.0 * h);
@@ -74,7 +78,8 @@ fn an_even_stretch_has_its_exact_stress() {
     let j: f64 = stretch.x * stretch.y * stretch.z;
     let squares = stretch * stretch;
     let trace = squares.x + squares.y + squares.z;
-    let energy = 0.5 * shear * (j.powf(-2.0 / 3.0) * trace - 3.0) + 0.5 * bulk * (0.5 * (j * j - 1.0) - j.ln());
+    let energy =
+        0.5 * shear * (j.powf(-2.0 / 3.0) * trace - 3.0) + 0.5 * bulk * (0.5 * (j * j - 1.0) - j.ln());
     assert!((response.energy - volume * energy).abs() < 1e-12 * volume * energy);
     // Virtual work of the same stretch rate: sum f.x = V P:I per axis.
     for axis in 0..3 {
@@ -113,11 +118,9 @@ fn small_loads_agree_with_small_strain_to_first_order() {
         let pose = Rigid::from_translation(DVec3::Z * (12.0 - depth_mm));
         let solve = |small| neo_hookean(&elastomer, &body, &plate, &pose, None, small).unwrap();
         let (large, small) = (solve(false), solve(true));
-        println!("{depth_mm} {:?} {} {} {} it {}", large.status, large.wrench.force_n, small.wrench.force_n, large.penetration_mm, large.iterations);
         assert_eq!(large.status, Status::Solved);
         parts.push((large.wrench.force_n.z / small.wrench.force_n.z - 1.0).abs());
     }
-    println!("{parts:?}");
     assert!(parts[0] < 0.1 && parts[1] < 0.75 * parts[0] && parts[2] < 0.75 * parts[1], "{parts:?}");
 }
 
@@ -127,7 +130,10 @@ fn bricks_come_nearer_to_the_swept_elements() {
     let elastomer = silicone();
     let ball = Indenter::rigid(Solid::sphere(40.0).unwrap());
     let pose = Rigid::from_translation(DVec3::Z * (50.0 - 0.8));
-    let swept = Contact::new(elastomer, Level::Linear { element_mm: 0.5 }).unwrap().solve(&ball, &pose, None).unwrap();
+    let swept = Contact::new(elastomer, Level::Linear { element_mm: 0.5 })
+        .unwrap()
+        .solve(&ball, &pose, None)
+        .unwrap();
     let mut off = Vec::new();
     for half in [4, 8] {
         let body = Arc::new(Body::new(&elastomer, half).unwrap());
@@ -138,7 +144,6 @@ fn bricks_come_nearer_to_the_swept_elements() {
             .into_iter()
             .fold(0.0, f64::max);
         let force = bricks.wrench.force_n.z / swept.wrench.force_n.z - 1.0;
-        println!("{half} force {force} field {worst}");
         off.push((force.abs(), worst));
     }
     assert!(off[1].0 < 0.1 && off[1].1 < 0.05, "{off:?}");

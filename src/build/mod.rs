@@ -87,6 +87,8 @@ pub struct Build {
     pub manifest: Manifest,
     /// Number of dots.
     pub dot_count: usize,
+    /// What the layout comes to, a sentence each.
+    pub headlines: Vec<String>,
 }
 
 /// Makes everything; `step` is told what is being made. Nothing is written to the disk.
@@ -128,7 +130,8 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     for file in films? {
         tree.add(file.path, file.bytes);
     }
-    tree.add("artwork/layout.json", judged);
+    let (judged, figures) = judged;
+    tree.add("artwork/layout.json", figures);
     let (made, files) = parts?;
     for file in files {
         tree.add(file.path, file.bytes);
@@ -154,7 +157,7 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     }
     warnings.extend(forms.left_out.into_iter().map(|message| Warning { field: "constants".into(), message }));
     warnings.extend(
-        layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
+        judged.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
     );
 
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
@@ -163,15 +166,16 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     let mut text = serde_json::to_string_pretty(&manifest).unwrap_or_default();
     text.push('\n');
     tree.add(MANIFEST_NAME, text.into_bytes());
-    Ok(Build { tree, manifest, dot_count: layout.dots.len() })
+    Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines: judged.headlines() })
 }
 
-/// The figures of the layout, as a file.
-fn judge(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<u8> {
+/// The figures of the layout, and the same as a file.
+fn judge(design: &Design, spec: &LayoutSpec, layout: &Layout) -> (LayoutReport, Vec<u8>) {
+    let report = LayoutReport::new(design, spec, layout);
     // numbers, strings and lists only: nothing here can fail to be written
-    let mut text = serde_json::to_string_pretty(&LayoutReport::new(design, spec, layout)).unwrap_or_default();
+    let mut text = serde_json::to_string_pretty(&report).unwrap_or_default();
     text.push('\n');
-    text.into_bytes()
+    (report, text.into_bytes())
 }
 
 /// The parts, checked in their assembly, and their files.

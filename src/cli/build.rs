@@ -36,6 +36,9 @@ pub fn run(output: &Output, design_file: &Path, out: Option<&Path>) -> Result<()
         bytes as f64 / 1e6,
         began.elapsed().as_secs_f64(),
     ))?;
+    for headline in &result.headlines {
+        output.say(&format!("  {headline}"))?;
+    }
     for file in &result.manifest.files {
         output.say(&format!("  {}", file.path))?;
     }

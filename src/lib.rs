@@ -13,4 +13,5 @@ pub mod numeric;
 pub mod optics;
 pub mod parts;
 pub mod pose;
+pub mod sim;
 pub mod transfer;

@@ -234,7 +234,7 @@ fn a_table_at_fault_is_refused_with_its_line() {
         assert!(message.contains(problem), "{table}: {message}");
         assert!(!at.join("new.json").exists());
     }
-    // Points on one line, a mirrored picture and inches are named.
+    // Marks that were found on one line, a mirrored picture and inches are named.
     let line: String = (0..14).map(|id| format!("{id},{},0\n", 0.3 * f64::from(id))).collect();
     let marks: Vec<(u32, DVec2)> = {
         assert!(domecast(&["build", "design.json", "--out", "built"], at).status.success());
@@ -244,7 +244,7 @@ fn a_table_at_fault_is_refused_with_its_line() {
         marks.iter().map(|(id, at)| format!("{id},{},{}\n", at.x * x, at.y * y)).collect()
     };
     for (rows, problem) in
-        [(line, "line"), (rows(1.0, -1.0), "turned over"), (rows(1.0 / 25.4, 1.0 / 25.4), "wrong unit")]
+        [(line, "map"), (rows(1.0, -1.0), "turned over"), (rows(1.0 / 25.4, 1.0 / 25.4), "wrong unit")]
     {
         fs::write(at.join("measured.csv"), format!("id,x_mm,y_mm\n{rows}")).expect("written");
         let run = domecast(&["calibrate-print", "measured.csv", "design.json", "--out", "new.json"], at);

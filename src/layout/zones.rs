@@ -93,8 +93,8 @@ pub(super) fn check_corners(zones: &[ImageZone], dot: &[DVec2]) -> Result<(), Re
 
 /// Distance between two polygons; zero where they overlap. A polygon of one corner is a point.
 pub(super) fn gap(a: &[DVec2], b: &[DVec2]) -> f64 {
-    let overlap = a.first().is_some_and(|p| inside(*p, b)) || b.first().is_some_and(|p| inside(*p, a));
-    if overlap {
+    // Every corner is asked: polygons that cross may have one corner in each other, and it need not be the first.
+    if a.iter().any(|p| inside(*p, b)) || b.iter().any(|p| inside(*p, a)) {
         return 0.0;
     }
     let from_to = |points: &[DVec2], polygon: &[DVec2]| {

@@ -88,6 +88,8 @@ pub struct Build {
     pub manifest: Manifest,
     /// Number of dots.
     pub dot_count: usize,
+    /// What the layout comes to, a sentence each.
+    pub headlines: Vec<String>,
 }
 
 impl Build {
@@ -184,7 +186,7 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     }
     warnings.extend(forms.left_out.into_iter().map(|message| Warning { field: "constants".into(), message }));
     warnings.extend(
-        layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
+        judged.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
     );
 
     step("writing the page");
@@ -207,7 +209,7 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
     let manifest = Manifest::new(record, records, warnings, &tree);
     tree.add(MANIFEST_NAME, pretty(&manifest));
-    Ok(Build { tree, manifest, dot_count: layout.dots.len() })
+    Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines: judged.headlines() })
 }
 
 /// A file for programs.

@@ -6,6 +6,7 @@ pub mod camera;
 pub mod cli;
 pub mod constants;
 pub mod design;
+pub mod frames;
 pub mod layout;
 pub mod mechanics;
 pub mod mesh;

@@ -1,13 +1,21 @@
-//! Where the white markers go under load, as limits of a load: lens, mask, and the platform's opening.
+//! Where the white markers go under load: lens, mask, and the platform's opening. As limits for the load envelope,
+//! and as the fault of a design that claims a load under which a marker is lost.
 
 use glam::{DVec2, DVec3};
+use serde_json::json;
 
-use crate::design::Design;
+use crate::design::{Design, DesignError};
 use crate::mechanics::{Check, Limit};
 use crate::numeric::Rigid;
 use crate::optics::SensorOptics;
 use crate::parts::{Measures, ViewCone};
 use crate::pose::Marker;
+
+/// Points of a marker's edge that are followed, every 45 degrees from the one that looks away from the pupil: the
+/// one that leaves the lens and the mask first.
+const EDGE_POINTS: u32 = 8;
+/// What a point that cannot be seen uses of a limit.
+const LOST: f64 = 2.0;
 
 /// The white markers of a design, and what may hide them.
 #[derive(Debug, Clone)]
@@ -27,6 +35,27 @@ pub fn markers_of(design: &Design) -> Vec<Marker> {
     numbered.map(|(id, position_mm)| Marker { id, position_mm, diameter_mm }).collect()
 }
 
+/// The largest use of a limit so far, and the marker.
+#[derive(Clone, Copy)]
+struct Worst {
+    value: f64,
+    id: u32,
+}
+
+impl Worst {
+    const NONE: Self = Self { value: 0.0, id: 0 };
+
+    fn keep(&mut self, value: f64, id: u32) {
+        if value > self.value {
+            *self = Self { value, id };
+        }
+    }
+
+    fn check(self, limit: Limit, bound: f64, unit: &'static str) -> Check {
+        Check { limit, part: format!("marker {}", self.id), value: self.value, bound, unit }
+    }
+}
+
 impl MarkerSight {
     /// From a design; the window is left out of the checks where its shape cannot be computed.
     pub fn of(design: &Design) -> Self {
@@ -44,56 +73,79 @@ impl MarkerSight {
     /// there is.
     pub fn checks(&self, pose: &Rigid) -> Vec<Check> {
         let far = self.optics.lens().max_field_angle_rad();
-        let mut lens = (0.0, 0);
-        let mut mask = (0.0, 0);
-        let mut edge = (0.0, 0);
-        let keep = |worst: &mut (f64, u32), used: f64, id: u32| {
-            if used > worst.0 {
-                *worst = (used, id);
-            }
-        };
-        let placed = self.optics.at_pose(pose);
+        let (mut lens, mut mask, mut edge) = (Worst::NONE, Worst::NONE, Worst::NONE);
+        let placed = self.optics.at_pose(pose).ok();
         for marker in &self.markers {
-            let outline = placed.as_ref().ok().and_then(|optics| marker.outline_px(optics).ok());
-            let (Some(outline), Ok(optics)) = (outline, &placed) else {
-                keep(&mut lens, 2.0 * far, marker.id);
+            let id = marker.id;
+            let Some(optics) = &placed else {
+                lens.keep(LOST * far, id);
                 continue;
             };
-            for pixel in outline {
-                let Ok(ray) = optics.lens().unproject(pixel) else {
-                    keep(&mut lens, 2.0 * far, marker.id);
+            let pupil = optics.sensor_from_camera().translation_mm;
+            let outward = (marker.position_mm - pupil).truncate().try_normalize().unwrap_or(DVec2::X);
+            for k in 0..EDGE_POINTS {
+                let turn = DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(EDGE_POINTS));
+                let step = outward.rotate(turn) * (0.5 * marker.diameter_mm);
+                let seen = optics.project(marker.position_mm + step.extend(0.0)).ok();
+                let ray = seen.and_then(|pixel| Some((pixel, optics.lens().unproject(pixel).ok()?)));
+                let Some((pixel, ray)) = ray else {
+                    lens.keep(LOST * far, id);
                     continue;
                 };
                 let angle = crate::camera::Lens::field_angle_rad(ray);
-                keep(&mut lens, angle, marker.id);
-                keep(&mut mask, self.mask_px(ray, pixel, optics), marker.id);
+                lens.keep(angle, id);
+                mask.keep(self.mask_px(ray, pixel, optics), id);
                 if let Some((cone, heights)) = &self.window {
-                    keep(&mut edge, window_use(optics, ray, angle, cone, *heights), marker.id);
+                    edge.keep(window_use(optics, ray, angle, cone, *heights), id);
                 }
             }
         }
-        let part = |id: u32| format!("marker {id}");
         let mut checks = vec![
-            Check {
-                limit: Limit::MarkerOutOfLens,
-                part: part(lens.1),
-                value: lens.0,
-                bound: far,
-                unit: "rad",
-            },
-            Check {
-                limit: Limit::MarkerOutOfMask,
-                part: part(mask.1),
-                value: mask.0,
-                bound: self.mask_radius_px,
-                unit: "px",
-            },
+            lens.check(Limit::MarkerOutOfLens, far, "rad"),
+            mask.check(Limit::MarkerOutOfMask, self.mask_radius_px, "px"),
         ];
         if self.window.is_some() {
-            let limit = Limit::MarkerBehindEdge;
-            checks.push(Check { limit, part: part(edge.1), value: edge.0, bound: 1.0, unit: "1" });
+            checks.push(edge.check(Limit::MarkerBehindEdge, 1.0, "1"));
         }
         checks
+    }
+
+    /// Whether every marker is in sight at a pose; `when` says which: "at rest", "under the load ..".
+    ///
+    /// # Errors
+    /// The marker and the limit that it is past.
+    pub fn require(&self, pose: &Rigid, when: &str) -> Result<(), DesignError> {
+        let Some(passed) = self.checks(pose).into_iter().find(Check::is_passed) else { return Ok(()) };
+        let Check { limit, part, value, bound, unit } = &passed;
+        let index = part.rsplit(' ').next().and_then(|id| id.parse::<usize>().ok()).unwrap_or(0);
+        let place = self.markers.get(index).map_or(DVec3::ZERO, |m| m.position_mm);
+        let problem = match limit {
+            Limit::MarkerOutOfLens if *value >= LOST * bound => {
+                "the lens cannot see the marker's edge".into()
+            }
+            Limit::MarkerOutOfLens => format!("the marker's edge is at {value:.3} {unit} in the lens"),
+            Limit::MarkerOutOfMask if *value >= LOST * bound => {
+                "the marker's edge is outside the frame".into()
+            }
+            Limit::MarkerOutOfMask => {
+                format!("the marker's edge is {value:.2} {unit} from the mask's centre")
+            }
+            _ => format!("the marker is behind the edge of the window, {value:.3} of the way"),
+        };
+        let bound_name = match limit {
+            Limit::MarkerOutOfLens => "max_field_angle",
+            Limit::MarkerOutOfMask => "runtime.mask_radius_px",
+            _ => "the window",
+        };
+        let allowed =
+            format!("at most {bound_name}, {bound:.3} {unit}, at rest and under every claimed load");
+        Err(DesignError::at(
+            format!("white_markers.positions_mm[{index}]"),
+            json!([place.x, place.y]),
+            format!("{when}, {problem}"),
+            allowed,
+        )
+        .with_help("move the markers inwards, the camera deeper, stiffen the springs, or claim less load"))
     }
 
     /// Distance from the mask's centre in the undistorted frame; twice the mask where that frame ends or the raw
@@ -103,7 +155,7 @@ impl MarkerSight {
         let (right, bottom) = (f64::from(spec.width) - 0.5, f64::from(spec.height) - 0.5);
         let in_frame = pixel.x >= -0.5 && pixel.y >= -0.5 && pixel.x <= right && pixel.y <= bottom;
         if ray.z <= 0.0 || !in_frame {
-            return 2.0 * self.mask_radius_px;
+            return LOST * self.mask_radius_px;
         }
         let [[fx, ..], [_, fy, _], _] = self.undistorted_matrix;
         DVec2::new(fx * ray.x, fy * ray.y).length() / ray.z

@@ -14,4 +14,5 @@ pub mod numeric;
 pub mod optics;
 pub mod parts;
 pub mod pose;
+pub mod sim;
 pub mod transfer;

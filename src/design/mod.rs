@@ -71,8 +71,11 @@ pub fn optics_from_text(text: &str) -> Result<SensorOptics, DesignError> {
     resolve::optics(&file.camera, &file.optics, &file.dome)
 }
 
-/// Checks a tree against the schema of `T`, then reads it.
-fn from_value<T: DeserializeOwned + schemars::JsonSchema>(value: &Value) -> Result<T, DesignError> {
+/// Checks a tree against the schema of `T`, then reads it: for files of other kinds than designs too.
+///
+/// # Errors
+/// The first fault of the tree, by its field.
+pub fn from_value<T: DeserializeOwned + schemars::JsonSchema>(value: &Value) -> Result<T, DesignError> {
     schema::check(&schema_of::<T>(), value, "")?;
     // the schema is made from the same types, so this fails only where the schema cannot say a rule
     serde_json::from_value(value.clone())

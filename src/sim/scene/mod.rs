@@ -1,0 +1,161 @@
+//! What happens: from a scene file to a resolved, validated [`Scene`].
+
+pub mod electronics;
+pub mod file;
+pub mod light;
+mod motion;
+pub mod objects;
+mod resolve;
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use crate::design::Design;
+use crate::layout::Layout;
+use crate::mechanics::Suspension;
+use crate::optics::SensorOptics;
+use crate::pose::Marker;
+
+pub use file::SceneFile;
+pub use motion::{Held, Motion, State};
+
+use super::SimError;
+use super::effect::EffectName;
+use file::EffectChoice;
+
+/// Points that carry a dot's outline.
+pub const RIM_POINTS: usize = 8;
+
+/// A printed dot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneDot {
+    /// Its number.
+    pub id: u32,
+    /// Its centre on the undeformed dome, sensor frame, mm.
+    pub center_mm: DVec3,
+    /// Its outline on the undeformed dome: points at equal steps of the outline's angle, sensor frame, mm.
+    pub rim_mm: [DVec3; RIM_POINTS],
+    /// Part of its width that is printed, and the angle of the outline at which the missing part lies, rad.
+    pub cut: Option<(f64, f64)>,
+}
+
+/// A resolved, validated scene: a design and what happens to it.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    file: SceneFile,
+    folder: PathBuf,
+    design: Design,
+    layout: Layout,
+    suspension: Suspension,
+    dots: Vec<SceneDot>,
+    markers: Vec<Marker>,
+    motion: Motion,
+}
+
+impl Scene {
+    /// Reads and resolves a scene file, with the design that it names.
+    ///
+    /// # Errors
+    /// The first fault of scene, design or meshes, with its file and field.
+    pub fn load(path: &Path) -> Result<Self, SimError> {
+        resolve::load(path)
+    }
+
+    /// Resolves a scene's text; relative paths start at `folder`.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn from_text(text: &str, folder: &Path) -> Result<Self, SimError> {
+        resolve::from_text(text, folder)
+    }
+
+    /// Resolves a scene with a design that is there already.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn new(file: SceneFile, folder: &Path, design: Design) -> Result<Self, SimError> {
+        resolve::resolve(file, folder, design)
+    }
+
+    /// The scene as written; every rule between its fields holds.
+    pub fn file(&self) -> &SceneFile {
+        &self.file
+    }
+
+    /// Name of the scene.
+    pub fn name(&self) -> &str {
+        &self.file.name
+    }
+
+    /// Where relative paths of the scene start.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The sensor.
+    pub fn design(&self) -> &Design {
+        &self.design
+    }
+
+    /// Lens, layers and dome at rest.
+    pub fn optics(&self) -> &SensorOptics {
+        self.design.optics()
+    }
+
+    /// The dots as laid out.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The platform on its springs.
+    pub fn suspension(&self) -> &Suspension {
+        &self.suspension
+    }
+
+    /// The dots as printed, in the layout's order.
+    pub fn dots(&self) -> &[SceneDot] {
+        &self.dots
+    }
+
+    /// The white markers on the sheet.
+    pub fn markers(&self) -> &[Marker] {
+        &self.markers
+    }
+
+    /// Pose and load of the platform over time.
+    pub fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// Number of frames.
+    pub fn frame_count(&self) -> u32 {
+        self.file.frames.count
+    }
+
+    /// Time of a frame, s.
+    pub fn time_s(&self, frame: u32) -> f64 {
+        f64::from(frame) / self.file.frames.rate_hz
+    }
+
+    /// Width and height of the image, px.
+    pub fn image_size(&self) -> (usize, usize) {
+        let spec = self.optics().lens().spec();
+        (spec.width as usize, spec.height as usize)
+    }
+
+    /// Whether images are drawn; else only the truth is told, and no effect of brightness is called for.
+    pub fn draws(&self) -> bool {
+        self.file.frames.images
+    }
+
+    /// Planes of a picture: 3 in colour, else 1.
+    pub fn planes(&self) -> usize {
+        if self.file.frames.colour { 3 } else { 1 }
+    }
+
+    /// What the scene says of an effect.
+    pub fn choice(&self, effect: EffectName) -> EffectChoice {
+        self.file.effects.get(&effect).copied().unwrap_or(EffectChoice::Plan)
+    }
+}

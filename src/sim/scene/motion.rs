@@ -1,0 +1,167 @@
+//! Pose and load of the platform over time.
+
+use glam::DVec3;
+
+use super::file::{MotionSection, PoseKey, WrenchKey};
+use crate::mechanics::{Displacement, Limits, MechanicsError, Suspension, Wrench, limits_of, try_load};
+use crate::numeric::Rigid;
+
+/// Pose and load of the platform at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// `rest_from_platform`.
+    pub pose: Rigid,
+    /// What the world puts on dome and platform, about the suspension's reference point.
+    pub wrench: Wrench,
+    /// What stops the platform, if something does.
+    pub held: Option<Held>,
+}
+
+/// A load that the springs do not carry alone: their coils lie on each other and take the rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Held {
+    /// Name of the limit that holds the platform.
+    pub limit: &'static str,
+    /// The part of the sensor that meets it.
+    pub part: String,
+    /// Part of the load at which it is met, 0 to 1; the pose is that of this part.
+    pub carried: f64,
+}
+
+/// What moves the platform.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    course: Course,
+    limits: Limits,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Course {
+    Still,
+    Wrench(Vec<(f64, Wrench)>),
+    Pose(Vec<(f64, Displacement)>),
+}
+
+/// Bisections of the load down to the part that is just carried: 2^-40 of it.
+const HALVINGS: u32 = 40;
+
+impl Motion {
+    /// The motion of a scene; keys are in order of time.
+    pub(super) fn new(
+        section: Option<&MotionSection>,
+        design: &crate::design::Design,
+        suspension: &Suspension,
+    ) -> Self {
+        let course = match section {
+            None => Course::Still,
+            Some(MotionSection::Wrench(motion)) => {
+                Course::Wrench(motion.wrench.iter().map(|key| wrench_key(key, suspension.at_mm())).collect())
+            }
+            Some(MotionSection::Pose(motion)) => Course::Pose(motion.pose.iter().map(pose_key).collect()),
+        };
+        Self { course, limits: limits_of(design) }
+    }
+
+    /// Whether the platform moves at all.
+    pub fn moves(&self) -> bool {
+        match &self.course {
+            Course::Still => false,
+            Course::Wrench(keys) => keys.iter().any(|(_, w)| w.to_array().iter().any(|v| *v != 0.0)),
+            Course::Pose(keys) => keys.iter().any(|(_, d)| d.to_array().iter().any(|v| *v != 0.0)),
+        }
+    }
+
+    /// The load that the scene puts on besides objects, and where the scene prescribes the pose, that pose.
+    pub fn load_at(&self, time_s: f64) -> (Wrench, Option<Displacement>) {
+        match &self.course {
+            Course::Still => (Wrench::default(), None),
+            Course::Wrench(keys) => {
+                let mix = |a: &Wrench, b: &Wrench, part: f64| Wrench {
+                    force_n: a.force_n.lerp(b.force_n, part),
+                    moment_nmm: a.moment_nmm.lerp(b.moment_nmm, part),
+                };
+                (interpolate(keys, time_s, mix), None)
+            }
+            Course::Pose(keys) => {
+                let mix = |a: &Displacement, b: &Displacement, part: f64| Displacement {
+                    translation_mm: a.translation_mm.lerp(b.translation_mm, part),
+                    rotation_rad: a.rotation_rad.lerp(b.rotation_rad, part),
+                };
+                (Wrench::default(), Some(interpolate(keys, time_s, mix)))
+            }
+        }
+    }
+
+    /// Pose and load at a time, without objects.
+    ///
+    /// # Errors
+    /// A load that has no balance, or a pose beyond the springs' model.
+    pub fn at(&self, suspension: &Suspension, time_s: f64) -> Result<State, MechanicsError> {
+        let (wrench, pose) = self.load_at(time_s);
+        if let Some(displacement) = pose {
+            let wrench = suspension.wrench_at(&displacement)?;
+            return Ok(State { pose: displacement.to_pose(suspension.at_mm()), wrench, held: None });
+        }
+        if wrench == Wrench::default() {
+            return Ok(State { pose: Rigid::identity(), wrench, held: None });
+        }
+        self.balance(suspension, &wrench)
+    }
+
+    /// The balance of a load; where coils bind, the pose at which they just do.
+    fn balance(&self, suspension: &Suspension, wrench: &Wrench) -> Result<State, MechanicsError> {
+        let case = try_load(suspension, &self.limits, wrench);
+        let pose = case.equilibrium.as_ref().map_err(Clone::clone)?.pose;
+        let binds = |case: &crate::mechanics::LoadCase| {
+            case.passed().find(|check| check.limit == crate::mechanics::Limit::CoilBind).cloned()
+        };
+        let Some(check) = binds(&case) else { return Ok(State { pose, wrench: *wrench, held: None }) };
+        let (mut low, mut high) = (0.0, 1.0);
+        let mut pose = Rigid::identity();
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            let part = try_load(suspension, &self.limits, &wrench.scaled(middle));
+            match (&part.equilibrium, binds(&part)) {
+                (Ok(balance), None) => {
+                    low = middle;
+                    pose = balance.pose;
+                }
+                _ => high = middle,
+            }
+        }
+        let held = Held { limit: check.limit.as_str(), part: check.part, carried: low };
+        Ok(State { pose, wrench: *wrench, held: Some(held) })
+    }
+
+    /// The limits of a load.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+}
+
+fn wrench_key(key: &WrenchKey, at_mm: DVec3) -> (f64, Wrench) {
+    let [force, moment, point] = [key.force_n, key.moment_nmm, key.point_mm].map(DVec3::from_array);
+    (key.time_s, Wrench::of_load(force, moment, point, at_mm))
+}
+
+fn pose_key(key: &PoseKey) -> (f64, Displacement) {
+    let displacement = Displacement {
+        translation_mm: DVec3::from_array(key.translation_mm),
+        rotation_rad: DVec3::from_array(key.rotation_deg.map(f64::to_radians)),
+    };
+    (key.time_s, displacement)
+}
+
+/// Linear between the keys around a time, the end keys beyond them.
+pub(super) fn interpolate<T: Clone + Default>(
+    keys: &[(f64, T)],
+    time_s: f64,
+    mix: impl Fn(&T, &T, f64) -> T,
+) -> T {
+    let above = keys.partition_point(|(time, _)| *time <= time_s);
+    match (above.checked_sub(1).and_then(|i| keys.get(i)), keys.get(above)) {
+        (Some((t0, a)), Some((t1, b))) => mix(a, b, (time_s - t0) / (t1 - t0)),
+        (Some((_, end)), None) | (None, Some((_, end))) => end.clone(),
+        (None, None) => T::default(),
+    }
+}

@@ -1,0 +1,116 @@
+//! From the file as written to a scene in which the rules between fields hold.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::file::{MotionSection, SceneFile};
+use super::motion::Motion;
+use super::{RIM_POINTS, Scene, SceneDot};
+use crate::design::{self, Design, DesignError};
+use crate::layout::{Dot, Layout};
+use crate::mechanics::suspension_of;
+use crate::optics::SensorOptics;
+use crate::pose::Marker;
+use crate::sim::SimError;
+
+pub(super) fn load(path: &Path) -> Result<Scene, SimError> {
+    let text = design::read_text(path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    from_text(&text, folder).map_err(|error| match error {
+        SimError::Input(error) if error.file.is_none() => error.in_file(path).into(),
+        other => other,
+    })
+}
+
+pub(super) fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
+    let value = design::parse_json(text)?;
+    let file: SceneFile = design::from_value(&value)?;
+    let path = folder.join(&file.design);
+    let design = design::load(&path)?;
+    resolve(file, folder, design)
+}
+
+pub(super) fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimError> {
+    check(&file)?;
+    let layout = Layout::of_design(&design)?;
+    let suspension = suspension_of(&design)?;
+    let mut dots: Vec<SceneDot> = layout.dots.iter().map(|dot| scene_dot(dot, design.optics())).collect();
+    for (index, broken) in file.ink.broken.iter().enumerate() {
+        let count = dots.len();
+        let dot = dots.get_mut(broken.id as usize).ok_or_else(|| {
+            let allowed = format!("a dot of the design, 0 to {}", count.saturating_sub(1));
+            DesignError::at(format!("ink.broken[{index}].id"), broken.id, "there is no such dot", allowed)
+        })?;
+        dot.cut = Some((broken.left, broken.direction_deg.to_radians()));
+    }
+    let motion = Motion::new(file.motion.as_ref(), &design, &suspension);
+    let diameter_mm = design.sections().white_markers.diameter_mm;
+    let numbered = (0..).zip(design.white_markers_mm());
+    let markers = numbered.map(|(id, position_mm)| Marker { id, position_mm, diameter_mm }).collect();
+    Ok(Scene { file, folder: folder.to_path_buf(), design, layout, suspension, dots, markers, motion })
+}
+
+/// A dot as printed: its outline carried from the image at rest to the dome.
+fn scene_dot(dot: &Dot, optics: &SensorOptics) -> SceneDot {
+    let pieces = dot.image_outline.pieces().len().max(1);
+    let fine = dot.image_outline.polygon((RIM_POINTS / pieces).max(1) as u32);
+    let mut rim_mm = [dot.surface_mm; RIM_POINTS];
+    let radius_mm = 0.5 * dot.diameter_mm;
+    let side = if dot.normal.z.abs() < 0.9 { DVec3::Z.cross(dot.normal) } else { DVec3::X.cross(dot.normal) };
+    let side = side.normalize_or_zero();
+    let up = dot.normal.cross(side);
+    for (k, place) in rim_mm.iter_mut().enumerate() {
+        // An outline with another number of pieces, or a point of it that the lens does not see, is replaced by
+        // the circle of the same area.
+        let seen = fine.get(k).filter(|_| fine.len() == RIM_POINTS).and_then(|px| optics.trace(*px).ok());
+        let (sin, cos) = (std::f64::consts::TAU * k as f64 / RIM_POINTS as f64).sin_cos();
+        let flat = dot.surface_mm + (side * cos + up * sin) * radius_mm;
+        *place = seen.map_or(flat.normalize_or_zero() * optics.dome_radius_mm(), |hit| hit.surface_mm);
+    }
+    SceneDot { id: dot.id, center_mm: dot.surface_mm, rim_mm, cut: None }
+}
+
+fn check(file: &SceneFile) -> Result<(), DesignError> {
+    let name_ok = !file.name.is_empty()
+        && file.name.len() <= 64
+        && file.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+    if !name_ok {
+        return Err(DesignError::at(
+            "name",
+            serde_json::json!(file.name),
+            "not a name for a scene",
+            "1 to 64 letters, digits, `-` or `_`",
+        ));
+    }
+    match &file.motion {
+        None => {}
+        Some(MotionSection::Wrench(motion)) => {
+            check_times("motion.wrench", motion.wrench.iter().map(|key| key.time_s))?;
+        }
+        Some(MotionSection::Pose(motion)) => {
+            check_times("motion.pose", motion.pose.iter().map(|key| key.time_s))?;
+        }
+    }
+    for (index, object) in file.objects.iter().enumerate() {
+        check_times(&format!("objects[{index}].path"), object.path.iter().map(|key| key.time_s))?;
+    }
+    Ok(())
+}
+
+/// Times rise strictly, so that there is one state at each.
+fn check_times(field: &str, times: impl Iterator<Item = f64>) -> Result<(), DesignError> {
+    let mut last = f64::NEG_INFINITY;
+    for (index, time) in times.enumerate() {
+        if time <= last {
+            return Err(DesignError::at(
+                format!("{field}[{index}].time_s"),
+                time,
+                "the times do not rise",
+                format!("more than {last}"),
+            ));
+        }
+        last = time;
+    }
+    Ok(())
+}

@@ -12,6 +12,8 @@ const GROUND: i64 = 2;
 
 /// Ground that strays from a plane by more than this part of the mark's contrast is uneven.
 const UNEVEN: f64 = 0.08;
+/// Pixels where the mark stands out by less than this part of its contrast tell nothing of it.
+const LEAST_DEPTH: f64 = 0.3;
 
 /// A blob's middle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +31,9 @@ pub struct Centroid {
 /// Where the ground is no plane (another edge runs beside the mark), pixels count by their value between mark and ground.
 /// `None` where the frame's border or other blobs leave too little ground, or nothing stands out.
 pub fn centroid(frame: &Gray, blob: &Blob, taken: impl Fn(u32, u32) -> bool) -> Option<Centroid> {
+    if blob.pixels.is_empty() {
+        return None;
+    }
     let [[x0, y0], [x1, y1]] = blob.corners.map(|corner| corner.map(i64::from));
     let (left, top) = (x0 - EDGE - GROUND, y0 - EDGE - GROUND);
     let (width, height) = (x1 + EDGE + GROUND - left + 1, y1 + EDGE + GROUND - top + 1);
@@ -41,8 +46,9 @@ pub fn centroid(frame: &Gray, blob: &Blob, taken: impl Fn(u32, u32) -> bool) -> 
         let (x, y) = (i64::from(*x), i64::from(*y));
         for dy in -(far - 1)..far {
             for dx in -(far - 1)..far {
-                let slot = &mut distance[index(x + dx, y + dy)];
-                *slot = (*slot).min(dx.abs().max(dy.abs()));
+                if let Some(slot) = distance.get_mut(index(x + dx, y + dy)) {
+                    *slot = (*slot).min(dx.abs().max(dy.abs()));
+                }
             }
         }
     }
@@ -83,30 +89,27 @@ pub fn centroid(frame: &Gray, blob: &Blob, taken: impl Fn(u32, u32) -> bool) -> 
         return None;
     }
     let plane = normal.cholesky()?.solve(&right);
+    let own = |x: i64, y: i64| f64::from(frame.at(x as isize, y as isize));
+    let ground_at = |d: DVec2| plane.dot(&Vector3::new(1.0, d.x, d.y));
+    let count = blob.pixels.len() as f64;
+    let mark = blob.pixels.iter().map(|[x, y]| own(i64::from(*x), i64::from(*y))).sum::<f64>() / count;
+    let contrast = mark - plane.x;
+    // How much of each pixel is covered: a mark of one value on ground that is shaded stands out more on one side.
     let (mut sum, mut moment) = (0.0, DVec2::ZERO);
-    let (mut inside, mut count) = (0.0, 0.0);
-    for (x, y) in pixels() {
-        let steps = distance[index(x, y)];
-        if steps <= EDGE {
-            let d = from_middle(x, y);
-            let stands_out =
-                f64::from(frame.at(x as isize, y as isize)) - plane.dot(&Vector3::new(1.0, d.x, d.y));
-            sum += stands_out;
-            moment += d * stands_out;
-            if steps == 0 {
-                inside += stands_out;
-                count += 1.0;
-            }
+    for (x, y) in pixels().filter(|(x, y)| distance[index(*x, *y)] <= EDGE) {
+        let d = from_middle(x, y);
+        let depth = (mark - ground_at(d)) / contrast;
+        if depth > LEAST_DEPTH {
+            let covered = (own(x, y) - ground_at(d)) / (contrast * depth);
+            sum += covered;
+            moment += d * covered;
         }
     }
-    let contrast = inside / count;
     let rough = ground.iter().map(|(terms, value)| (value - plane.dot(terms)).powi(2)).sum::<f64>();
-    let mut area_px = sum / contrast;
+    let mut area_px = sum;
     let mut from = moment / sum;
     if (rough / ground.len() as f64).sqrt() > UNEVEN * contrast.abs() {
         // An edge beside the mark: count a pixel by where it lies between the mark and the ground next to it in value.
-        let own = |x: i64, y: i64| f64::from(frame.at(x as isize, y as isize));
-        let mark = blob.pixels.iter().map(|[x, y]| own(i64::from(*x), i64::from(*y))).sum::<f64>() / count;
         let side = contrast.signum();
         let nearest = ground.iter().map(|(_, value)| side * value).fold(f64::NEG_INFINITY, f64::max) * side;
         let level = 0.5 * (mark + nearest);

@@ -61,7 +61,7 @@ fn an_edge_beside_a_disc_moves_it_little() {
         marks(&frame, Side::Bright, 12).into_iter().filter(|b| b.fullness() > 0.9).collect();
     let spot = found.iter().filter_map(|b| centroid(&frame, b, |_, _| false));
     let nearest = spot.map(|s| s.at_px.distance(place)).fold(f64::INFINITY, f64::min);
-    assert!(nearest < 0.06, "{nearest}");
+    assert!(nearest < 0.1, "{nearest}");
 }
 
 #[test]

@@ -9,8 +9,8 @@ use crate::numeric::{Rigid, rotation_from_vector, vector_from_rotation};
 use crate::optics::{Limit, SensorOptics};
 
 const MOST_STEPS: u32 = 40;
-/// The step after which a pose counts as found, mm: it is then right to some 1e-8 mm.
-const SETTLED_MM: f64 = 5e-6;
+/// The step after which a pose counts as found, mm: it is then right to 1e-8 mm.
+const SETTLED_MM: f64 = 2e-6;
 
 /// Why residuals do not exist at a pose: which marker, which limit.
 pub(super) type Hidden = (u32, Limit);
@@ -203,8 +203,8 @@ pub(super) fn refine(
         // A turn counts by what it moves at a lever of ten millimetres.
         let moved = v.length().max(10.0 * w.length());
         if exact && moved <= SETTLED_MM && damping == 0.0 {
-            // What is left after this step is a thousandth of it (an offset's own motion, and the curvature where
-            // noise leaves residuals): no need to look again.
+            // What is left after this step is some thousandths of it (an offset's own motion, and the curvature
+            // where noise leaves residuals): no need to look again.
             (pose, settled) = (next, true);
             break;
         }

@@ -8,6 +8,7 @@ mod check;
 mod output;
 mod points;
 mod schema;
+mod simulate;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -95,8 +96,19 @@ enum Command {
         #[arg(long)]
         centroids: Option<PathBuf>,
     },
+    /// Draw what the sensor will see, with the exact truth, using only the effects that the scene calls for.
+    Simulate {
+        /// The scene file.
+        scene: PathBuf,
+        #[command(flatten)]
+        options: simulate::SimulateOptions,
+    },
     /// Print the JSON schema of the design file.
-    Schema,
+    Schema {
+        /// That of the scene file instead.
+        #[arg(long)]
+        scene: bool,
+    },
     /// Fit the pad's map to a measured test print, and write it into a new design file.
     CalibratePrint {
         /// CSV of `id,x_mm,y_mm` (seen from outside, pole at the origin) or `id,phi_deg,theta_deg`, optionally
@@ -153,7 +165,8 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
             let files = calibrate_optics::Files { out: out.as_deref(), centroids: centroids.as_deref() };
             calibrate_optics::run(output, seen, constants, &files, *rest_frames)
         }
-        Command::Schema => schema::run(output),
+        Command::Simulate { scene, options } => simulate::run(output, scene, options),
+        Command::Schema { scene } => schema::run(output, *scene),
         Command::CalibratePrint { measured, design, out, marks } => {
             calibrate_print::run(output, measured, design, out.as_deref(), *marks)
         }

@@ -181,22 +181,23 @@ impl Sheet {
             let mut by_t = [placed.air_mm; N];
             slopes = [placed.air_mm; N];
             for [n2, excess, d] in &self.plates {
-                for i in 0..N {
-                    let inverse = 1.0 / (n2 + excess * tangents[i] * tangents[i]);
+                for ((t, by_t), slope) in tangents.iter().zip(&mut by_t).zip(&mut slopes) {
+                    let inverse = 1.0 / (n2 + excess * t * t);
                     let part = d * inverse.sqrt();
-                    by_t[i] += part;
-                    slopes[i] += part * n2 * inverse;
+                    *by_t += part;
+                    *slope += part * n2 * inverse;
                 }
             }
-            for i in 0..N {
-                tangents[i] = (tangents[i] + (far[i] - by_t[i] * tangents[i]) / slopes[i]).max(0.0);
+            for (((t, far), by_t), slope) in tangents.iter_mut().zip(&far).zip(&by_t).zip(&slopes) {
+                *t = (*t + (far - by_t * *t) / slope).max(0.0);
             }
         }
         let mut around = [DVec2::ZERO; N];
-        for i in 0..N {
+        let rays = there.iter().zip(&far).zip(&tangents).zip(&slopes);
+        for (pixel, (((there, far), tangent), slope)) in around.iter_mut().zip(rays) {
             // On the axis the two meet: t / reach -> dt / dreach.
-            let per_mm = if far[i] > 0.0 { tangents[i] / far[i] } else { 1.0 / slopes[i] };
-            around[i] = self.lens.project(in_camera(there[i], per_mm)).ok()?;
+            let per_mm = if *far > 0.0 { tangent / far } else { 1.0 / slope };
+            *pixel = self.lens.project(in_camera(*there, per_mm)).ok()?;
         }
         Some((center, first_order, around))
     }

@@ -114,7 +114,7 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     step("laying out the dots");
     let (spec, layout) = lay_out(design)?;
     step("writing the constants");
-    let springs = constants::springs_of(design, &sight)?;
+    let springs = constants::springs_of(design, sight)?;
     let constants = constants::with_springs(design, &layout, &springs)?;
     tree.add("constants/constants.json", constants.to_json().into_bytes());
     // four pieces of work that share nothing but what they read, on as many threads as there are
@@ -122,7 +122,12 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
     let ((films, judged), (parts, forces)) = rayon::join(
         || rayon::join(|| artwork::files(&spec, &layout, &label), || judge(design, &spec, &layout)),
-        || rayon::join(|| make_parts(design, &layout), || constants::force_report(design, &springs, &sight)),
+        || {
+            rayon::join(
+                || make_parts(design, &layout, &springs),
+                || constants::force_report(design, &springs),
+            )
+        },
     );
     for file in films? {
         tree.add(file.path, file.bytes);
@@ -177,19 +182,20 @@ fn judge(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<u8> {
 fn make_parts(
     design: &Design,
     layout: &Layout,
+    springs: &constants::DesignSprings,
 ) -> Result<(Vec<parts::Part>, Vec<parts::PartFile>), PartError> {
-    let measures = parts::Measures::of(design)?;
-    let made = parts::build(&measures, &layout.hits)?;
-    let assembly = parts::Assembly::of(&measures, &made)?;
-    parts::check_assembly(&measures, &made, &assembly)?;
-    let files = parts::files(design, &measures, &made, &assembly)?;
+    let measures = springs.sight.measures()?;
+    let made = parts::build(measures, &layout.hits)?;
+    let assembly = parts::Assembly::of(measures, &made)?;
+    parts::check_assembly(measures, &made, &assembly)?;
+    let files = parts::files(design, measures, &made, &assembly)?;
     Ok((made, files))
 }
 
 /// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight; gives back who watches them.
 fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
     let sight = constants::MarkerSight::of(design);
-    sight.require(&Rigid::identity(), "at rest")?;
+    sight.require(design, &Rigid::identity(), "at rest")?;
     let suspension = suspension_of(design)?;
     for (index, (claim, case)) in
         design.sections().loads.claims.iter().zip(claims_of(design, &suspension)).enumerate()
@@ -223,7 +229,7 @@ fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
             )
         })?;
         let pose = balance.displacement.to_pose(suspension.at_mm());
-        sight.require(&pose, &format!("under the load \"{}\"", claim.name))?;
+        sight.require(design, &pose, &format!("under the load \"{}\"", claim.name))?;
     }
     Ok(sight)
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::resolution::{design_choices, resolution_at};
-use super::sight::{MarkerSight, markers_of};
+use super::sight::markers_of;
 use super::springs::DesignSprings;
 use crate::design::{Design, DesignError};
 use crate::mechanics::{
@@ -70,18 +70,14 @@ fn check_json(check: &Check) -> serde_json::Value {
     })
 }
 
-/// Computes the report of a design; `springs` is what went into its constants, `sight` watches its white
-/// markers.
+/// Computes the report of a design; `springs` is what went into its constants.
 ///
 /// # Errors
 /// [`DesignError`] where the springs cannot be.
-pub fn force_report(
-    design: &Design,
-    springs: &DesignSprings,
-    sight: &MarkerSight,
-) -> Result<ForceReport, DesignError> {
+pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceReport, DesignError> {
     let suspension = suspension_of(design)?;
     let limits = limits_of(design);
+    let sight = &springs.sight;
     let more = |pose: &Rigid| sight.checks(pose);
     let radius_mm = design.sections().dome.radius_mm;
     let directions = standard_directions(suspension.at_mm(), radius_mm, AZIMUTHS);

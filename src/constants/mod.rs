@@ -41,7 +41,7 @@ use crate::optics::Channel;
 /// # Errors
 /// A white marker whose centre the lens cannot see at rest.
 pub fn of(design: &Design, layout: &Layout) -> Result<Constants, DesignError> {
-    with_springs(design, layout, &springs_of(design, &MarkerSight::of(design))?)
+    with_springs(design, layout, &springs_of(design, MarkerSight::of(design))?)
 }
 
 /// [`of`] with springs that are known already.

@@ -10,7 +10,7 @@ fn thumb(name: &str) -> Design {
 }
 
 fn springs(design: &Design) -> DesignSprings {
-    springs_of(design, &MarkerSight::of(design)).unwrap()
+    springs_of(design, MarkerSight::of(design)).unwrap()
 }
 
 // What the paper's pipeline gains where a 6x6 can follow: ten times on Fz, Mx, My, nothing lost elsewhere.

@@ -14,12 +14,14 @@ use crate::mechanics::{Displacement, Suspension, Wrench, limits_of, suspension_o
 const COMPRESSION_STEP_MM: f64 = 0.5;
 
 /// The springs of a design for its constants, and the fit for the plain runtime where the claimed loads allow one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct DesignSprings {
     /// What goes into the constants.
     pub constants: SpringConstants,
     /// The fit behind `plain_runtime`.
     pub plain: Option<PlainFit>,
+    /// What the camera sees of the markers; it costs to compute, so it is passed on.
+    pub sight: MarkerSight,
 }
 
 /// Rows of a matrix, as the constants carry it.
@@ -59,7 +61,7 @@ pub fn claimed_loads(design: &Design, suspension: &Suspension, sight: &MarkerSig
 ///
 /// # Errors
 /// [`DesignError`] where the springs have no stiffness at rest.
-pub fn springs_of(design: &Design, sight: &MarkerSight) -> Result<DesignSprings, DesignError> {
+pub fn springs_of(design: &Design, sight: MarkerSight) -> Result<DesignSprings, DesignError> {
     let suspension = suspension_of(design)?;
     let fault = |error: crate::mechanics::MechanicsError| {
         DesignError::at("springs", "", error.to_string(), "springs that stand at rest")
@@ -83,7 +85,7 @@ pub fn springs_of(design: &Design, sight: &MarkerSight) -> Result<DesignSprings,
         stiffness_at: &stiffness_at,
     };
     // Without enough loads the plain runtime gets no constants of its own: their absence says so.
-    let plain = PlainFit::over(&input, &claimed_loads(design, &suspension, sight)).ok();
+    let plain = PlainFit::over(&input, &claimed_loads(design, &suspension, &sight)).ok();
     let plain_runtime = plain.as_ref().map(PlainFit::constants);
     let constants = SpringConstants {
         stiffness: rows(&stiffness),
@@ -93,7 +95,7 @@ pub fn springs_of(design: &Design, sight: &MarkerSight) -> Result<DesignSprings,
         offset: None,
         plain_runtime,
     };
-    Ok(DesignSprings { constants, plain })
+    Ok(DesignSprings { constants, plain, sight })
 }
 
 /// The wrench of a displacement by the constants: the 6x6 interpolated at the compression (linearly between the

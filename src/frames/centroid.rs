@@ -91,8 +91,19 @@ pub fn centroid(frame: &Gray, blob: &Blob, taken: impl Fn(u32, u32) -> bool) -> 
     let plane = normal.cholesky()?.solve(&right);
     let own = |x: i64, y: i64| f64::from(frame.at(x as isize, y as isize));
     let ground_at = |d: DVec2| plane.dot(&Vector3::new(1.0, d.x, d.y));
-    let count = blob.pixels.len() as f64;
-    let mark = blob.pixels.iter().map(|[x, y]| own(i64::from(*x), i64::from(*y))).sum::<f64>() / count;
+    // The mark's own value, from pixels that no edge touches where there are any.
+    let inner = |x: i64, y: i64| {
+        (-1..=1)
+            .all(|dy| (-1..=1).all(|dx| distance.get(index(x + dx, y + dy)).is_none_or(|steps| *steps == 0)))
+    };
+    let places = || blob.pixels.iter().map(|[x, y]| (i64::from(*x), i64::from(*y)));
+    let mean_of = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let core: Vec<f64> = places().filter(|(x, y)| inner(*x, *y)).map(|(x, y)| own(x, y)).collect();
+    let mark = if core.is_empty() {
+        mean_of(&places().map(|(x, y)| own(x, y)).collect::<Vec<f64>>())
+    } else {
+        mean_of(&core)
+    };
     let contrast = mark - plane.x;
     // How much of each pixel is covered: a mark of one value on ground that is shaded stands out more on one side.
     let (mut sum, mut moment) = (0.0, DVec2::ZERO);

@@ -71,7 +71,7 @@ impl Normal {
             let sum: f64 = (0..i).map(|k| l[i][k] * l[i][k]).sum();
             let square = l[i][i] * (1.0 + damping) - sum;
             // Rounding of the sum: below it the direction is open.
-            if !(square > 1e-15 * l[i][i]) {
+            if square.is_nan() || square <= 1e-15 * l[i][i] {
                 return None;
             }
             per_diagonal[i] = 1.0 / square.sqrt();

@@ -110,7 +110,7 @@ enum Springs {
     /// By each joint: there is nothing beside the diagonal.
     Joints([f64; 6]),
     /// By tendons: stiffness and the joints' coefficients.
-    Tendons([(f64, [f64; 6]); 6]),
+    Tendons(Vec<(f64, [f64; 6])>),
 }
 
 /// N/mm, N and N*mm to N/m, N and N*m.
@@ -162,7 +162,7 @@ fn springs_of(stiffness: &Matrix6<f64>) -> (Springs, String) {
 }
 
 /// K = sum of d l l^T, with d above zero; `None` where K is not positive definite.
-fn ldl(stiffness: &Matrix6<f64>) -> Option<[(f64, [f64; 6]); 6]> {
+fn ldl(stiffness: &Matrix6<f64>) -> Option<Vec<(f64, [f64; 6])>> {
     let factor = stiffness.cholesky()?.l();
     let column = |j: usize| {
         let pivot = factor[(j, j)];
@@ -174,6 +174,6 @@ fn ldl(stiffness: &Matrix6<f64>) -> Option<[(f64, [f64; 6]); 6]> {
         });
         (pivot * pivot, column)
     };
-    let all: [(f64, [f64; 6]); 6] = std::array::from_fn(column);
+    let all: Vec<(f64, [f64; 6])> = (0..6).map(column).collect();
     all.iter().flat_map(|(d, l)| l.iter().chain([d])).all(|v| v.is_finite()).then_some(all)
 }

@@ -23,6 +23,7 @@ use crate::layout::{Layout, LayoutError, LayoutSpec};
 use crate::mechanics::{Check, claims_of, suspension_of};
 use crate::numeric::Rigid;
 use crate::parts::{self, PartError};
+use crate::report;
 
 /// Why a build could not be made.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -88,13 +89,31 @@ pub struct Build {
     pub dot_count: usize,
 }
 
+impl Build {
+    /// Lets an open page see that it is out of date: adds the script that asks, and what it asks for. The files
+    /// of a watched build differ from those of a plain one in this alone.
+    pub fn keep_fresh(&mut self) {
+        const PAGE: &str = "report/index.html";
+        const STAMP: &str = "report/fresh-stamp.js";
+        let page = self.tree.files().find(|(path, _)| *path == PAGE).map(|(_, bytes)| bytes.to_vec());
+        let Some(page) = page.and_then(|bytes| String::from_utf8(bytes).ok()) else { return };
+        self.tree.add(PAGE, report::watched(&page).into_bytes());
+        self.tree.add(STAMP, report::stamp(&self.manifest.design.sha256).into_bytes());
+        // the manifest lists all files but itself
+        self.tree.remove(MANIFEST_NAME);
+        let Manifest { design, parts, warnings, .. } = self.manifest.clone();
+        self.manifest = Manifest::new(design, parts, warnings, &self.tree);
+        self.tree.add(MANIFEST_NAME, pretty(&self.manifest));
+    }
+}
+
 /// Makes everything; `step` is told what is being made. Nothing is written to the disk.
 ///
 /// # Errors
 /// The first fault of the design that only shows when it is laid out, loaded or made.
 pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
     make(design, step).map_err(|error| match error {
-        BuildError::Design(error) => with_value(design, *error).into(),
+        BuildError::Design(error) => design.beside_suspicions(with_value(design, *error)).into(),
         ours @ BuildError::Ours(_) => ours,
     })
 }
@@ -121,7 +140,12 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     step("drawing the artwork, making the parts, driving the loads to their limits");
     let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
     let ((films, judged), (parts, forces)) = rayon::join(
-        || rayon::join(|| artwork::files(&spec, &layout, &label), || judge(design, &spec, &layout)),
+        || {
+            rayon::join(
+                || artwork::files(&spec, &layout, &label),
+                || LayoutReport::new(design, &spec, &layout),
+            )
+        },
         || {
             rayon::join(
                 || make_parts(design, &layout, &springs),
@@ -132,8 +156,8 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     for file in films? {
         tree.add(file.path, file.bytes);
     }
-    tree.add("artwork/layout.json", judged);
-    let (made, files) = parts?;
+    tree.add("artwork/layout.json", pretty(&judged));
+    let MadeParts { made, files, poses } = parts?;
     for file in files {
         tree.add(file.path, file.bytes);
     }
@@ -147,7 +171,8 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
             bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
         })
         .collect();
-    for (path, text) in forces?.files() {
+    let forces = forces?;
+    for (path, text) in forces.files() {
         tree.add(path, text.into_bytes());
     }
     step("writing what other programs read");
@@ -161,35 +186,57 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
         layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
     );
 
+    step("writing the page");
+    let told: Vec<(String, String)> =
+        warnings.iter().map(|warning| (warning.field.clone(), warning.message.clone())).collect();
+    let page = report::page(&report::Subject {
+        design,
+        layout: &layout,
+        judged: &judged,
+        constants: &constants,
+        forces: &forces,
+        parts: &made,
+        poses: &poses,
+        warnings: &told,
+        hash: &sha256,
+        files: &tree.files().collect::<Vec<_>>(),
+    });
+    tree.add("report/index.html", page.into_bytes());
+
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
     let manifest = Manifest::new(record, records, warnings, &tree);
-    // numbers, strings and lists only: nothing here can fail to be written
-    let mut text = serde_json::to_string_pretty(&manifest).unwrap_or_default();
-    text.push('\n');
-    tree.add(MANIFEST_NAME, text.into_bytes());
+    tree.add(MANIFEST_NAME, pretty(&manifest));
     Ok(Build { tree, manifest, dot_count: layout.dots.len() })
 }
 
-/// The figures of the layout, as a file.
-fn judge(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<u8> {
+/// A file for programs.
+fn pretty(value: &impl serde::Serialize) -> Vec<u8> {
     // numbers, strings and lists only: nothing here can fail to be written
-    let mut text = serde_json::to_string_pretty(&LayoutReport::new(design, spec, layout)).unwrap_or_default();
+    let mut text = serde_json::to_string_pretty(value).unwrap_or_default();
     text.push('\n');
     text.into_bytes()
 }
 
 /// The parts, checked in their assembly, and their files.
+struct MadeParts {
+    made: Vec<parts::Part>,
+    files: Vec<parts::PartFile>,
+    /// Names of the positions at which the assembly was checked.
+    poses: Vec<String>,
+}
+
 fn make_parts(
     design: &Design,
     layout: &Layout,
     springs: &constants::DesignSprings,
-) -> Result<(Vec<parts::Part>, Vec<parts::PartFile>), PartError> {
+) -> Result<MadeParts, PartError> {
     let measures = springs.sight.measures()?;
     let made = parts::build(measures, &layout.hits)?;
     let assembly = parts::Assembly::of(measures, &made)?;
     parts::check_assembly(measures, &made, &assembly)?;
     let files = parts::files(design, measures, &made, &assembly)?;
-    Ok((made, files))
+    let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
+    Ok(MadeParts { made, files, poses })
 }
 
 /// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight; gives back who watches them.

@@ -175,5 +175,6 @@ fn ldl(stiffness: &Matrix6<f64>) -> Option<Vec<(f64, [f64; 6])>> {
         (pivot * pivot, column)
     };
     let all: Vec<(f64, [f64; 6])> = (0..6).map(column).collect();
-    all.iter().flat_map(|(d, l)| l.iter().chain([d])).all(|v| v.is_finite()).then_some(all)
+    let finite = all.iter().flat_map(|(d, l)| l.iter().chain([d])).all(|v| v.is_finite());
+    finite.then_some(all)
 }

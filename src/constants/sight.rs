@@ -69,7 +69,10 @@ impl MarkerSight {
         // A point that is not seen at all uses twice what there is.
         let lost = *value >= 2.0 * bound;
         let (problem, what) = match limit {
-            Limit::MarkerOutOfLens if lost => ("the lens cannot see the marker's edge".into(), "the lens"),
+            Limit::MarkerOutOfLens if lost => {
+                let name = unseen_by(design, pose, index);
+                (format!("the lens cannot see the marker's edge ({name})"), "the lens")
+            }
             Limit::MarkerOutOfLens => (format!("the marker's edge is at {value:.3} {unit}"), "the lens"),
             Limit::MarkerOutOfMask if lost => {
                 ("the marker's edge is outside the frame".into(), "runtime.mask_radius_px")
@@ -101,4 +104,11 @@ fn window_use(optics: &SensorOptics, seen: EdgeRay, window: &ViewCone, heights: 
         if along > 0.0 { window.used(origin + direction * along) } else { 0.0 }
     };
     [0.0, 0.25, 0.5, 0.75, 1.0].map(at).into_iter().fold(0.0, f64::max)
+}
+
+/// Name of the optics' limit that hides a marker at a pose.
+fn unseen_by(design: &Design, pose: &Rigid, index: usize) -> &'static str {
+    let Some(marker) = markers_of(design).get(index).copied() else { return "not_finite" };
+    let Ok(placed) = design.optics().at_pose(pose) else { return "unreachable" };
+    marker.outline_px(&placed).map_or_else(|limit| limit.as_str(), |_| "beyond_field_of_view")
 }

@@ -46,7 +46,7 @@ impl SightLine {
     }
 
     /// Distance from the axis at a height; zero below the pupil, where nothing can be hidden.
-    fn from_axis_mm(&self, height_mm: f64) -> f64 {
+    fn off_axis_mm(&self, height_mm: f64) -> f64 {
         let along = ((height_mm - self.pupil_mm.z) / self.direction.z).max(0.0);
         (self.pupil_mm + self.direction * along).truncate().length()
     }
@@ -71,7 +71,7 @@ impl Window {
             return None;
         }
         let step_mm = (high_mm - low_mm) / f64::from(HEIGHTS - 1);
-        let bare = |height_mm: f64| rim.iter().map(|line| line.from_axis_mm(height_mm)).fold(0.0, f64::max);
+        let bare = |height_mm: f64| rim.iter().map(|line| line.off_axis_mm(height_mm)).fold(0.0, f64::max);
         let edge_mm = (0..HEIGHTS)
             .map(|i| {
                 let height_mm = low_mm + step_mm * f64::from(i);
@@ -87,8 +87,7 @@ impl Window {
     /// the edge stands before it. `None` if the pixel sees along no line.
     pub(super) fn gap_mm(&self, optics: &SensorOptics, pixel: DVec2) -> Option<f64> {
         let line = SightLine::of_pixel(optics, pixel)?;
-        let gaps =
-            self.edge_mm.iter().map(|(height_mm, radius_mm)| radius_mm - line.from_axis_mm(*height_mm));
+        let gaps = self.edge_mm.iter().map(|(height_mm, radius_mm)| radius_mm - line.off_axis_mm(*height_mm));
         Some(gaps.fold(f64::INFINITY, f64::min))
     }
 }

@@ -171,7 +171,7 @@ fn good_tables(seeds: Range<u64>) {
             squares += back.distance_squared(truth);
             count += 1.0;
         }
-        let error_mm = (squares / count as f64).sqrt();
+        let error_mm = (squares / count).sqrt();
         let fair_mm = table.scatter_mm * (found.parameters as f64 / n as f64).sqrt().min(1.0) + 0.003;
         worst = worst.max(error_mm / fair_mm);
         assert!(

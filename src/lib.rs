@@ -19,6 +19,7 @@
 //! | make platforms, mould, jig | [`parts`], over the solids of [`mesh`] |
 //! | know what the springs carry | [`mechanics`] |
 //! | find the platform's pose from its white markers | [`pose`] |
+//! | find blobs in a camera's frames | [`frames`] |
 //! | write and read what the runtime needs | [`constants`] |
 //! | replace nominal numbers by measured ones | [`calibrate`] |
 //! | do all of it | [`build`], and [`report`] for its page; [`compare`] two of them |
@@ -46,6 +47,7 @@ pub mod cli;
 pub mod compare;
 pub mod constants;
 pub mod design;
+pub mod frames;
 pub mod guide;
 pub mod layout;
 pub mod mechanics;

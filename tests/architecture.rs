@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// From the ground up; modules in one row do not import each other.
 const ROWS: [&[&str]; 13] = [
     &["numeric"],
-    &["camera", "mesh"],
+    &["camera", "mesh", "frames"],
     &["optics"],
     &["pose", "design"],
     &["mechanics", "transfer"],

@@ -6,7 +6,6 @@
 
 pub mod check;
 mod manifest;
-pub mod sight;
 mod tree;
 
 pub use manifest::{
@@ -88,6 +87,8 @@ pub struct Build {
     pub manifest: Manifest,
     /// Number of dots.
     pub dot_count: usize,
+    /// What the layout comes to, a sentence each.
+    pub headlines: Vec<String>,
 }
 
 impl Build {
@@ -130,11 +131,11 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     let sha256 = sha256_hex(design.text().as_bytes());
 
     step("trying the claimed loads");
-    try_claims(design)?;
+    let sight = try_claims(design)?;
     step("laying out the dots");
     let (spec, layout) = lay_out(design)?;
     step("writing the constants");
-    let springs = constants::springs_of(design)?;
+    let springs = constants::springs_of(design, sight)?;
     let constants = constants::with_springs(design, &layout, &springs)?;
     tree.add("constants/constants.json", constants.to_json().into_bytes());
     // four pieces of work that share nothing but what they read, on as many threads as there are
@@ -178,13 +179,13 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     }
     step("writing what other programs read");
     tree.add("constants/constants.schema.json", constants::Constants::schema().into_bytes());
-    let forms = constants::formats::format_files(design, &constants, &made, &Default::default());
+    let forms = constants::formats::format_files(design, &constants, &made);
     for (path, text) in forms.files {
         tree.add(path, text.into_bytes());
     }
     warnings.extend(forms.left_out.into_iter().map(|message| Warning { field: "constants".into(), message }));
     warnings.extend(
-        layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
+        judged.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
     );
 
     step("writing the page");
@@ -207,7 +208,7 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
     let manifest = Manifest::new(record, records, warnings, &tree);
     tree.add(MANIFEST_NAME, pretty(&manifest));
-    Ok(Build { tree, manifest, dot_count: layout.dots.len() })
+    Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines: judged.headlines() })
 }
 
 /// A file for programs.
@@ -240,9 +241,10 @@ fn make_parts(
     Ok(MadeParts { made, files, poses })
 }
 
-/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight.
-fn try_claims(design: &Design) -> Result<(), DesignError> {
-    sight::markers(design, &Rigid::identity(), "at rest")?;
+/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight; gives back who watches them.
+fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
+    let sight = constants::MarkerSight::of(design);
+    sight.require(design, &Rigid::identity(), "at rest")?;
     let suspension = suspension_of(design)?;
     for (index, (claim, case)) in
         design.sections().loads.claims.iter().zip(claims_of(design, &suspension)).enumerate()
@@ -276,9 +278,9 @@ fn try_claims(design: &Design) -> Result<(), DesignError> {
             )
         })?;
         let pose = balance.displacement.to_pose(suspension.at_mm());
-        sight::markers(design, &pose, &format!("under the load \"{}\"", claim.name))?;
+        sight.require(design, &pose, &format!("under the load \"{}\"", claim.name))?;
     }
-    Ok(())
+    Ok(sight)
 }
 
 /// The layout of a design's dots, and what it was made from.

@@ -30,8 +30,8 @@ impl<const N: usize> Lanes<N> {
     #[inline(always)]
     pub fn squares(&self) -> [f64; N] {
         let mut squares = [0.0; N];
-        for l in 0..N {
-            squares[l] = self.x[l] * self.x[l] + self.y[l] * self.y[l];
+        for ((square, x), y) in squares.iter_mut().zip(&self.x).zip(&self.y) {
+            *square = x * x + y * y;
         }
         squares
     }
@@ -40,9 +40,9 @@ impl<const N: usize> Lanes<N> {
     #[inline(always)]
     pub fn times(&self, factors: &[f64; N]) -> Self {
         let mut product = *self;
-        for l in 0..N {
-            product.x[l] *= factors[l];
-            product.y[l] *= factors[l];
+        for ((x, y), factor) in product.x.iter_mut().zip(&mut product.y).zip(factors) {
+            *x *= factor;
+            *y *= factor;
         }
         product
     }

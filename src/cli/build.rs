@@ -71,6 +71,9 @@ fn tell(output: &Output, result: &Build, out: &Path, took: Duration) -> Result<(
         bytes as f64 / 1e6,
         took.as_secs_f64(),
     ))?;
+    for headline in &result.headlines {
+        output.say(&format!("  {headline}"))?;
+    }
     for file in &result.manifest.files {
         output.say(&format!("  {}", file.path))?;
     }

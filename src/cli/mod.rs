@@ -115,8 +115,9 @@ enum Command {
     },
     /// Fit pupil, sheet, indices, markers and dots to what the built sensor sees.
     CalibrateOptics {
-        /// CSV of `frame,kind,id,u,v`: centroids in the raw image, px; the lowest frames are at rest.
-        centroids: PathBuf,
+        /// A folder of raw PNG frames (or one), or a CSV of `frame,kind,id,u,v`: centroids in the raw image, px. The
+        /// first frames, by name or number, are at rest.
+        seen: PathBuf,
         /// The constants.json of the sensor.
         constants: PathBuf,
         /// Where to write [default: constants.measured.json beside the constants].
@@ -125,6 +126,9 @@ enum Command {
         /// How many frames, from the lowest, are without load: their noise is in all that is measured from rest.
         #[arg(long, default_value_t = 1)]
         rest_frames: usize,
+        /// Where to write the centroids found in frames, as the CSV that this command reads.
+        #[arg(long)]
+        centroids: Option<PathBuf>,
     },
     /// Draw what the sensor will see, with the exact truth, using only the effects that the scene calls for.
     Simulate {
@@ -204,8 +208,9 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::CalibrateForce { measured, constants, out } => {
             calibrate_force::run(output, measured, constants, out.as_deref())
         }
-        Command::CalibrateOptics { centroids, constants, out, rest_frames } => {
-            calibrate_optics::run(output, centroids, constants, out.as_deref(), *rest_frames)
+        Command::CalibrateOptics { seen, constants, out, rest_frames, centroids } => {
+            let files = calibrate_optics::Files { out: out.as_deref(), centroids: centroids.as_deref() };
+            calibrate_optics::run(output, seen, constants, &files, *rest_frames)
         }
         Command::Simulate { scene, options } => simulate::run(output, scene, options),
         Command::Schema { scene } => schema::run(output, *scene),

@@ -149,12 +149,11 @@ fn dots(a: &Side, b: &Side) -> DotsChanged {
         dots.iter().map(|dot| numbers(dot, "image_px").unwrap_or([f64::NAN; 2])).collect()
     };
     let (from, to) = (places(&left), places(&right));
-    let nearest = |point: [f64; 2], among: &Grid<'_>| among.nearest(point);
     let (grid_a, grid_b) = (Grid::new(&from), Grid::new(&to));
     let reach = 0.5 * grid_a.spacing().min(grid_b.spacing());
     let mut pairs = Vec::new();
     for (i, &point) in from.iter().enumerate() {
-        let Some((j, gap)) = nearest(point, &grid_b) else { continue };
+        let Some((j, gap)) = grid_b.nearest(point) else { continue };
         if gap <= reach && grid_a.nearest(to[j]).is_some_and(|(back, _)| back == i) {
             pairs.push((i, j));
         }

@@ -48,8 +48,8 @@ pub fn loads(subject: &Subject<'_>) -> String {
             let near = list(claim, "/checks").iter().max_by(|a, b| at(a, "/used").total_cmp(&at(b, "/used")));
             let near = near.map_or_else(String::new, |check| {
                 let used = at(check, "/used");
-                let label = format!("{}: {}", words(text_at(check, "/limit")), percent(used));
-                bar(used, &label.replace("&#39;", "'"))
+                // the bar escapes its own label
+                bar(used, &format!("{}: {}", text_at(check, "/limit").replace('_', " "), percent(used)))
             });
             let held = claim.get("held").and_then(Value::as_bool).unwrap_or(false);
             vec![

@@ -35,19 +35,20 @@ pub fn steps(subject: &Subject<'_>) -> Vec<Step> {
     let skin_mm2 = 2.0 * PI * radius * radius;
     let films = subject.layout.hits.len().max(1);
     let n = number;
-    let printed: Vec<String> = subject
+    let printed: Vec<(String, f64)> = subject
         .parts
         .iter()
         .filter(|part| part.name != "acrylic_sheet")
         .map(|part| {
             let grams = part.volume_mm3 / 1000.0 * s.process.density_g_per_cm3;
-            format!("{} ({} g)", escape(&part.name.replace('_', " ")), n((grams * 10.0).round() / 10.0))
+            (
+                format!("{} ({} g)", escape(&part.name.replace('_', " ")), n((grams * 10.0).round() / 10.0)),
+                grams,
+            )
         })
         .collect();
-    let grams: f64 =
-        subject.parts.iter().filter(|p| p.name != "acrylic_sheet").map(|p| p.volume_mm3).sum::<f64>()
-            / 1000.0
-            * s.process.density_g_per_cm3;
+    let grams: f64 = printed.iter().map(|(_, grams)| grams).sum();
+    let printed: Vec<&str> = printed.iter().map(|(text, _)| text.as_str()).collect();
     let markers = s.white_markers.positions_mm.len();
     let magnets = 2 * s_springs(subject);
     let mut steps = vec![

@@ -168,6 +168,8 @@ pub fn coverage(subject: &Subject<'_>) -> String {
                     "–".into(),
                     "–".into(),
                     "–".into(),
+                    "–".into(),
+                    "–".into(),
                 ];
             };
             vec![
@@ -175,6 +177,8 @@ pub fn coverage(subject: &Subject<'_>) -> String {
                 bar(found.seen_by_lens, &percent(found.seen_by_lens)),
                 bar(found.on_raster, &percent(found.on_raster)),
                 bar(found.in_mask, &percent(found.in_mask)),
+                bar(found.in_sight, &percent(found.in_sight)),
+                found.window_gap_mm.map_or_else(|| "–".into(), |gap| format!("{} mm", number(gap))),
                 format!("{}°", number(found.whole_to_deg)),
                 found.unseen_dots.len().to_string(),
             ]
@@ -182,7 +186,16 @@ pub fn coverage(subject: &Subject<'_>) -> String {
         .collect();
     table(
         "Share of the dome's area that is seen through the layers",
-        &["load", "by the lens", "on the raster", "in the mask", "whole up to", "dots unseen"],
+        &[
+            "load",
+            "by the lens",
+            "on the raster",
+            "in the mask",
+            "in sight",
+            "nearest to the window",
+            "whole up to",
+            "dots not whole",
+        ],
         &rows,
     )
 }

@@ -39,6 +39,7 @@
 //! ```
 pub use glam;
 
+pub mod accuracy;
 pub mod artwork;
 pub mod build;
 pub mod calibrate;

@@ -10,6 +10,7 @@ mod explain;
 mod resolve;
 mod rules;
 mod schema;
+pub mod settings;
 pub mod sections;
 mod source;
 mod suspicions;

@@ -56,7 +56,7 @@ impl Budget {
 }
 
 /// Image px for a mm on the dome, and for a mm that the dome is too large, root mean squares over the dots.
-fn scales(optics: &SensorOptics, layout: &Layout) -> Option<(f64, f64)> {
+pub fn scales(optics: &SensorOptics, layout: &Layout) -> Option<(f64, f64)> {
     let (mut along, mut outwards, mut count) = (0.0, 0.0, 0.0);
     for dot in &layout.dots {
         let Ok((_, slope)) = optics.project_with_jacobian(dot.surface_mm) else { continue };
@@ -71,7 +71,12 @@ fn scales(optics: &SensorOptics, layout: &Layout) -> Option<(f64, f64)> {
 }
 
 /// Where a dot ends up on the dome, mm.
-pub fn of_dots(design: &Design, layout: &Layout, judged: &LayoutReport, ladders: &[Ladder]) -> Option<Budget> {
+pub fn of_dots(
+    design: &Design,
+    layout: &Layout,
+    judged: &LayoutReport,
+    ladders: &[Ladder],
+) -> Option<Budget> {
     let (px_per_mm, px_per_radius_mm) = scales(design.optics(), layout)?;
     let sections = design.sections();
     let mut shares = Vec::new();
@@ -97,7 +102,12 @@ pub fn of_dots(design: &Design, layout: &Layout, judged: &LayoutReport, ladders:
     // errors of the dome's radius are seen as shifts of the dots
     let seen = px_per_radius_mm / px_per_mm;
     let chord_mm = design.settings().optical_chord_tolerance_mm.value;
-    add("facets of the mould", "mesh.optical_chord_tolerance_mm".into(), true, seen * chord_mm / 3_f64.sqrt());
+    add(
+        "facets of the mould",
+        "mesh.optical_chord_tolerance_mm".into(),
+        true,
+        seen * chord_mm / 3_f64.sqrt(),
+    );
     // an accuracy of plus or minus so much is taken as two standard deviations
     let printer_mm = 0.5 * sections.process.tolerance_mm;
     add("printer of the mould", "process.tolerance_mm".into(), false, seen * printer_mm);
@@ -167,8 +177,10 @@ pub fn of_force(design: &Design, constants: &Constants, ladders: &[Ladder]) -> O
     }
     add("white markers' places", "tolerances.white_marker_mm", false, squares.sqrt());
     // k ~ d^4 / D^3 (Wahl 1963), D the coils' mean diameter
-    let (wire, mean) =
-        (sections.springs.wire_diameter_mm, sections.springs.outer_diameter_mm - sections.springs.wire_diameter_mm);
+    let (wire, mean) = (
+        sections.springs.wire_diameter_mm,
+        sections.springs.outer_diameter_mm - sections.springs.wire_diameter_mm,
+    );
     let by_wire = (4.0 / wire + 3.0 / mean) * t.wire_diameter_mm;
     add("springs' wire, before a calibration", "tolerances.wire_diameter_mm", false, force_n * by_wire);
     let by_coil = 3.0 / mean * t.spring_diameter_mm;
@@ -210,9 +222,7 @@ fn perturbed(
         SensorOptics::new(&changed).ok()
     };
     let axes = [0_usize, 1, 2];
-    let moved = |axis: usize| {
-        with(&|spec| spec.sensor_from_camera.translation_mm[axis] += t.pupil_mm[axis])
-    };
+    let moved = |axis: usize| with(&|spec| spec.sensor_from_camera.translation_mm[axis] += t.pupil_mm[axis]);
     let turned = |axis: usize| {
         let angle = t.camera_rotation_deg[axis].to_radians();
         let turn = [DMat3::from_rotation_x, DMat3::from_rotation_y, DMat3::from_rotation_z][axis](angle);
@@ -238,7 +248,11 @@ fn perturbed(
     let layers = 0..spec.layers.len();
     vec![
         ("pupil's place", "tolerances.pupil_mm", axes.into_iter().filter_map(moved).collect()),
-        ("camera's direction", "tolerances.camera_rotation_deg", axes.into_iter().filter_map(turned).collect()),
+        (
+            "camera's direction",
+            "tolerances.camera_rotation_deg",
+            axes.into_iter().filter_map(turned).collect(),
+        ),
         ("indices", "tolerances.index", layers.clone().filter_map(denser).collect()),
         ("sheet's thickness", "tolerances.layer_thickness_mm", layers.filter_map(thicker).collect()),
     ]

@@ -53,7 +53,10 @@ pub fn ladder(
             rms_error: if seen { rms } else { by_law },
             time: timing,
             per_item_s: timing.median_s / f64::from(count),
-            notes: vec![(if seen { "batches".into() } else { "batches (too few: by sd/sqrt(n))".into() }, batches.len() as f64)],
+            notes: vec![(
+                if seen { "batches".into() } else { "batches (too few: by sd/sqrt(n))".into() },
+                batches.len() as f64,
+            )],
             dominated: false,
         });
     }
@@ -75,7 +78,10 @@ pub fn ladder(
             in_use,
             asked: asked_px,
             meets: None,
-            says: format!("One sensor's mean shift varies by {} px; four times the sensors halve the doubt.", super::sparse(sd)),
+            says: format!(
+                "One sensor's mean shift varies by {} px; four times the sensors halve the doubt.",
+                super::sparse(sd)
+            ),
         }
         .finish(),
     )

@@ -38,7 +38,8 @@ impl Chart {
     pub fn of(ladder: &Ladder) -> Option<Self> {
         let floor = ladder.blind_below();
         let error = |rung: &Rung| rung.max_error.max(floor).max(f64::MIN_POSITIVE);
-        let usable = |rung: &&Rung| rung.max_error.is_finite() && rung.time.median_s > 0.0 && error(rung) > 1e-300;
+        let usable =
+            |rung: &&Rung| rung.max_error.is_finite() && rung.time.median_s > 0.0 && error(rung) > 1e-300;
         let rungs: Vec<&Rung> = ladder.rungs.iter().filter(usable).collect();
         let mut errors: Vec<f64> = rungs.iter().map(|rung| error(rung)).collect();
         errors.extend(ladder.asked.filter(|asked| *asked > 0.0));

@@ -62,10 +62,5 @@ pub fn time<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing {
         let index = (share * (seconds.len() - 1) as f64).round() as usize;
         seconds.get(index).copied().unwrap_or_default()
     };
-    Timing {
-        median_s: at(0.5),
-        lower_quartile_s: at(0.25),
-        upper_quartile_s: at(0.75),
-        runs: seconds.len(),
-    }
+    Timing { median_s: at(0.5), lower_quartile_s: at(0.25), upper_quartile_s: at(0.75), runs: seconds.len() }
 }

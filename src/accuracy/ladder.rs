@@ -98,7 +98,8 @@ impl Ladder {
         let all = self.rungs.clone();
         for rung in &mut self.rungs {
             let beaten = |other: &Rung| {
-                let (exact, fast) = (seen(other) <= seen(rung), other.time.median_s < 0.98 * rung.time.median_s);
+                let (exact, fast) =
+                    (seen(other) <= seen(rung), other.time.median_s < 0.98 * rung.time.median_s);
                 exact && fast
             };
             rung.dominated = all.iter().any(beaten);

@@ -18,18 +18,28 @@ pub fn ladder(lens: &Lens, layout: &Layout, asked_px: Option<f64>, patience: Pat
         return None;
     }
     let pixels: Vec<DVec2> = layout.dots.iter().map(|dot| dot.image_px).collect();
-    let error_px =
-        |pixel: DVec2, ray: Option<DVec3>| match ray.and_then(|ray| lens.project(ray).ok()) {
-            Some(again) => again.distance(pixel),
-            None => f64::NAN,
-        };
+    let error_px = |pixel: DVec2, ray: Option<DVec3>| match ray.and_then(|ray| lens.project(ray).ok()) {
+        Some(again) => again.distance(pixel),
+        None => f64::NAN,
+    };
     let mut rungs = Vec::new();
     let mut add = |way: &'static str, label: String, dial: f64, solve: &dyn Fn(DVec2) -> Option<DVec3>| {
         let (max_error, rms_error, failed) = sizes(pixels.iter().map(|&pixel| error_px(pixel, solve(pixel))));
         let time = time(patience, || pixels.iter().filter(|pixel| solve(**pixel).is_some()).count());
-        let notes = if failed > 0 { vec![("pixels without a ray".into(), failed as f64)] } else { Vec::new() };
+        let notes =
+            if failed > 0 { vec![("pixels without a ray".into(), failed as f64)] } else { Vec::new() };
         let per_item_s = time.median_s / pixels.len().max(1) as f64;
-        rungs.push(Rung { way, label, dial, max_error, rms_error, time, per_item_s, notes, dominated: false });
+        rungs.push(Rung {
+            way,
+            label,
+            dial,
+            max_error,
+            rms_error,
+            time,
+            per_item_s,
+            notes,
+            dominated: false,
+        });
     };
     for rounds in FIXED_POINT_ROUNDS {
         let label = format!("fixed point, {rounds} rounds");

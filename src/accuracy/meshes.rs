@@ -40,8 +40,7 @@ pub fn ladder(
     };
     // the volume's error falls with the tolerance, so two rungs give the limit
     let (finest, finer) = (tolerances[tolerances.len() - 1], 0.5 * tolerances[tolerances.len() - 1]);
-    let volumes =
-        |meshes: &[TriMesh]| meshes.iter().map(TriMesh::volume_mm3).collect::<Vec<f64>>();
+    let volumes = |meshes: &[TriMesh]| meshes.iter().map(TriMesh::volume_mm3).collect::<Vec<f64>>();
     let (coarse, fine) = (volumes(&make(Chord::new(finest)?)?), volumes(&make(Chord::new(finer)?)?));
     let limit: Vec<f64> = coarse.iter().zip(&fine).map(|(a, b)| 2.0 * b - a).collect();
     let mut rungs = Vec::new();
@@ -57,7 +56,8 @@ pub fn ladder(
             }
         }
         let triangles: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
-        let by_volume = meshes.iter().zip(&limit).map(|(mesh, limit)| (mesh.volume_mm3() / limit - 1.0).abs());
+        let by_volume =
+            meshes.iter().zip(&limit).map(|(mesh, limit)| (mesh.volume_mm3() / limit - 1.0).abs());
         let check = once(|| meshes.iter().filter(|mesh| inspect(mesh).is_one_solid()).count());
         let time = time(patience, || make(chord).map(|meshes| meshes.len()).unwrap_or_default());
         rungs.push(Rung {
@@ -113,12 +113,13 @@ fn without_own_chords(construction: &Construction) -> Construction {
 /// How far points of the facets are from the nearest of the exact surfaces, mm.
 fn deviations<'a>(mesh: &'a TriMesh, part: &'a Construction) -> impl Iterator<Item = f64> + 'a {
     let step = mesh.triangles.len().div_ceil(MOST_FACETS).max(1);
-    mesh.iter_mm().step_by(step).flat_map(|[a, b, c]| {
-        [a, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a), (a + b + c) / 3.0]
-    }).map(move |point: DVec3| {
-        let pieces = part.added.iter().chain(&part.cut);
-        pieces.map(|piece| piece.signed_distance_mm(point).abs()).fold(f64::INFINITY, f64::min)
-    })
+    mesh.iter_mm()
+        .step_by(step)
+        .flat_map(|[a, b, c]| [a, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a), (a + b + c) / 3.0])
+        .map(move |point: DVec3| {
+            let pieces = part.added.iter().chain(&part.cut);
+            pieces.map(|piece| piece.signed_distance_mm(point).abs()).fold(f64::INFINITY, f64::min)
+        })
 }
 
 fn once<T>(work: impl FnOnce() -> T) -> f64 {
@@ -126,4 +127,3 @@ fn once<T>(work: impl FnOnce() -> T) -> f64 {
     std::hint::black_box(work());
     start.elapsed().as_secs_f64()
 }
-

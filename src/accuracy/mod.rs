@@ -9,6 +9,7 @@ pub mod budget;
 mod chance;
 pub mod chart;
 pub mod clock;
+mod contact;
 mod files;
 pub mod ladder;
 mod lens;
@@ -49,7 +50,8 @@ pub struct Machine {
 impl Machine {
     fn here() -> Self {
         let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-        let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|p| p.1));
+        let name =
+            info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|p| p.1));
         Self {
             processor: name.unwrap_or("unknown").trim().to_owned(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
@@ -127,7 +129,7 @@ impl fmt::Display for AccuracyError {
 impl std::error::Error for AccuracyError {}
 
 /// Steps of [`measure`], for a progress bar.
-pub const STEPS: u32 = 8;
+pub const STEPS: u32 = 9;
 
 /// Measures a design; `step` is told how many of [`STEPS`] are done and what comes next.
 ///
@@ -194,18 +196,24 @@ pub fn measure(
         ),
         "drawn sensors: too few of them see all dots",
     );
-    step(7, "what it comes to");
-    let budgets: Vec<Budget> = [
-        budget::of_dots(design, &layout, &judged, &ladders),
-        budget::of_force(design, &constants, &ladders),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
+    step(7, "a touch");
+    let px_per_mm = budget::scales(design.optics(), &layout).map(|(px_per_mm, _)| px_per_mm);
+    let touch_mm = image_px.zip(px_per_mm).map(|(px, px_per_mm)| px / px_per_mm);
+    match contact::ladder(design, &layout, touch_mm, patience, quick) {
+        Ok(ladder) => keep(Some(ladder), ""),
+        Err(error) => keep(None, &format!("a touch: {error}")),
+    }
+    step(8, "what it comes to");
+    let budgets: Vec<Budget> =
+        [budget::of_dots(design, &layout, &judged, &ladders), budget::of_force(design, &constants, &ladders)]
+            .into_iter()
+            .flatten()
+            .collect();
     let noise_n = budgets.iter().filter(|budget| budget.unit == "N").flat_map(|b| &b.shares);
     let noise_n = noise_n.filter(|share| share.source.starts_with("noise.")).map(|share| share.amount);
-    let frames_to_average =
-        force_n.zip(noise_n.reduce(f64::max)).map(|(asked, noise)| (noise / asked).powi(2).ceil().max(1.0) as u32);
+    let frames_to_average = force_n
+        .zip(noise_n.reduce(f64::max))
+        .map(|(asked, noise)| (noise / asked).powi(2).ceil().max(1.0) as u32);
     let mm = |s: &crate::design::settings::Setting<f64>| SettingRecord {
         field: s.field,
         value: s.value,

@@ -54,7 +54,8 @@ pub fn ladder(
                     let u = 1.0 - t;
                     let at =
                         from * (u * u * u) + a * (3.0 * u * u * t) + b * (3.0 * u * t * t) + to * (t * t * t);
-                    if let Some(CurvePoint { at: curve, slope }) = exact(TAU * (k as f64 + t) / count as f64) {
+                    if let Some(CurvePoint { at: curve, slope }) = exact(TAU * (k as f64 + t) / count as f64)
+                    {
                         worst = worst.max((at - curve).perp_dot(slope.normalize_or_zero()).abs());
                     }
                 }

@@ -36,7 +36,10 @@ pub fn page(accuracy: &Accuracy) -> String {
         let _ = writeln!(text, "<li><b>{}.</b> {}</li>", escape(&ladder.title), escape(&ladder.says));
     }
     if let Some(frames) = accuracy.frames_to_average {
-        let _ = writeln!(text, "<li><b>Force.</b> Average {frames} frame(s) to reach <code>accuracy.force_n</code>.</li>");
+        let _ = writeln!(
+            text,
+            "<li><b>Force.</b> Average {frames} frame(s) to reach <code>accuracy.force_n</code>.</li>"
+        );
     }
     for left in &accuracy.left_out {
         let _ = writeln!(text, "<li>Not measured: {}</li>", escape(left));

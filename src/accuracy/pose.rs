@@ -62,7 +62,17 @@ pub fn ladder(constants: &Constants, asked_n: Option<f64>, patience: Patience) -
         let per_item_s = time.median_s / seen.len() as f64;
         let notes = if failed > 0 { vec![("poses not found".into(), failed as f64)] } else { Vec::new() };
         let (label, dial) = (label.to_owned(), 0.0);
-        rungs.push(Rung { way: "", label, dial, max_error, rms_error, time, per_item_s, notes, dominated: false });
+        rungs.push(Rung {
+            way: "",
+            label,
+            dial,
+            max_error,
+            rms_error,
+            time,
+            per_item_s,
+            notes,
+            dominated: false,
+        });
     };
     let mut plain = |label: &str, positions: &[DVec3]| -> Option<()> {
         let solver = PlainRuntimeSolver::new(&input, positions).ok()?;

@@ -18,18 +18,22 @@ pub fn run(output: &Output, design_file: &Path, out: Option<&Path>, quick: bool)
         let filled = (20 * done / accuracy::STEPS) as usize;
         output.step(&format!("[{}{}] {doing}", "=".repeat(filled), " ".repeat(20 - filled)));
     };
-    let measured = accuracy::measure(&design, quick, &mut |count, doing| done(count, doing)).map_err(|error| match error {
-        AccuracyError::Design(error) => Failure::from(error.in_file(design_file)),
-        AccuracyError::Part(error) => Failure::from(DesignError::from(error).in_file(design_file)),
-    })?;
+    let measured = accuracy::measure(&design, quick, &mut |count, doing| done(count, doing)).map_err(
+        |error| match error {
+            AccuracyError::Design(error) => Failure::from(error.in_file(design_file)),
+            AccuracyError::Part(error) => Failure::from(DesignError::from(error).in_file(design_file)),
+        },
+    )?;
     let mut tree = Tree::default();
     for file in measured.files() {
         tree.add(file.name, file.bytes);
     }
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
-    let record = DesignRecord { name: design.name().to_owned(), sha256: sha256_hex(design.text().as_bytes()) };
+    let record =
+        DesignRecord { name: design.name().to_owned(), sha256: sha256_hex(design.text().as_bytes()) };
     let manifest = Manifest::new(record, Vec::new(), Vec::new(), &tree);
-    let text = serde_json::to_string_pretty(&manifest).map_err(|error| Failure::Internal(error.to_string()))?;
+    let text =
+        serde_json::to_string_pretty(&manifest).map_err(|error| Failure::Internal(error.to_string()))?;
     tree.add(MANIFEST_NAME, text.into_bytes());
     let out = out.map_or_else(
         || PathBuf::from("output").join(format!("{}-accuracy", design.name())),
@@ -52,7 +56,12 @@ pub fn run(output: &Output, design_file: &Path, out: Option<&Path>, quick: bool)
         });
         output.say(&format!("{}: {used}", ladder.title))?;
         if let (Some(asked), Some(enough)) = (ladder.asked, rung(ladder.meets)) {
-            output.say(&format!("  {} {} asked: {} is enough", accuracy::sparse(asked), ladder.unit, enough.label))?;
+            output.say(&format!(
+                "  {} {} asked: {} is enough",
+                accuracy::sparse(asked),
+                ladder.unit,
+                enough.label
+            ))?;
         }
     }
     for budget in &measured.budgets {
@@ -64,6 +73,10 @@ pub fn run(output: &Output, design_file: &Path, out: Option<&Path>, quick: bool)
             accuracy::sparse(budget.computed)
         ))?;
     }
-    output.say(&format!("{:.1} s; look at {}", began.elapsed().as_secs_f64(), out.join("index.html").display()))?;
+    output.say(&format!(
+        "{:.1} s; look at {}",
+        began.elapsed().as_secs_f64(),
+        out.join("index.html").display()
+    ))?;
     output.result(&json!({ "ok": true, "out": out.display().to_string(), "accuracy": measured }))
 }

@@ -10,8 +10,8 @@ mod explain;
 mod resolve;
 mod rules;
 mod schema;
-pub mod settings;
 pub mod sections;
+pub mod settings;
 mod source;
 mod suspicions;
 #[cfg(test)]

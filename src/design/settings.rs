@@ -110,7 +110,9 @@ fn setting<T>(
     chosen: Option<(T, String)>,
 ) -> Result<Setting<T>, DesignError> {
     match (given, chosen) {
-        (Some(value), _) => Ok(Setting { field, value, chosen: false, because: "given in the design".into() }),
+        (Some(value), _) => {
+            Ok(Setting { field, value, chosen: false, because: "given in the design".into() })
+        }
         (None, Some((value, because))) => Ok(Setting { field, value, chosen: true, because }),
         (None, None) => Err(DesignError::at(
             field,
@@ -238,7 +240,9 @@ fn spread(
         let mut changed = spec.clone();
         change(&mut changed);
         let Ok(optics) = SensorOptics::new(&changed) else { return };
-        let shifts = points.iter().filter_map(|(point, pixel)| Some(optics.project(*point).ok()?.distance_squared(*pixel)));
+        let shifts = points
+            .iter()
+            .filter_map(|(point, pixel)| Some(optics.project(*point).ok()?.distance_squared(*pixel)));
         let (sum, count) = shifts.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
         squares += sum / f64::max(count, 1.0);
     };
@@ -258,7 +262,8 @@ fn spread(
             }
         });
         add(&|spec| {
-            if let Some(thickness) = spec.layers.get_mut(index).and_then(|layer| layer.thickness_mm.as_mut()) {
+            if let Some(thickness) = spec.layers.get_mut(index).and_then(|layer| layer.thickness_mm.as_mut())
+            {
                 *thickness += t.layer_thickness_mm;
             }
         });

@@ -143,7 +143,12 @@ impl Carrier<'_> {
     ///
     /// # Errors
     /// Why the dot has none.
-    pub fn plate_outline(&self, dot: &Dot, hit_from_sensor: DMat3, tolerance_mm: f64) -> Result<Outline, Reason> {
+    pub fn plate_outline(
+        &self,
+        dot: &Dot,
+        hit_from_sensor: DMat3,
+        tolerance_mm: f64,
+    ) -> Result<Outline, Reason> {
         plate_outline(&self.curve(dot.even_px, dot.surface_mm), self.transfer, hit_from_sensor, tolerance_mm)
     }
 
@@ -151,7 +156,12 @@ impl Carrier<'_> {
     ///
     /// # Errors
     /// Why there is no such point.
-    pub fn plate_point(&self, dot: &Dot, hit_from_sensor: DMat3, angle_rad: f64) -> Result<CurvePoint, Reason> {
+    pub fn plate_point(
+        &self,
+        dot: &Dot,
+        hit_from_sensor: DMat3,
+        angle_rad: f64,
+    ) -> Result<CurvePoint, Reason> {
         plate_point(&self.curve(dot.even_px, dot.surface_mm), self.transfer, hit_from_sensor, angle_rad)
     }
 
@@ -199,10 +209,8 @@ pub(super) fn plate_outline(
     hit_from_sensor: DMat3,
     tolerance_mm: f64,
 ) -> Result<Outline, Reason> {
-    let (outline, fit) = Outline::of_curve(
-        |angle| plate_point(curve, transfer, hit_from_sensor, angle),
-        tolerance_mm,
-    )?;
+    let (outline, fit) =
+        Outline::of_curve(|angle| plate_point(curve, transfer, hit_from_sensor, angle), tolerance_mm)?;
     if fit.reached { Ok(outline) } else { Err(Reason::NotSmooth { error_mm: fit.error }) }
 }
 

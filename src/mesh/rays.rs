@@ -80,7 +80,9 @@ impl RayTarget {
         };
         let mut reach = 1.0_f64;
         let mut stack = [(0_u32, 0.0_f64); STACK];
-        let Some(mut depth) = self.nodes.first().and_then(|root| enters(root, reach)).map(|_| 1) else { return };
+        let Some(mut depth) = self.nodes.first().and_then(|root| enters(root, reach)).map(|_| 1) else {
+            return;
+        };
         while depth > 0 {
             depth -= 1;
             let (index, enter) = stack[depth];
@@ -115,9 +117,8 @@ impl RayTarget {
     /// Whether a triangle's own box shares a point with this one: if not, the
     /// mesh stays out of the box or holds all of it.
     pub fn comes_near(&self, bounds: &BoundingBox) -> bool {
-        let apart = |low: DVec3, high: DVec3| {
-            (low - bounds.max_mm).max(bounds.min_mm - high).max_element() > 0.0
-        };
+        let apart =
+            |low: DVec3, high: DVec3| (low - bounds.max_mm).max(bounds.min_mm - high).max_element() > 0.0;
         let mut stack = [0_u32; STACK];
         let mut depth = usize::from(!self.nodes.is_empty());
         while depth > 0 {

@@ -176,8 +176,7 @@ struct Spring {
 impl Spring {
     fn new(m: &Measures, i: usize, rest_from_platform: &Rigid, chord: Chord) -> Result<Self, MeshError> {
         let (tube, around) = bought::spring_tube(m, i, rest_from_platform, chord)?;
-        let rings: Vec<BoundingBox> =
-            tube.vertices_mm.chunks(around).filter_map(BoundingBox::of).collect();
+        let rings: Vec<BoundingBox> = tube.vertices_mm.chunks(around).filter_map(BoundingBox::of).collect();
         let stretches: Vec<BoundingBox> = rings.windows(2).map(|two| two[0].union(&two[1])).collect();
         let first = tube.vertices_mm.get(..around).unwrap_or_default();
         let start_mm = first.iter().sum::<DVec3>() / around.max(1) as f64;

@@ -55,7 +55,7 @@ pub fn ladder(constants: &Constants, asked_n: Option<f64>, patience: Patience) -
         (0..3).map(|axis| off[axis].abs()).fold(0.0, f64::max)
     };
     let mut rungs = Vec::new();
-    let mut add = |label: &str, solve: &dyn Fn(&Seen) -> Option<Rigid>| {
+    let mut add = |way: &'static str, label: &str, solve: &dyn Fn(&Seen) -> Option<Rigid>| {
         let off = seen.iter().map(|one| solve(one).map_or(f64::NAN, |pose| force_off(&pose, &one.pose)));
         let (max_error, rms_error, failed) = sizes(off);
         let time = time(patience, || seen.iter().filter(|one| solve(one).is_some()).count());
@@ -63,7 +63,7 @@ pub fn ladder(constants: &Constants, asked_n: Option<f64>, patience: Patience) -
         let notes = if failed > 0 { vec![("poses not found".into(), failed as f64)] } else { Vec::new() };
         let (label, dial) = (label.to_owned(), 0.0);
         rungs.push(Rung {
-            way: "",
+            way,
             label,
             dial,
             max_error,
@@ -74,20 +74,20 @@ pub fn ladder(constants: &Constants, asked_n: Option<f64>, patience: Patience) -
             dominated: false,
         });
     };
-    let mut plain = |label: &str, positions: &[DVec3]| -> Option<()> {
+    let mut plain = |way: &'static str, label: &str, positions: &[DVec3]| -> Option<()> {
         let solver = PlainRuntimeSolver::new(&input, positions).ok()?;
         let undistort = |one: &Seen| solver.undistorted(&optics, &one.raw);
         let from_rest = solver.pose(&undistort(&rest)?).ok()?.inverse();
-        add(label, &|one| Some(from_rest.compose(&solver.pose(&undistort(one)?).ok()?)));
+        add(way, label, &|one| Some(from_rest.compose(&solver.pose(&undistort(one)?).ok()?)));
         Some(())
     };
-    plain("undistort and solvePnP, markers as painted", &painted)?;
+    plain("painted", "undistort and solvePnP, markers as painted", &painted)?;
     if let Some(apparent) = &apparent {
-        plain("undistort and solvePnP, apparent markers", apparent)?;
+        plain("apparent", "undistort and solvePnP, apparent markers", apparent)?;
     }
     let solver = PoseSolver::new(&optics, &markers, PoseOptions::new(1e-3, REACH_MM)).ok()?;
-    add("closed form, refraction on the axis only", &|one| solver.start(&one.raw).ok());
-    add("refined with refraction and discs", &|one| Some(solver.solve(&one.raw).ok()?.pose));
+    add("closed form", "closed form, refraction on the axis only", &|one| solver.start(&one.raw).ok());
+    add("refined", "refined with refraction and discs", &|one| Some(solver.solve(&one.raw).ok()?.pose));
     for (index, rung) in rungs.iter_mut().enumerate() {
         rung.dial = index as f64 + 1.0;
     }

@@ -81,34 +81,35 @@ fn orders_fronts_and_choices_follow_from_the_rungs() {
     assert!((rms - 12.5_f64.sqrt()).abs() < 1e-12);
 }
 
-/// Falls from rung to rung of one way, but for rounding, and by the order that theory gives.
-fn holds(ladder: &Ladder) {
+/// What is wrong with a ladder that should fall from rung to rung of one way, but for rounding, by the order that
+/// theory gives.
+fn faults_of(ladder: &Ladder) -> Vec<String> {
+    let mut faults = Vec::new();
     let blind = ladder.blind_below();
+    let name = ladder.name;
     for two in ladder.rungs.windows(2).filter(|two| two[0].way == two[1].way) {
-        let scatter = if ladder.name == "chance" { 1.25 } else { 1.0 + 1e-9 };
-        assert!(
-            two[1].rms_error <= two[0].rms_error * scatter + blind,
-            "{}: {} leaves {:e}, {} leaves {:e}",
-            ladder.name,
-            two[0].label,
-            two[0].rms_error,
-            two[1].label,
-            two[1].rms_error
-        );
-    }
-    let (theory, seen, slack) = match ladder.law {
-        Law::Power { exponent } => (exponent, ladder.observed, 0.25 * exponent.abs().max(0.6)),
-        Law::Steps { order } => (order, ladder.observed, 0.5),
-        Law::Within => {
-            for rung in &ladder.rungs {
-                assert!(rung.max_error <= rung.dial * (1.0 + 1e-6) + blind, "{} {}", ladder.name, rung.label);
-            }
-            return;
+        let scatter = if name == "chance" { 1.25 } else { 1.0 + 1e-9 };
+        if two[1].rms_error > two[0].rms_error * scatter + blind {
+            let told = two.iter().map(|rung| format!("{} leaves {:e}", rung.label, rung.rms_error));
+            faults.push(format!("{name}: {}", told.collect::<Vec<_>>().join(", ")));
         }
-        Law::Falls => return,
+    }
+    let (theory, slack) = match ladder.law {
+        Law::Power { exponent } => (exponent, 0.25 * exponent.abs().max(0.6)),
+        Law::Steps { order } => (order, 0.5),
+        Law::Within => {
+            let passed = |rung: &&Rung| rung.max_error > rung.dial * (1.0 + 1e-6) + blind;
+            let passed = ladder.rungs.iter().filter(passed);
+            faults.extend(passed.map(|rung| format!("{name}: {} leaves {:e}", rung.label, rung.max_error)));
+            return faults;
+        }
+        Law::Falls => return faults,
     };
-    let seen = seen.unwrap_or_else(|| panic!("{} shows no order", ladder.name));
-    assert!((seen - theory).abs() <= slack, "{}: order {seen}, by theory {theory}", ladder.name);
+    match ladder.observed {
+        Some(seen) if (seen - theory).abs() <= slack => {}
+        seen => faults.push(format!("{name}: order {seen:?}, by theory {theory}")),
+    }
+    faults
 }
 
 #[test]
@@ -128,8 +129,9 @@ fn ladders_of(name: &str, text: &str, left_out: usize) {
     let mut steps = Vec::new();
     let measured = measure(&design, true, &mut |done, _| steps.push(done)).unwrap();
     assert_eq!(steps, (0..STEPS).collect::<Vec<_>>(), "{name}");
+    let mut faults = Vec::new();
     for ladder in &measured.ladders {
-        holds(ladder);
+        faults.extend(faults_of(ladder));
         // a quick look at contact stops short of the elements that the simulator starts from
         assert!(ladder.in_use.is_some() || ladder.name == "contact", "{name}: {}", ladder.name);
         for rung in &ladder.rungs {
@@ -139,6 +141,12 @@ fn ladders_of(name: &str, text: &str, left_out: usize) {
             assert!(ladder.rungs[index].max_error <= asked);
         }
     }
+    assert!(faults.is_empty(), "{name}: {faults:#?}");
+    // without noise the refracting solver is exact, and the runtime that knows no layers is not
+    let pose = measured.ladders.iter().find(|ladder| ladder.name == "pose").unwrap();
+    let refined = pose.rungs.last().unwrap();
+    assert!(refined.max_error < 1e-6, "{:e} N", refined.max_error);
+    assert!(pose.rungs.iter().all(|rung| rung.max_error >= refined.max_error));
     assert_eq!(measured.left_out.len(), left_out, "{:?}", measured.left_out);
     assert_eq!(measured.budgets.len(), 2);
     for budget in &measured.budgets {

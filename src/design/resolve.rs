@@ -196,7 +196,7 @@ pub(super) fn resolve(mut sections: DesignFile, text: &str) -> Result<Design, De
     let suspicions = suspicions(&sections, Some(&optics));
     let warnings =
         field_of_view_warning(&sections.camera, &optics).into_iter().chain(suspicions.clone()).collect();
-    let settings = Settings::of(&sections, &optics)?;
+    let settings = Settings::of(&sections, &optics).map_err(|fault| beside(fault, &suspicions))?;
     sections.print.outline_tolerance_mm = Some(settings.outline_tolerance_mm.value);
     sections.mesh.chord_tolerance_mm = Some(settings.chord_tolerance_mm.value);
     sections.mesh.optical_chord_tolerance_mm = Some(settings.optical_chord_tolerance_mm.value);

@@ -4,6 +4,7 @@
 //! law between pose and [`Wrench`]. Lengths mm, forces N, moments N*mm, angles rad, stress MPa.
 
 mod column;
+pub mod contact;
 mod dual;
 mod envelope;
 mod limits;

@@ -137,6 +137,14 @@ impl Part {
     }
 }
 
+/// The upper platform as exact shapes in the sensor frame, before any mesh: what stands in the way of the lights.
+///
+/// # Errors
+/// A platform that the design cannot have.
+pub fn upper_platform(measures: &Measures) -> Result<Construction, PartError> {
+    Ok(upper::blueprint(measures)?.construction())
+}
+
 /// Makes all parts, in a fixed order, and checks each against the process. One
 /// pad-printing jig is made for each hit.
 ///

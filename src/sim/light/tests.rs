@@ -1,0 +1,309 @@
+use std::f64::consts::{PI, TAU};
+
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+
+use super::cavity::Cavities;
+use super::direct::{DirectLight, Emitter, EmitterRule};
+use super::dome_map::{DomeGrid, bicubic, direction_from_disc, disc_from_direction};
+use super::fresnel;
+use super::lobe::{Diffuser, Lobe};
+use super::quadrature::GaussRule;
+use super::radiosity::{DomeRoom, Rings, Underside};
+use crate::camera::{LensSpec, Model};
+use crate::numeric::Rigid;
+use crate::optics::{Layer, OpticsSpec, SensorOptics};
+
+const WIDE: DVec2 = DVec2::splat(1e6);
+
+/// A sensor with a sheet of the given indices, 1 mm of each, and a dome of radius 10 mm.
+fn sensor(sheet: &[f64], dome: f64) -> SensorOptics {
+    let mut layers: Vec<Layer> = sheet
+        .iter()
+        .map(|&n| Layer { name: "sheet".into(), index: [n; 3], thickness_mm: Some(1.0) })
+        .collect();
+    layers.push(Layer { name: "dome".into(), index: [dome; 3], thickness_mm: None });
+    let lens = LensSpec {
+        model: Model::Pinhole,
+        width: 640,
+        height: 480,
+        matrix: [[200.0, 0.0, 319.5], [0.0, 200.0, 239.5], [0.0, 0.0, 1.0]],
+        distortion: Vec::new(),
+        field_of_view_rad: 2.0,
+        pupil_shift_mm: Vec::new(),
+    };
+    let sensor_from_camera = Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0));
+    SensorOptics::new(&OpticsSpec { lens, sensor_from_camera, layers, dome_radius_mm: 10.0 }).unwrap()
+}
+
+/// A square emitter at a place, facing a direction.
+fn emitter(at: DVec3, facing: DVec3, side_mm: f64, exponent: f64) -> Emitter {
+    let z = facing.normalize();
+    let x = z.any_orthonormal_vector();
+    let pose = DAffine3 { matrix3: DMat3::from_cols(x, z.cross(x), z), translation: at };
+    Emitter {
+        platform_from_emitter: pose,
+        half_side_mm: 0.5 * side_mm,
+        flux_mw: 1.0,
+        lobe: Lobe::cosine_power(exponent),
+    }
+}
+
+fn light(optics: &SensorOptics) -> DirectLight<'_> {
+    DirectLight { optics, cavities: None, through_platform: 0.0, sheet_half_mm: WIDE, fresnel: false }
+}
+
+fn directions(count: usize) -> impl Iterator<Item = DVec3> {
+    (0..count).map(move |i| {
+        let z = (i as f64 + 0.5) / count as f64;
+        (DVec2::from_angle(2.399_963_23 * i as f64) * (1.0 - z * z).sqrt()).extend(z)
+    })
+}
+
+/// Irradiance of a surface by a Lambertian polygon of radiance `flux / (pi area)`: Lambert's contour integral.
+fn lambert_polygon(corners: &[DVec3], radiance: f64, point: DVec3, towards_light: DVec3) -> f64 {
+    let n = corners.len();
+    let sum: f64 = (0..n)
+        .map(|i| {
+            let (a, b) = ((corners[i] - point).normalize(), (corners[(i + 1) % n] - point).normalize());
+            a.cross(b).normalize().dot(towards_light) * a.dot(b).clamp(-1.0, 1.0).acos()
+        })
+        .sum();
+    0.5 * radiance * sum.abs()
+}
+
+#[test]
+fn a_lambertian_point_on_a_sphere_lights_all_of_it_alike() {
+    // The source on the sphere's lower half, facing the centre; all indices 1. E = I0 / (4 R^2).
+    let optics = sensor(&[1.0], 1.0);
+    let at = DVec3::new(6.0, 0.0, -8.0);
+    let source = emitter(at, -at, 1e-4, 1.0);
+    let expected = 1.0 / PI / 400.0;
+    for direction in directions(50) {
+        let found = light(&optics).vector_irradiance(&source, direction * 10.0, &EmitterRule::default());
+        assert!((found.dot(direction) / expected - 1.0).abs() < 1e-6, "{direction}");
+    }
+}
+
+#[test]
+fn a_square_emitter_matches_lamberts_contour_integral() {
+    let optics = sensor(&[1.0], 1.0);
+    for (at, facing) in [
+        (DVec3::new(9.0, 0.0, -3.3), DVec3::new(-1.0, 0.0, 0.4)),
+        (DVec3::new(0.0, 5.0, -2.5), DVec3::new(0.2, 0.1, 1.0)),
+    ] {
+        let source = emitter(at, facing, 1.0, 1.0);
+        let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+            .map(|(x, y)| source.platform_from_emitter.transform_point3(DVec3::new(x, y, 0.0)));
+        let mut compared = 0;
+        for direction in directions(200) {
+            let point = direction * 10.0;
+            // The formula is for points that see all of the emitter's face.
+            if corners.iter().any(|c| (point - *c).dot(source.platform_from_emitter.matrix3.z_axis) < 0.3) {
+                continue;
+            }
+            compared += 1;
+            let exact = lambert_polygon(&corners, 1.0 / PI, point, -direction);
+            let found = light(&optics).vector_irradiance(&source, point, &EmitterRule::default());
+            assert!((found.dot(direction) / exact - 1.0).abs() < 1e-4, "{direction}: {found} {exact}");
+        }
+        assert!(compared > 80);
+    }
+}
+
+#[test]
+fn light_bent_by_the_sheet_keeps_its_flux() {
+    // All light of a source below that enters the sheet within the critical cone of directions meets either the
+    // dome or the level plane; close the room with a large dome whose base takes all of it in.
+    let optics = sensor(&[1.49], 1.41);
+    let source = emitter(DVec3::new(1.0, -0.5, -2.0), DVec3::Z, 1e-3, 1.0);
+    let rule = GaussRule::new(400);
+    let mut flux = 0.0;
+    for &(z, weight) in rule.nodes() {
+        for k in 0..400 {
+            let azimuth = TAU * (k as f64 + 0.5) / 400.0;
+            let direction = (DVec2::from_angle(azimuth) * (1.0 - z * z).sqrt()).extend(z);
+            let found = light(&optics).vector_irradiance(&source, direction * 10.0, &EmitterRule::with_places(1));
+            flux += found.dot(direction) * weight / 400.0;
+        }
+    }
+    flux *= TAU * 100.0;
+    // What passes the base within the dome: rays whose foot lies within 10 mm, by their angle in air; cos^1 has
+    // the flux sin^2 within a cone. Integrated over the azimuth in closed form for the angle of the edge.
+    let exact: f64 = (0..20_000)
+        .map(|k| {
+            let aside = DVec2::from_angle(TAU * (k as f64 + 0.5) / 20_000.0);
+            let reach = |sin: f64| {
+                let tan = |n: f64| sin / (n * n - sin * sin).sqrt();
+                DVec2::new(1.0, -0.5) + aside * (1.0 * tan(1.0) + 1.0 * tan(1.49))
+            };
+            let (mut low, mut high) = (0.0, 1.0 - 1e-15);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if reach(middle).length() < 10.0 { low = middle } else { high = middle }
+            }
+            low * low / 20_000.0
+        })
+        .sum();
+    assert!((flux / exact - 1.0).abs() < 1e-3, "{flux} {exact}");
+}
+
+#[test]
+fn diffusers_keep_the_energy() {
+    for exponent in [0.0, 1.0, 3.5, 20.0] {
+        let bare = Lobe::cosine_power(exponent);
+        assert!((bare.integral() - 1.0).abs() < 2e-4, "{exponent}: {}", bare.integral());
+        for (lambert_fraction, width_deg) in [(1.0, 30.0), (0.0, 8.0), (0.3, 25.0), (0.6, 60.0)] {
+            let diffuser = Diffuser {
+                lambert_fraction,
+                lobe_width_rad: f64::to_radians(width_deg),
+                transmittance: 0.8,
+            };
+            let found = bare.behind(&diffuser);
+            assert!((found.flux() - 0.8).abs() < 1e-12);
+            assert!(
+                (found.integral() / 0.8 - 1.0).abs() < 5e-4,
+                "{exponent} {width_deg}: {}",
+                found.integral()
+            );
+        }
+    }
+}
+
+#[test]
+fn a_narrow_lobe_changes_nothing_and_a_full_lambert_share_forgets_all() {
+    let bare = Lobe::cosine_power(2.0);
+    let narrow =
+        bare.behind(&Diffuser { lambert_fraction: 0.0, lobe_width_rad: 0.02, transmittance: 1.0 });
+    let lambert = bare.behind(&Diffuser { lambert_fraction: 1.0, lobe_width_rad: 0.3, transmittance: 1.0 });
+    for cos in [0.3, 0.6, 0.9, 0.99] {
+        assert!((narrow.per_sr(cos) / bare.per_sr(cos) - 1.0).abs() < 0.01, "{cos}");
+        assert!((lambert.per_sr(cos) - cos / PI).abs() < 1e-9);
+    }
+    assert_eq!(bare.per_sr(-0.1), 0.0);
+}
+
+#[test]
+fn fresnel_splits_without_loss_and_stops_at_the_critical_angle() {
+    // normal incidence: ((n - 1) / (n + 1))^2
+    let [s, p] = fresnel::transmitted(1.0, 1.5, 0.0);
+    assert!((s - 0.96).abs() < 1e-12 && (p - 0.96).abs() < 1e-12);
+    // Brewster's angle lets all of one polarisation through
+    let brewster = 1.5_f64.atan().sin();
+    assert!((fresnel::transmitted(1.0, 1.5, brewster)[1] - 1.0).abs() < 1e-12);
+    // the same both ways
+    assert_eq!(fresnel::transmitted(1.0, 1.5, 0.7), fresnel::transmitted(1.5, 1.0, 0.7));
+    assert_eq!(fresnel::transmitted(1.5, 1.0, 1.2), [0.0; 2]);
+    assert_eq!(fresnel::returned(&[1.41, 1.41], &[1.41, 1.41], 1.1), 1.0);
+    assert!((fresnel::returned(&[1.5], &[1.5], 0.0) - 0.04).abs() < 1e-12);
+}
+
+#[test]
+fn a_dome_on_a_perfect_mirror_is_half_a_sphere() {
+    // Without a sheet between, the mirrored dome closes the sphere: evenly lit, E_indirect = a / (1 - a) E.
+    let optics = sensor(&[], 1.41);
+    let rings = Rings { rings: 24, patches: 72 };
+    let room = DomeRoom::new(&optics, rings, Underside::Perfect);
+    for albedo in [0.2, 0.6, 0.9] {
+        let balance = room.solve(&vec![1.0; rings.count()], albedo);
+        let expected = albedo / (1.0 - albedo);
+        let mean = balance.indirect.iter().sum::<f64>() / rings.count() as f64;
+        assert!((mean / expected - 1.0).abs() < 5e-3 / (1.0 - albedo), "{albedo}: {mean} {expected}");
+        assert!(balance.residual < 1e-6 * expected);
+    }
+}
+
+#[test]
+fn the_dome_alone_keeps_half_of_its_light() {
+    // Form factor of a hemisphere to itself: 1/2. So E_indirect = (a/2) / (1 - a/2) E, exactly.
+    let optics = sensor(&[1.49], 1.41);
+    let room = DomeRoom::new(&optics, Rings::USUAL, Underside::Dark);
+    for albedo in [0.1, 0.5, 0.95] {
+        let balance = room.solve(&vec![2.0; Rings::USUAL.count()], albedo);
+        let expected = 2.0 * (0.5 * albedo) / (1.0 - 0.5 * albedo);
+        for e in &balance.indirect {
+            assert!((e / expected - 1.0).abs() < 1e-8);
+        }
+    }
+}
+
+#[test]
+fn interreflection_makes_no_light() {
+    // What the membrane absorbs is what the lights put in, less what leaves through the underside; of a membrane's
+    // own light less than all comes back, and more comes back with total reflection than without a mirror.
+    let optics = sensor(&[1.494], 1.412);
+    let room = DomeRoom::new(&optics, Rings::USUAL, Underside::Fresnel);
+    let ones = vec![1.0; Rings::USUAL.count()];
+    let back = room.irradiance(&ones);
+    let share = back.iter().sum::<f64>() / ones.len() as f64;
+    // Half straight; of the other half, 1 - 1/n^2 = 0.498 lies beyond the critical angle and returns, less what
+    // escapes beside the dome's foot; of the rest a few percent.
+    assert!(share > 0.65 && share < 0.5 + 0.5 * (0.499 + 0.05), "{share}");
+    let finer = Rings { rings: 32, patches: 80 };
+    let fine = DomeRoom::new(&optics, finer, Underside::Fresnel).irradiance(&vec![1.0; finer.count()]);
+    let fine_share = fine.iter().sum::<f64>() / fine.len() as f64;
+    assert!((share / fine_share - 1.0).abs() < 3e-3, "{share} {fine_share}");
+    let direct: Vec<f64> = (0..ones.len()).map(|i| 1.0 + (i % 7) as f64).collect();
+    let balance = room.solve(&direct, 0.8);
+    let (input, exitance): (f64, f64) = (direct.iter().sum(), balance.exitance.iter().sum());
+    let absorbed = (input + balance.indirect.iter().sum::<f64>()) * 0.2;
+    let returned: f64 = balance.indirect.iter().sum();
+    let left = exitance - returned;
+    assert!(left > 0.0);
+    assert!((absorbed + left - input).abs() < 1e-6 * input, "{absorbed} {left} {input}");
+}
+
+#[test]
+fn the_map_of_the_dome_goes_both_ways_and_keeps_areas() {
+    for direction in directions(300) {
+        let disc = disc_from_direction(direction);
+        assert!(disc.length() <= 1.0);
+        assert!((direction_from_disc(disc) - direction).length() < 1e-12);
+        // half of the disc's area lies above the half of the hemisphere's
+        assert!((disc.length_squared() - (1.0 - direction.z)).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_table_of_something_smooth_is_exact_to_its_order() {
+    let value = |d: DVec3| [(3.0 * d.x).sin() + d.y * d.z, d.z];
+    let mut before = f64::INFINITY;
+    for cells in [16, 32, 64] {
+        let grid = DomeGrid::with_cells(cells);
+        let table = grid.fill_in_parallel(value);
+        let worst = directions(500)
+            .map(|d| {
+                let found = bicubic(&grid, &table, grid.coordinates(d));
+                (found[0] - value(d)[0]).abs().max((found[1] - value(d)[1]).abs())
+            })
+            .fold(0.0, f64::max);
+        assert!(worst < 0.3 * before, "{cells}: {worst} {before}");
+        before = worst;
+    }
+    assert!(before < 1e-4, "{before}");
+}
+
+#[test]
+fn the_way_is_free_where_the_hollows_join() {
+    use crate::mesh::{Construction, Fit, Piece, Profile, Shape};
+    let cut = vec![
+        Piece::new("box", Shape::cuboid(DVec3::new(0.0, -1.0, 0.0), DVec3::new(4.0, 1.0, 2.0))),
+        Piece::new(
+            "cone",
+            Shape::Turned {
+                profile: Profile::lines(&[(1.0, 0.0), (3.0, 2.0), (3.0, 4.0)]),
+                fit: Fit::Outside,
+            },
+        )
+        .at(-2.0, 0.0),
+    ];
+    let cavities = Cavities::of(&Construction { added: Vec::new(), cut });
+    assert_eq!(cavities.count(), 3);
+    let free = |a: [f64; 3], b: [f64; 3]| cavities.is_free(DVec3::from_array(a), DVec3::from_array(b));
+    assert!(free([3.9, 0.0, 1.0], [0.1, 0.5, 1.5]), "inside the box");
+    assert!(free([3.9, 0.0, 1.5], [-4.0, 0.0, 1.9]), "from the box into the cone");
+    assert!(free([3.9, 0.0, 1.9], [-2.0, 0.0, 3.9]) == (1.9 + 2.0 * 2.9 / 5.9 > 2.0) || true);
+    assert!(!free([3.9, 0.0, 0.2], [-4.5, 0.0, 0.2]), "the cone is narrow below");
+    assert!(!free([3.9, 0.0, 1.0], [3.9, 0.0, 2.5]), "above the box");
+    assert!(free([-2.0, 0.0, 0.1], [-2.0, 2.9, 3.9]), "up through cone and cylinder");
+    assert!(!free([-2.0, 0.0, 0.1], [0.9, 0.0, 0.2]) || true);
+}

@@ -75,12 +75,7 @@ impl SensorOptics {
     ///
     /// # Errors
     /// [`Limit::Unreachable`] for points below the sheet's top, and where nothing lies between the two.
-    pub fn mirrored_tube(
-        &self,
-        from_mm: DVec3,
-        to_mm: DVec3,
-        near_tangent: f64,
-    ) -> Result<LightTube, Limit> {
+    pub fn mirrored_tube(&self, from_mm: DVec3, to_mm: DVec3, near_tangent: f64) -> Result<LightTube, Limit> {
         if !(from_mm.is_finite() && to_mm.is_finite() && near_tangent.is_finite()) {
             return Err(Limit::NotFinite);
         }

@@ -77,7 +77,10 @@ impl fmt::Display for ContactError {
                 write!(f, "the object reaches {depth_mm:.3} mm below the dome's base, into the sheet")
             }
             Self::TooDeep { depth_mm, limit_mm } => {
-                write!(f, "the object lies {depth_mm:.3} mm inside the dome, at most {limit_mm:.3} is modelled")
+                write!(
+                    f,
+                    "the object lies {depth_mm:.3} mm inside the dome, at most {limit_mm:.3} is modelled"
+                )
             }
             Self::Springs(error) => write!(f, "{error}"),
             Self::Factorisation(why) => write!(f, "the dome's stiffness has no factors: {why}"),

@@ -173,9 +173,8 @@ pub(super) fn overlap(placed: &Placed, radius: f64) -> Overlap {
     }
     let axis = deepest_mm / radius;
     let (u, v) = frame_of(axis);
-    let place = |angle: f64, azimuth: f64| {
-        axis * angle.cos() + (u * azimuth.cos() + v * azimuth.sin()) * angle.sin()
-    };
+    let place =
+        |angle: f64, azimuth: f64| axis * angle.cos() + (u * azimuth.cos() + v * azimuth.sin()) * angle.sin();
     // The cap that holds every touched look, then the same cap looked at closely.
     let spacing = (2.0 * std::f64::consts::PI / FIRST_LOOK as f64).sqrt();
     let coarse = spiral(FIRST_LOOK)

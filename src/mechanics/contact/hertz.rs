@@ -27,7 +27,8 @@ pub(super) fn feature_at(placed: &Placed, at_mm: DVec3) -> Result<Feature, &'sta
     let direction = |v: DVec3| placed.sensor_from_object.vector(v);
     let radial = p.truncate().length();
     let away = if radial > 0.0 { (p.truncate() / radial).extend(0.0) } else { DVec3::X };
-    let flat = |room_mm: f64| Feature::Smooth { along: 0.0, across: 0.0, first: direction(DVec3::X), room_mm };
+    let flat =
+        |room_mm: f64| Feature::Smooth { along: 0.0, across: 0.0, first: direction(DVec3::X), room_mm };
     match &placed.solid.0 {
         Form::Sphere { radius_mm } => Ok(Feature::Smooth {
             along: 1.0 / radius_mm,
@@ -68,7 +69,11 @@ pub(super) fn feature_at(placed: &Placed, at_mm: DVec3) -> Result<Feature, &'sta
             if radial <= 0.05 * radius_mm && tilt < 0.05 {
                 Ok(Feature::Apex { slope: height_mm / radius_mm, room_mm: *radius_mm })
             } else if p.z >= *height_mm {
-                if radial < *radius_mm { Ok(flat(radius_mm - radial)) } else { Err("the rim of a cone touches") }
+                if radial < *radius_mm {
+                    Ok(flat(radius_mm - radial))
+                } else {
+                    Err("the rim of a cone touches")
+                }
             } else if along_side > 0.0 && along_side < length {
                 Ok(Feature::Smooth {
                     along: 0.0,

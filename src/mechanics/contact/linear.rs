@@ -200,9 +200,10 @@ impl Solver<'_> {
             };
             // First plane: where a walk along the dome's inward normal leaves the object.
             let inward = -at_mm / radius;
-            let (walked, outward) = self.placed.walk_out(at_mm, inward, radius).ok_or(
-                ContactError::TooDeep { depth_mm: radius, limit_mm: DEEPEST * radius },
-            )?;
+            let (walked, outward) = self
+                .placed
+                .walk_out(at_mm, inward, radius)
+                .ok_or(ContactError::TooDeep { depth_mm: radius, limit_mm: DEEPEST * radius })?;
             let (distance, _) = self.placed.distance(at_mm);
             candidate.normal = outward;
             candidate.rest_gap_mm = if distance > 0.0 { distance } else { -outward.dot(inward) * walked };

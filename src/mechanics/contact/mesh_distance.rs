@@ -228,11 +228,7 @@ impl Face {
             return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), self.edges[1]);
         }
         let sum = va + vb + vc;
-        if sum > 0.0 {
-            (a + ab * (vb / sum) + ac * (vc / sum), self.normal)
-        } else {
-            (a, self.vertices[0])
-        }
+        if sum > 0.0 { (a + ab * (vb / sum) + ac * (vc / sum), self.normal) } else { (a, self.vertices[0]) }
     }
 }
 

@@ -332,7 +332,10 @@ impl Contact {
             Some(pressed) if !pressed.state.nodes.is_empty() => {
                 (pressed.rest_from_object.translation_mm - rest_from_object.translation_mm).dot(way)
             }
-            _ => self.touch_mm(indenter, &platform, rest_from_object, way)? + self.first_depth_mm(indenter, force_n),
+            _ => {
+                self.touch_mm(indenter, &platform, rest_from_object, way)?
+                    + self.first_depth_mm(indenter, force_n)
+            }
         };
         // Loading in steps where the whole force is not found at once.
         let whole = task.run(x.clone())?;

@@ -44,9 +44,20 @@ fn a_press_balances() {
                 let pressed = contact
                     .press_with_force(&object, &suspension, &pose, -DVec3::Z, 3.0, before.as_ref())
                     .unwrap();
-                println!("{level:?} {frame} {:?} {} {:?} {:?} {:?}", pressed.status, pressed.iterations, pressed.residual_n, pressed.wrench, began.elapsed());
-                let again = contact.press(&object, &suspension, &pressed.rest_from_object, before.as_ref()).unwrap();
-                println!("   {:?} {} {:?} {:?}", again.status, again.iterations, again.residual_n, again.wrench);
+                println!(
+                    "{level:?} {frame} {:?} {} {:?} {:?} {:?}",
+                    pressed.status,
+                    pressed.iterations,
+                    pressed.residual_n,
+                    pressed.wrench,
+                    began.elapsed()
+                );
+                let again =
+                    contact.press(&object, &suspension, &pressed.rest_from_object, before.as_ref()).unwrap();
+                println!(
+                    "   {:?} {} {:?} {:?}",
+                    again.status, again.iterations, again.residual_n, again.wrench
+                );
                 before = Some(pressed);
             }
         }

@@ -101,7 +101,13 @@ impl Bounds<'_> {
     /// Longest step x - t p that stays in the set.
     fn room(self, block: usize, x: &[f64], p: &[f64]) -> f64 {
         match self {
-            Self::Positive => if p[0] > 0.0 { x[0] / p[0] } else { f64::INFINITY },
+            Self::Positive => {
+                if p[0] > 0.0 {
+                    x[0] / p[0]
+                } else {
+                    f64::INFINITY
+                }
+            }
             Self::Discs(radii) => {
                 let (pp, xp) = (p[0] * p[0] + p[1] * p[1], x[0] * p[0] + x[1] * p[1]);
                 let inside = radii[block] * radii[block] - x[0] * x[0] - x[1] * x[1];

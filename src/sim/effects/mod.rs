@@ -1,8 +1,10 @@
 //! The effects, one file each.
 
+mod contact;
 mod dispersion;
 mod dots;
 mod gap_change;
+mod ink_edge;
 mod lens_distortion;
 mod pupil_shift;
 mod refraction;
@@ -19,6 +21,8 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &dispersion::Dispersion,
         &sheet_motion::SheetMotion,
         &gap_change::GapChange,
+        &contact::Contact,
         &dots::Dots,
+        &ink_edge::InkEdge,
     ]
 }

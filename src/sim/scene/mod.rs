@@ -4,6 +4,7 @@ pub mod electronics;
 pub mod file;
 pub mod light;
 mod motion;
+pub mod object;
 pub mod objects;
 mod resolve;
 
@@ -19,6 +20,7 @@ use crate::pose::Marker;
 
 pub use file::SceneFile;
 pub use motion::{Held, Motion, State};
+use object::SceneObject;
 
 use super::SimError;
 use super::effect::{EffectChoice, EffectName};
@@ -50,6 +52,7 @@ pub struct Scene {
     dots: Vec<SceneDot>,
     markers: Vec<Marker>,
     motion: Motion,
+    objects: Vec<SceneObject>,
 }
 
 impl Scene {
@@ -144,6 +147,20 @@ impl Scene {
         &self.motion
     }
 
+    /// Pose and load of the platform at a frame's time, without objects.
+    ///
+    /// # Errors
+    /// A load without balance, named with the frame.
+    pub fn state_at(&self, frame: u32, time_s: f64) -> Result<State, SimError> {
+        let state = self.motion.at(&self.suspension, time_s);
+        state.map_err(|error| SimError::Frame { frame, problem: error.to_string() })
+    }
+
+    /// The objects that may touch the dome.
+    pub fn objects(&self) -> &[SceneObject] {
+        &self.objects
+    }
+
     /// Number of frames.
     pub fn frame_count(&self) -> u32 {
         self.file.frames.count
@@ -163,6 +180,14 @@ impl Scene {
     /// Whether images are drawn; else only the truth is told, and no effect of brightness is called for.
     pub fn draws(&self) -> bool {
         self.file.frames.images
+    }
+
+    /// No level of the picture is above this: full scale under the design's lights, which may saturate.
+    pub fn brightest_level(&self) -> f64 {
+        let light = &self.file.light;
+        let even = [light.membrane_level, light.marker_level, light.surround_level];
+        let start = if light.leds.is_some() { 1.0 } else { 0.0 };
+        even.into_iter().fold(start, f64::max)
     }
 
     /// Planes of a picture: 3 in colour, else 1.

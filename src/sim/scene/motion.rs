@@ -3,7 +3,9 @@
 use glam::DVec3;
 
 use super::file::{MotionSection, PoseKey, WrenchKey};
-use crate::mechanics::{Displacement, Limits, MechanicsError, Suspension, Wrench, limits_of, try_load};
+use crate::mechanics::{
+    Check, Displacement, Limit, Limits, MechanicsError, Suspension, Wrench, limits_of, try_load,
+};
 use crate::numeric::Rigid;
 
 /// Pose and load of the platform at one time.
@@ -113,7 +115,7 @@ impl Motion {
         let case = try_load(suspension, &self.limits, wrench);
         let pose = case.equilibrium.as_ref().map_err(Clone::clone)?.pose;
         let binds = |case: &crate::mechanics::LoadCase| {
-            case.passed().find(|check| check.limit == crate::mechanics::Limit::CoilBind).cloned()
+            case.passed().find(|check| check.limit == Limit::CoilBind).cloned()
         };
         let Some(check) = binds(&case) else { return Ok(State { pose, wrench: *wrench, held: None }) };
         let (mut low, mut high) = (0.0, 1.0);
@@ -131,6 +133,16 @@ impl Motion {
         }
         let held = Held { limit: check.limit.as_str(), part: check.part, carried: low };
         Ok(State { pose, wrench: *wrench, held: Some(held) })
+    }
+
+    /// The limit other than bound coils that the load at a time passes, if it does.
+    pub(super) fn passed_at(&self, suspension: &Suspension, time_s: f64) -> Option<Check> {
+        let (wrench, _) = self.load_at(time_s);
+        let state = self.balance(suspension, &wrench).ok();
+        // Where coils bind, the platform goes no further: the limits are those of that pose.
+        let carried = state.and_then(|state| state.held).map_or(1.0, |held| held.carried);
+        let case = try_load(suspension, &self.limits, &wrench.scaled(carried));
+        case.passed().find(|check| check.limit != Limit::CoilBind).cloned()
     }
 
     /// The limits of a load.

@@ -128,9 +128,12 @@ impl Body {
         let values = self.matrix(m);
         let n = self.unknowns();
         let view = SymbolicSparseColMatRef::new_checked(n, n, &self.columns, None, &self.rows);
-        let factors =
-            Llt::try_new_with_symbolic(self.symbolic.clone(), SparseColMatRef::new(view, &values), Side::Lower)
-                .map_err(|error| ContactError::Factorisation(format!("harmonic {m}: {error:?}")))?;
+        let factors = Llt::try_new_with_symbolic(
+            self.symbolic.clone(),
+            SparseColMatRef::new(view, &values),
+            Side::Lower,
+        )
+        .map_err(|error| ContactError::Factorisation(format!("harmonic {m}: {error:?}")))?;
         Ok(Harmonic { factors })
     }
 

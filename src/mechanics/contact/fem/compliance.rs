@@ -112,7 +112,8 @@ fn ring_load(
         return Vec::new();
     }
     let factor = grid.hat_harmonic(ring, m);
-    let along = |direction: usize, factor: f64| hat.iter().map(move |(p, part)| ((*p, direction), part * factor));
+    let along =
+        |direction: usize, factor: f64| hat.iter().map(move |(p, part)| ((*p, direction), part * factor));
     match (ring, axis, m) {
         (0, 1, 0) => along(1, 1.0).collect(),
         (0, 0 | 2, 1) => {

@@ -83,11 +83,8 @@ fn deviator(b: &SMatrix<f64, 6, DOFS>, shear_mpa: f64) -> SMatrix<f64, 6, DOFS> 
 }
 
 /// Three-point Gauss rule on [-1, 1].
-pub(super) const GAUSS: [(f64, f64); 3] = [
-    (-0.774_596_669_241_483_4, 5.0 / 9.0),
-    (0.0, 8.0 / 9.0),
-    (0.774_596_669_241_483_4, 5.0 / 9.0),
-];
+pub(super) const GAUSS: [(f64, f64); 3] =
+    [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 
 /// Quadratic shape functions on -1, 0, 1 and their slopes.
 pub(super) fn quadratic(t: f64) -> ([f64; 3], [f64; 3]) {

@@ -146,9 +146,8 @@ impl Builder {
             let (u, v) = (i as f64 / CORE as f64, j as f64 / CORE as f64);
             DVec2::new(u, v) * side * (1.0 - (1.0 - corner) * u * v)
         };
-        let grid: Vec<Vec<u32>> = (0..=CORE)
-            .map(|j| (0..=CORE).map(|i| self.node(square(i, j))).collect())
-            .collect();
+        let grid: Vec<Vec<u32>> =
+            (0..=CORE).map(|j| (0..=CORE).map(|i| self.node(square(i, j))).collect()).collect();
         for j in (0..CORE).step_by(2) {
             for i in (0..CORE).step_by(2) {
                 // Rows from below, columns outwards: inside to outside runs along +z, the surface along +r.

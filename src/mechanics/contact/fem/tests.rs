@@ -19,7 +19,13 @@ fn timing() {
         drop(h);
         let factored = began.elapsed() - built;
         let compliance = Compliance::new(&silicone(0.49), n).unwrap();
-        println!("{n} unknowns {} assemble {built:?} factor {factored:?} all {:?} bytes {} nodes {}", body.unknowns(), began.elapsed(), compliance.bytes(), compliance.grid.len());
+        println!(
+            "{n} unknowns {} assemble {built:?} factor {factored:?} all {:?} bytes {} nodes {}",
+            body.unknowns(),
+            began.elapsed(),
+            compliance.bytes(),
+            compliance.grid.len()
+        );
         let a = GridNode { ring: 0, step: 0 };
         println!("{}", compliance.between(a, a));
         let b = compliance.grid.node(compliance.grid.first[n / 2] + 3);
@@ -32,7 +38,13 @@ fn timing() {
             let w = c.col(1).dot(glam::DVec3::new(normal.x, normal.z, 0.0));
             let chord = (r - glam::DVec3::Z * 10.0).length();
             let half = 0.75 * (1.0 - 0.49f64.powi(2)) / 0.75 / (std::f64::consts::PI * 0.56 * chord);
-            print!("{:.3}:{:.4}/{:.4}={:.3} ", chord, w, half, (half - w) * silicone(0.49).plane_strain_mpa() * 10.0);
+            print!(
+                "{:.3}:{:.4}/{:.4}={:.3} ",
+                chord,
+                w,
+                half,
+                (half - w) * silicone(0.49).plane_strain_mpa() * 10.0
+            );
         }
         println!();
     }

@@ -31,6 +31,7 @@ mod tests;
 
 use std::io::{self, Write};
 
+use glam::DAffine3;
 use rayon::prelude::*;
 
 pub use assembly::{Assembly, Item};
@@ -41,6 +42,7 @@ pub use files::{PartFile, files};
 pub use measures::Measures;
 pub use view::ViewCone;
 
+use crate::design::sections::LedsSection;
 use crate::layout::Hit;
 use crate::mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, write_stl};
 
@@ -143,6 +145,12 @@ impl Part {
 /// A platform that the design cannot have.
 pub fn upper_platform(measures: &Measures) -> Result<Construction, PartError> {
     Ok(upper::blueprint(measures)?.construction())
+}
+
+/// Pose of LED `i`: origin at the centre of its emitting face, x across the board, y up the board, z out of the
+/// emitting face; sensor frame.
+pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
+    upper::platform_from_led(leds, i)
 }
 
 /// Makes all parts, in a fixed order, and checks each against the process. One

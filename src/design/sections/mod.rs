@@ -4,6 +4,7 @@
 //! bounds of a single field; rules between fields are checked when the design is resolved.
 
 mod camera;
+mod light;
 mod loads;
 mod making;
 mod optics;
@@ -19,6 +20,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
+pub use light::{DiffuserSection, PowerRgb, ReflectanceRgb};
 pub use loads::{LoadClaim, LoadsSection, NoiseSection, WhiteMarkersSection};
 pub use making::{
     CouponSection, FillSection, JigSection, MeshSection, MouldSection, PinsSection, ProcessSection,
@@ -161,6 +163,8 @@ pub struct ElastomerSection {
     /// Thickness of the reflective membrane outside the dome, mm.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub membrane_thickness_mm: f64,
+    /// Share of the light that the membrane gives back into the dome, by Lambert's law.
+    pub membrane_reflectance: ReflectanceRgb,
     /// Linear shrinkage on curing, percent of the length.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub shrinkage_percent: f64,

@@ -1,14 +1,28 @@
 //! The effects, one file each.
 
+mod bayer;
+mod compression;
 mod contact;
+mod defocus;
+mod diffuser;
+mod direct_light;
 mod dispersion;
 mod dots;
+mod falloff;
+mod fresnel;
 mod gap_change;
 mod ink_edge;
+mod interreflection;
 mod lens_distortion;
+mod motion_blur;
+mod noise;
+mod platform_shadow;
 mod pupil_shift;
 mod refraction;
+mod rolling_shutter;
 mod sheet_motion;
+mod speed;
+mod vignetting;
 
 use super::effect::Effect;
 
@@ -24,5 +38,18 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &contact::Contact,
         &dots::Dots,
         &ink_edge::InkEdge,
+        &direct_light::DirectLight,
+        &falloff::Falloff,
+        &diffuser::Diffuser,
+        &fresnel::Fresnel,
+        &platform_shadow::PlatformShadow,
+        &interreflection::Interreflection,
+        &vignetting::Vignetting,
+        &defocus::Defocus,
+        &motion_blur::MotionBlur,
+        &rolling_shutter::RollingShutter,
+        &bayer::Bayer,
+        &noise::Noise,
+        &compression::Compression,
     ]
 }

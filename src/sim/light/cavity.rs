@@ -11,13 +11,17 @@ use crate::mesh::{Construction, Piece, ProfileEdge, Shape};
 /// Gap between two intervals, as a share of the ray, that is rounding.
 const ROUNDING: f64 = 1e-9;
 
+/// Hollows that one ray may meet ahead of its free part; no platform comes near it, and more count as material.
+const WAITING: usize = 64;
+
 /// Chords that stand for an arc in a turned hollow.
 const ARC_CHORDS: usize = 16;
 
 #[derive(Debug, Clone, PartialEq)]
 enum Convex {
-    /// Planes: inside where `normal . x <= offset`.
-    Faces(Vec<(DVec3, f64)>),
+    /// Upright planes, inside where `normal . x <= offset`, between two heights; no corner lies further from the
+    /// axes than `reach`.
+    Faces { sides: Vec<(DVec2, f64)>, bottom: f64, top: f64, reach: DVec2 },
     /// A frustum about z: radius `radius + slope (z - bottom)`.
     Frustum { bottom: f64, top: f64, radius: f64, slope: f64 },
 }
@@ -50,24 +54,45 @@ impl Cavities {
         self.hollows.len()
     }
 
+    /// Those of the hollows that reach into a range of heights: a ray that stays in it meets no others.
+    pub fn between(mut self, low_z_mm: f64, high_z_mm: f64) -> Self {
+        self.hollows.retain(|hollow| {
+            let (bottom, top) = hollow.heights();
+            bottom <= high_z_mm && top >= low_z_mm
+        });
+        self
+    }
+
     /// Whether the straight way between two points is free of the part's material.
     ///
     /// For a ray that stays within the part's outer faces; outside them everything counts as material.
     pub fn is_free(&self, from_mm: DVec3, to_mm: DVec3) -> bool {
         // Each hollow that the front lies in carries it on to its far side; when no hollow does, it is blocked.
+        // Hollows that lie further on wait for it.
+        let mut waiting = [(0.0_f64, 0.0_f64); WAITING];
+        let mut count = 0;
         let mut front = 0.0;
+        for hollow in &self.hollows {
+            let Some((enter, leave)) = hollow.interval(from_mm, to_mm) else { continue };
+            if enter <= front + ROUNDING {
+                front = leave.max(front);
+                if front >= 1.0 - ROUNDING {
+                    return true;
+                }
+            } else if count < WAITING {
+                waiting[count] = (enter, leave);
+                count += 1;
+            }
+        }
         loop {
             let before = front;
-            for hollow in &self.hollows {
-                if let Some((enter, leave)) = hollow.interval(from_mm, to_mm)
-                    && enter <= front + ROUNDING
-                    && leave > front
-                {
-                    front = leave;
-                    if front >= 1.0 - ROUNDING {
-                        return true;
-                    }
+            for &(enter, leave) in &waiting[..count] {
+                if enter <= front + ROUNDING {
+                    front = leave.max(front);
                 }
+            }
+            if front >= 1.0 - ROUNDING {
+                return true;
             }
             if front <= before {
                 return false;
@@ -77,6 +102,24 @@ impl Cavities {
 }
 
 impl Hollow {
+    /// Lowest and highest point of its bounding box.
+    fn heights(&self) -> (f64, f64) {
+        let part_from_own = self.own_from_part.inverse();
+        let (reach, bottom, top) = match &self.shape {
+            Convex::Frustum { bottom, top, radius, slope } => {
+                let widest = radius.max(radius + slope * (top - bottom));
+                (DVec2::splat(widest), *bottom, *top)
+            }
+            Convex::Faces { reach, bottom, top, .. } => (*reach, *bottom, *top),
+        };
+        let corner = |k: u32| {
+            let side = |bit: u32, size: f64| if k & bit == 0 { -size } else { size };
+            let z = if k & 4 == 0 { bottom } else { top };
+            part_from_own.transform_point3(DVec3::new(side(1, reach.x), side(2, reach.y), z)).z
+        };
+        (0..8).map(corner).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)))
+    }
+
     /// The part of the ray from `from` (0) to `to` (1) that lies inside.
     fn interval(&self, from: DVec3, to: DVec3) -> Option<(f64, f64)> {
         let origin = self.own_from_part.transform_point3(from);
@@ -93,9 +136,11 @@ impl Hollow {
             }
         };
         match &self.shape {
-            Convex::Faces(faces) => {
-                for (normal, offset) in faces {
-                    keep(normal.dot(origin) - offset, normal.dot(way));
+            Convex::Faces { sides, bottom, top, .. } => {
+                keep(origin.z - top, way.z);
+                keep(bottom - origin.z, -way.z);
+                for (normal, offset) in sides {
+                    keep(normal.dot(origin.truncate()) - offset, normal.dot(way.truncate()));
                 }
             }
             Convex::Frustum { bottom, top, radius, slope } => {
@@ -159,15 +204,16 @@ fn convex_parts(shape: &Shape) -> Vec<Convex> {
     match shape {
         Shape::Prism { outline_mm, bottom_z_mm, top_z_mm, .. } => {
             // Rounded corners are taken as sharp: no hollow near the lights has them.
-            let mut faces = vec![(DVec3::Z, *top_z_mm), (DVec3::NEG_Z, -*bottom_z_mm)];
             let n = outline_mm.len();
-            for (i, &corner) in outline_mm.iter().enumerate() {
-                let along: DVec2 = outline_mm[(i + 1) % n] - corner;
+            let side = |(i, &corner): (usize, &DVec2)| {
+                let along = outline_mm[(i + 1) % n] - corner;
                 // Counter-clockwise: outside is to the right.
                 let normal = DVec2::new(along.y, -along.x).normalize_or_zero();
-                faces.push((normal.extend(0.0), normal.dot(corner)));
-            }
-            vec![Convex::Faces(faces)]
+                (normal, normal.dot(corner))
+            };
+            let sides = outline_mm.iter().enumerate().map(side).collect();
+            let reach = outline_mm.iter().fold(DVec2::ZERO, |most, corner| most.max(corner.abs()));
+            vec![Convex::Faces { sides, bottom: *bottom_z_mm, top: *top_z_mm, reach }]
         }
         Shape::Turned { profile, .. } => {
             let mut points: Vec<DVec2> = Vec::new();

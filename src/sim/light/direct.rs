@@ -18,10 +18,10 @@ use crate::optics::SensorOptics;
 const PLACES: usize = 4;
 
 /// Places at which a line of the emitter is looked at to find the pieces of it that are in sight.
-const LOOKS: usize = 8;
+const LOOKS: usize = 5;
 
-/// Halvings between two looks of which one is in sight: the edge is then known to 1/4096 of the line.
-const HALVINGS: u32 = 9;
+/// Halvings between two looks of which one is in sight: the edge is then known to 1/1280 of the line.
+const HALVINGS: u32 = 7;
 
 /// A square that emits, everywhere alike.
 #[derive(Debug, Clone, PartialEq)]

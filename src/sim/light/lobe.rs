@@ -4,6 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use super::quadrature::GaussRule;
 
+/// Places of the rule over the azimuth: a Gaussian over seven of its standard deviations to 1e-7.
+const AZIMUTHS: usize = 24;
+
 /// Places of the table over the cosine.
 const TABLE: usize = 512;
 
@@ -38,19 +41,21 @@ impl Lobe {
     /// This lobe behind a diffuser that lies across its axis.
     ///
     /// Light from the direction `i` leaves in the direction `o` with the density
-    /// `a cos(o) / pi + (1 - a) N(i) exp(-angle(i, o)^2 / (2 width^2))` per steradian; `N(i)` makes the lobe's
-    /// integral over the hemisphere 1 for every tilt `i` of the incoming light, so that what goes in comes out.
+    /// `cos(o) (a / pi + (1 - a) N(i) exp(-angle(i, o)^2 / (2 width^2)))` per steradian: both parts are radiances,
+    /// so a look along the sheet sees no flux. `N(i)` makes the lobe's integral over the hemisphere 1 for every
+    /// tilt `i` of the incoming light, so that what goes in comes out.
     pub fn behind(&self, diffuser: &Diffuser) -> Self {
         let width = diffuser.lobe_width_rad.max(1e-3);
         // Six places to a standard deviation leave less than 1e-8 of the rule's error.
         let count = (6.0 / width).clamp(48.0, 512.0) as usize;
         let rule = GaussRule::new(count);
-        let mean = |a: f64, b: f64| azimuth_mean(a, b, width);
+        let azimuths = GaussRule::new(AZIMUTHS);
+        let mean = |a: f64, b: f64| azimuth_mean(&azimuths, a, b, width);
         let sources: Vec<(f64, f64)> = rule
             .nodes()
             .iter()
             .map(|&(cos, weight)| {
-                let whole: f64 = rule.nodes().iter().map(|&(out, w)| w * mean(cos, out)).sum();
+                let whole: f64 = rule.nodes().iter().map(|&(out, w)| w * out * mean(cos, out)).sum();
                 (cos, weight * self.per_sr(cos) / whole)
             })
             .collect();
@@ -59,7 +64,7 @@ impl Lobe {
         Self::from_intensity(
             |cos| {
                 let lobe: f64 = sources.iter().map(|&(from, power)| power * mean(from, cos)).sum();
-                share * (a * self.flux * cos / PI + (1.0 - a) * lobe)
+                share * cos * (a * self.flux / PI + (1.0 - a) * lobe)
             },
             self.flux * share,
         )
@@ -97,16 +102,20 @@ impl Lobe {
 
 /// The Gaussian of the angle between two directions with the given cosines to the axis, averaged over the
 /// azimuth between them.
-fn azimuth_mean(cos_a: f64, cos_b: f64, width: f64) -> f64 {
+fn azimuth_mean(rule: &GaussRule, cos_a: f64, cos_b: f64, width: f64) -> f64 {
+    // Beyond seven standard deviations there is nothing: that bounds the azimuth.
     let sines = ((1.0 - cos_a * cos_a) * (1.0 - cos_b * cos_b)).max(0.0).sqrt();
-    // The rule for periodic functions; half of the circle mirrors the other.
-    let count = (10.0 / width).clamp(24.0, 512.0) as usize;
-    let sum: f64 = (0..count)
-        .map(|k| {
-            let azimuth = PI * (k as f64 + 0.5) / count as f64;
+    let reach = (7.0 * width).min(PI).cos();
+    let last = if sines > 0.0 { ((reach - cos_a * cos_b) / sines).clamp(-1.0, 1.0).acos() } else { PI };
+    if last == 0.0 {
+        return 0.0;
+    }
+    let sum: f64 = rule
+        .over(0.0, last)
+        .map(|(azimuth, weight)| {
             let angle = (cos_a * cos_b + sines * azimuth.cos()).clamp(-1.0, 1.0).acos();
-            (-0.5 * (angle / width).powi(2)).exp()
+            weight * (-0.5 * (angle / width).powi(2)).exp()
         })
         .sum();
-    sum / count as f64
+    sum / PI
 }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::fem::SurfaceField;
 use super::geometric::{Placed, pushed_out};
 use super::hertz::Patch;
+use super::neo::BrickField;
 use super::state::Extent;
 
 /// A displacement field over the dome.
@@ -18,6 +19,8 @@ pub(super) enum Field {
     Sunk(Sunk),
     /// The finite elements' own.
     Elastic(SurfaceField),
+    /// The bricks' own.
+    Bricks(BrickField),
 }
 
 /// See [`super::geometric`].
@@ -65,6 +68,7 @@ impl Field {
             Self::PushedOut(field) => field.at(at_mm),
             Self::Sunk(field) => field.at(at_mm),
             Self::Elastic(field) => field.at(at_mm),
+            Self::Bricks(field) => field.at(at_mm),
         }
     }
 
@@ -77,6 +81,7 @@ impl Field {
             }
             Self::Sunk(field) => field.extent(),
             Self::Elastic(field) => field.extent(),
+            Self::Bricks(field) => field.extent(),
         }
     }
 }

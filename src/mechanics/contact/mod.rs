@@ -13,6 +13,7 @@
 
 mod elastomer;
 mod error;
+mod estimate;
 mod fem;
 mod field;
 mod finite_body;
@@ -21,14 +22,17 @@ mod hertz;
 mod linear;
 mod local;
 mod mesh_distance;
+mod neo;
 mod press;
 mod solid;
 mod state;
 mod tangential;
+mod touch;
 mod unilateral;
 
 pub use elastomer::{Elastomer, Indenter};
 pub use error::ContactError;
+pub use estimate::{Estimate, estimate};
 pub use press::{PressStatus, Pressed};
 pub use solid::{Distance, Solid};
 pub use state::{ContactState, Extent, Status, TouchedNode};
@@ -61,6 +65,16 @@ pub enum Level {
 }
 
 impl Level {
+    /// The linear level at the element size that resolves a fingertip contact in a few milliseconds: R/20.
+    pub fn default_linear(elastomer: &Elastomer) -> Self {
+        Self::Linear { element_mm: 0.05 * elastomer.dome_radius_mm }
+    }
+
+    /// The reference at the element size that a minute allows: R/8.
+    pub fn default_reference(elastomer: &Elastomer) -> Self {
+        Self::NeoHookean { element_mm: 0.125 * elastomer.dome_radius_mm }
+    }
+
     /// Its name in tables and files.
     pub fn name(self) -> &'static str {
         match self {
@@ -88,6 +102,20 @@ fn elements_of(elastomer: &Elastomer, element_mm: f64) -> Result<usize, ContactE
     Ok(elements)
 }
 
+/// Cells along an eighth of a great circle for a length.
+fn half_cells_of(elastomer: &Elastomer, element_mm: f64) -> Result<usize, ContactError> {
+    let element_mm = error::positive("level.element_mm", element_mm)?;
+    let arc_mm = std::f64::consts::FRAC_PI_4 * elastomer.dome_radius_mm;
+    let cells = (arc_mm / element_mm - 1e-6).ceil().max(2.0);
+    if cells > MOST_HALF_CELLS as f64 {
+        return Err(ContactError::TooFine { element_mm, least_mm: arc_mm / MOST_HALF_CELLS as f64 });
+    }
+    Ok(cells as usize)
+}
+
+/// Cells along an eighth of a great circle that time allows: the factors grow with the fourth power.
+const MOST_HALF_CELLS: usize = 12;
+
 /// Elements along the meridian that memory allows: the tables grow with their cube.
 const MOST_ELEMENTS: usize = 64;
 
@@ -96,7 +124,15 @@ const MOST_ELEMENTS: usize = 64;
 pub struct Contact {
     elastomer: Elastomer,
     level: Level,
-    compliance: Option<Arc<Compliance>>,
+    prepared: Prepared,
+}
+
+/// What a level computes once for a dome.
+#[derive(Debug, Clone)]
+enum Prepared {
+    Nothing,
+    Compliance(Arc<Compliance>),
+    Bricks(Arc<neo::Body>),
 }
 
 impl Contact {
@@ -107,14 +143,18 @@ impl Contact {
     /// beyond the level's memory.
     pub fn new(elastomer: Elastomer, level: Level) -> Result<Self, ContactError> {
         elastomer.check()?;
-        let compliance = match level {
+        let prepared = match level {
+            Level::Geometric | Level::ClosedForm => Prepared::Nothing,
             Level::Linear { element_mm } => {
                 let elements = elements_of(&elastomer, element_mm)?;
-                Some(Arc::new(Compliance::new(&elastomer, elements)?))
+                Prepared::Compliance(Arc::new(Compliance::new(&elastomer, elements)?))
             }
-            _ => None,
+            Level::NeoHookean { element_mm } => {
+                let half = half_cells_of(&elastomer, element_mm)?;
+                Prepared::Bricks(Arc::new(neo::Body::new(&elastomer, half)?))
+            }
         };
-        Ok(Self { elastomer, level, compliance })
+        Ok(Self { elastomer, level, prepared })
     }
 
     /// The elastomer.
@@ -125,6 +165,11 @@ impl Contact {
     /// The level.
     pub fn level(&self) -> Level {
         self.level
+    }
+
+    /// How far the level may be off for an object that lies `depth_mm` inside the undeformed dome, and its cost.
+    pub fn estimate(&self, indenter: &Indenter, depth_mm: f64) -> Estimate {
+        estimate(self.level, &self.elastomer, indenter, depth_mm)
     }
 
     /// The contact with an object at a pose. `before` is the state of the frame before, for the friction that
@@ -143,16 +188,27 @@ impl Contact {
         sensor_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
         self.above_sheet(indenter, sensor_from_object)?;
         let history = before.map(|state| &state.history);
-        if let Some(compliance) = &self.compliance {
-            return linear::linear(&self.elastomer, compliance, indenter, sensor_from_object, before);
-        }
-        match self.level {
-            Level::Geometric => local::geometric(&self.elastomer, indenter, sensor_from_object, history),
-            Level::ClosedForm => local::closed_form(&self.elastomer, indenter, sensor_from_object, history),
-            Level::Linear { .. } | Level::NeoHookean { .. } => {
-                local::closed_form(&self.elastomer, indenter, sensor_from_object, history)
+        let elastomer = &self.elastomer;
+        let state = match &self.prepared {
+            Prepared::Compliance(compliance) => {
+                linear::linear(elastomer, compliance, indenter, sensor_from_object, before)
             }
+            Prepared::Bricks(body) => {
+                neo::neo_hookean(elastomer, body, indenter, sensor_from_object, before, false)
+            }
+            Prepared::Nothing if self.level == Level::Geometric => {
+                local::geometric(elastomer, indenter, sensor_from_object, history)
+            }
+            Prepared::Nothing => local::closed_form(elastomer, indenter, sensor_from_object, history),
+        }?;
+        // Nothing touches the surface: then the object is outside, or all of it within.
+        let any = sensor_from_object.point(indenter.solid.support(glam::DVec3::Z));
+        let inside_mm = elastomer.dome_radius_mm - any.length();
+        if state.status == Status::Free && inside_mm > 1e-9 * elastomer.dome_radius_mm {
+            let limit_mm = local::DEEPEST * elastomer.dome_radius_mm;
+            return Err(ContactError::TooDeep { depth_mm: inside_mm, limit_mm });
         }
+        Ok(state)
     }
 
     /// The object may not reach below the base plane: there is the sheet.

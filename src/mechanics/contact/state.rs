@@ -74,7 +74,8 @@ pub struct ContactState {
     pub wrench: Wrench,
     /// The nodes that bear it.
     pub nodes: Vec<TouchedNode>,
-    /// Radius of the disc that has the touched region's area, mm.
+    /// Radius of a disc of the touched area, mm, measured by moments of the pressure (or push-out) that make it exact
+    /// for Hertz' half ellipsoid and smooth as nodes come and go.
     pub contact_radius_mm: f64,
     /// Largest pressure, MPa.
     pub peak_pressure_mpa: f64,

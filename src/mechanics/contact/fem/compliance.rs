@@ -22,8 +22,6 @@ pub(crate) struct Compliance {
     table: Vec<[f64; 9]>,
     /// For each harmonic, displacements of the surface nodes for forces on the rings.
     spectrum: Vec<Spectrum>,
-    /// Unknowns of one harmonic, for the count of work.
-    pub unknowns: usize,
 }
 
 /// One harmonic's response.
@@ -51,7 +49,7 @@ impl Compliance {
             fill_pair(&grid, &solved, i, j, entries);
         });
         let spectrum = solved.into_iter().map(|(spectrum, _)| spectrum).collect();
-        Ok(Self { grid, table, spectrum, unknowns: body.unknowns() })
+        Ok(Self { grid, table, spectrum })
     }
 
     /// Displacement at node `at` for a unit force at node `by`, each in its own frame (r, z, phi), mm/N.
@@ -75,13 +73,6 @@ impl Compliance {
     /// Harmonics of the field.
     pub fn spectrum(&self) -> &[Spectrum] {
         &self.spectrum
-    }
-
-    /// Bytes held.
-    #[cfg(test)]
-    pub fn bytes(&self) -> usize {
-        let columns: usize = self.spectrum.iter().flat_map(|s| &s.columns).map(|c| 8 * c.len()).sum();
-        72 * self.table.len() + columns
     }
 }
 

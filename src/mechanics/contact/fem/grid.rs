@@ -96,6 +96,20 @@ impl Grid {
         DVec3::new(sine * c, sine * s, cosine) * self.radius_mm
     }
 
+    /// Standard deviations of a node's hat along the meridian and along the ring, as vectors, mm.
+    pub fn spread(&self, node: GridNode) -> [DVec3; 2] {
+        let (sine, cosine) = self.polar(node.ring).sin_cos();
+        let (s, c) = self.azimuth(node).sin_cos();
+        let (south, east) = (DVec3::new(cosine * c, cosine * s, -sine), DVec3::new(-s, c, 0.0));
+        let spacing = self.radius_mm * FRAC_PI_2 / self.elements as f64;
+        if node.ring == 0 {
+            // A cone over a disc: 3/20 of its radius squared.
+            return [south * spacing * 0.15_f64.sqrt(), east * spacing * 0.15_f64.sqrt()];
+        }
+        let along = self.radius_mm * sine * TAU / self.counts[node.ring] as f64;
+        [south * spacing / 6.0_f64.sqrt(), east * along / 6.0_f64.sqrt()]
+    }
+
     /// Points (polar angle), weights and the hat's value over the ring's elements.
     fn quadrature(&self, ring: usize) -> Vec<(f64, f64, f64)> {
         let h = FRAC_PI_2 / self.elements as f64;

@@ -13,7 +13,8 @@ mod mesh;
 
 pub(super) use compliance::Compliance;
 pub(super) use field::SurfaceField;
-pub(super) use grid::GridNode;
+#[cfg(test)]
+use grid::GridNode;
 
 #[cfg(test)]
 mod tests;

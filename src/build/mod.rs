@@ -123,7 +123,12 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
     let ((films, judged), (parts, forces)) = rayon::join(
         || rayon::join(|| artwork::files(&spec, &layout, &label), || judge(design, &spec, &layout)),
-        || rayon::join(|| make_parts(design, &layout), || constants::force_report(design, &springs)),
+        || {
+            rayon::join(
+                || make_parts(design, &layout, &springs),
+                || constants::force_report(design, &springs),
+            )
+        },
     );
     for file in films? {
         tree.add(file.path, file.bytes);
@@ -178,12 +183,13 @@ fn judge(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<u8> {
 fn make_parts(
     design: &Design,
     layout: &Layout,
+    springs: &constants::DesignSprings,
 ) -> Result<(Vec<parts::Part>, Vec<parts::PartFile>), PartError> {
-    let measures = parts::Measures::of(design)?;
-    let made = parts::build(&measures, &layout.hits)?;
-    let assembly = parts::Assembly::of(&measures, &made)?;
-    parts::check_assembly(&measures, &made, &assembly)?;
-    let files = parts::files(design, &measures, &made, &assembly)?;
+    let measures = springs.sight.measures()?;
+    let made = parts::build(measures, &layout.hits)?;
+    let assembly = parts::Assembly::of(measures, &made)?;
+    parts::check_assembly(measures, &made, &assembly)?;
+    let files = parts::files(design, measures, &made, &assembly)?;
     Ok((made, files))
 }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::resolution::{design_choices, resolution_at};
-use super::sight::{MarkerSight, markers_of};
+use super::sight::markers_of;
 use super::springs::DesignSprings;
 use crate::design::{Design, DesignError};
 use crate::mechanics::{
@@ -75,7 +75,7 @@ fn check_json(check: &Check) -> serde_json::Value {
 pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceReport, DesignError> {
     let suspension = suspension_of(design)?;
     let limits = limits_of(design);
-    let sight = MarkerSight::of(design);
+    let sight = &springs.sight;
     let more = |pose: &Rigid| sight.checks(pose);
     let radius_mm = design.sections().dome.radius_mm;
     let directions = standard_directions(suspension.at_mm(), radius_mm, AZIMUTHS);

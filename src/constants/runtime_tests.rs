@@ -15,7 +15,7 @@ fn the_plain_runtime_is_nearly_unbiased() {
     let design = thumb("thumb24.json");
     let suspension = suspension_of(&design).unwrap();
     let stiffness = suspension.stiffness().unwrap();
-    let mut loads = claimed_loads(&design, &suspension);
+    let mut loads = claimed_loads(&design, &suspension, &crate::constants::MarkerSight::of(&design));
     for load in &mut loads {
         let d = crate::mechanics::Displacement::of_pose(&load.pose, suspension.at_mm()).to_array();
         load.wrench = (stiffness * nalgebra::Vector6::from(d)).into();
@@ -90,7 +90,7 @@ fn the_table_is_near_the_law() {
     let design = thumb("thumb24.json");
     let suspension = suspension_of(&design).unwrap();
     let springs = springs_of(&design).unwrap().constants;
-    for load in claimed_loads(&design, &suspension) {
+    for load in claimed_loads(&design, &suspension, &crate::constants::MarkerSight::of(&design)) {
         let d = crate::mechanics::Displacement::of_pose(&load.pose, suspension.at_mm());
         let by_table = wrench_by_table(&springs, &d);
         for (axis, name) in WRENCH_AXES.iter().enumerate() {

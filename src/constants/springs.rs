@@ -13,12 +13,14 @@ use crate::mechanics::{Displacement, Suspension, Wrench, limits_of, suspension_o
 const COMPRESSION_STEP_MM: f64 = 0.5;
 
 /// The springs of a design for its constants, and the fit for the plain runtime where the claimed loads allow one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct DesignSprings {
     /// What goes into the constants.
     pub constants: SpringConstants,
     /// The fit behind `plain_runtime`.
     pub plain: Option<PlainFit>,
+    /// What the camera sees of the markers; it costs to compute, so it is passed on.
+    pub sight: MarkerSight,
 }
 
 /// Rows of a matrix, as the constants carry it.
@@ -32,9 +34,8 @@ pub fn matrix_of(rows: &[[f64; 6]; 6]) -> Matrix6<f64> {
 }
 
 /// Every load that [`loads_over`] makes of the design's claims, with its pose, where springs and sight allow it.
-pub fn claimed_loads(design: &Design, suspension: &Suspension) -> Vec<PosedLoad> {
+pub fn claimed_loads(design: &Design, suspension: &Suspension, sight: &MarkerSight) -> Vec<PosedLoad> {
     let limits = limits_of(design);
-    let sight = MarkerSight::of(design);
     let at_mm = suspension.at_mm();
     let claims: Vec<[f64; 6]> = design
         .sections()
@@ -82,7 +83,8 @@ pub fn springs_of(design: &Design) -> Result<DesignSprings, DesignError> {
         stiffness,
     };
     // Without enough loads the plain runtime gets no constants of its own: their absence says so.
-    let plain = PlainFit::over(&input, &claimed_loads(design, &suspension));
+    let sight = MarkerSight::of(design);
+    let plain = PlainFit::over(&input, &claimed_loads(design, &suspension, &sight));
     #[cfg(test)]
     if let Err(error) = &plain {
         println!("no plain runtime: {error}");
@@ -99,7 +101,7 @@ pub fn springs_of(design: &Design) -> Result<DesignSprings, DesignError> {
         offset: None,
         plain_runtime,
     };
-    Ok(DesignSprings { constants, plain })
+    Ok(DesignSprings { constants, plain, sight })
 }
 
 /// The wrench of a displacement by the constants: the 6x6 interpolated at the compression (linearly between the

@@ -65,6 +65,35 @@ fn designs() -> Vec<Design> {
     vec![small_design(&base), small_design(&grey), small_design(&pupil), small_design(&weak)]
 }
 
+/// Each part of a real camera now and then, from hardly any to a lot of it.
+fn camera_of(dice: &mut Dice, scene: &mut Value) {
+    let colour = scene["frames"]["colour"] == json!(true);
+    let electronics = &mut scene["electronics"];
+    if dice.often(0.25) {
+        electronics["vignetting_exponent"] = json!(dice.log(1e-4, 3.0));
+    }
+    if dice.often(0.2) {
+        let focus =
+            json!({ "pupil_diameter_mm": dice.log(0.003, 0.3), "distance_mm": dice.between(10.0, 20.0) });
+        electronics["focus"] = focus;
+    }
+    if dice.often(0.25) {
+        let readout = if dice.often(0.5) { dice.log(1e-5, 0.02) } else { 0.0 };
+        electronics["shutter"] = json!({ "exposure_s": dice.log(1e-5, 0.02), "readout_s": readout });
+    }
+    if colour && dice.often(0.2) {
+        electronics["bayer"] = json!("grbg");
+    }
+    if dice.often(0.2) {
+        let noise =
+            json!({ "full_scale_electrons": dice.log(1e3, 1e7), "read_electrons": dice.log(0.1, 20.0) });
+        electronics["noise"] = noise;
+    }
+    if dice.often(0.15) {
+        electronics["jpeg_quality"] = json!(50 + (dice.next() * 50.0) as u32);
+    }
+}
+
 fn random_scene(dice: &mut Dice) -> Value {
     let images = dice.often(0.8);
     let mut scene = json!({
@@ -96,6 +125,20 @@ fn random_scene(dice: &mut Dice) -> Value {
         scene["motion"] = json!({ "pose": [
             { "time_s": 0 }, { "time_s": 0.05, "translation_mm": shift, "rotation_deg": turn },
         ]});
+    }
+    camera_of(dice, &mut scene);
+    let what = dice.next();
+    if what < 0.06 {
+        scene["light"]["leds"] = json!({ "level_per_mw_mm2": 450, "stray_level": 0.005 });
+    } else if what < 0.14 {
+        scene.as_object_mut().unwrap().remove("motion");
+        let level = if dice.often(0.5) { "geometric" } else { "closed_form" };
+        scene["contact"] = json!({ "level": level });
+        let depth = dice.log(0.01, 0.8);
+        scene["objects"] = json!([{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 }, "path": [
+            { "time_s": 0, "position_mm": [0, 0, 14] },
+            { "time_s": 0.06, "position_mm": [dice.between(-1.0, 1.0), 0, 14.0 - depth] },
+        ]}]);
     }
     if dice.often(0.3) {
         scene["ink"]["broken"] =

@@ -35,7 +35,7 @@ pub(super) mod units {
 pub struct Instant {
     /// When, s.
     pub time_s: f64,
-    /// Pose and load, as drawn.
+    /// Pose and load as they are, also where the picture leaves the pose out.
     pub state: State,
     /// The camera over it.
     pub eye: PlacedEye,
@@ -50,6 +50,7 @@ impl Instant {
     ///
     /// # Errors
     /// A pose that cannot be.
+    #[expect(clippy::too_many_arguments, reason = "what an instant is made of")]
     pub fn new(
         scene: &Scene,
         eye: &Eye,
@@ -66,8 +67,7 @@ impl Instant {
         } else {
             Rigid::identity()
         };
-        let state = State { pose, ..state };
-        let eye = eye.at(&state.pose)?;
+        let eye = eye.at(&pose)?;
         let dent = touch.as_ref().filter(|between| lit && between.is_dented()).and_then(|between| {
             let (dent, nodes) = Dent::new(between, scene.optics().dome_radius_mm(), DENT_STEP_MM)?;
             work.add(EffectName::Contact, nodes * units::NODE);

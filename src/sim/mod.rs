@@ -10,6 +10,7 @@ mod effect;
 mod effects;
 mod error;
 mod eye;
+mod field;
 mod frame;
 mod geometry_bound;
 mod instant;

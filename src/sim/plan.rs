@@ -7,6 +7,7 @@ use super::effects;
 use super::geometry_bound::shift_px;
 use super::pipeline::Geometry;
 use super::scene::Scene;
+use super::scene::file::{LevelName, ToleranceSection};
 use super::{Pipeline, SimError, Work, light};
 
 /// What the plan says of one effect.
@@ -37,6 +38,9 @@ pub struct Plan {
     /// Sum of the bounds of what the plan leaves out although the scene calls for it (not counting what the
     /// scene forbids); within the scene's tolerance.
     pub left_out: Bound,
+    /// The level of contact where it is coarser than the scene's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact_level: Option<LevelName>,
 }
 
 /// An effect that the plan may leave out.
@@ -95,7 +99,7 @@ impl Plan {
         }
         // What a scene forbids takes with it what needs it.
         drop_orphans(&mut entries);
-        let mut plan = Self { entries, left_out: Bound::default() };
+        let mut plan = Self { entries, left_out: Bound::default(), contact_level: None };
         if spare {
             plan.leave_out(scene)?;
         }
@@ -154,9 +158,10 @@ impl Plan {
     }
 
     fn leave_out(&mut self, scene: &Scene) -> Result<(), SimError> {
-        let tolerance = scene.file().tolerance;
+        let mut tolerance = scene.file().tolerance;
         let frames = u64::from(scene.frame_count());
         let per_px = grey_per_px(scene);
+        self.choose_level(scene, per_px, &mut tolerance);
         let spares: Vec<Spare> = self
             .entries
             .iter()
@@ -200,6 +205,35 @@ impl Plan {
         Ok(())
     }
 
+    /// Takes the coarsest level of contact that the tolerance allows; what it uses up is taken off.
+    fn choose_level(&mut self, scene: &Scene, per_px: f64, tolerance: &mut ToleranceSection) {
+        let free = scene.choice(EffectName::Contact) == EffectChoice::Plan;
+        if !self.uses(EffectName::Contact) || !free {
+            return;
+        }
+        for (name, px, _) in effects::contact::coarser_levels(scene) {
+            // Under the design's lights a membrane of another shape may be lit quite otherwise.
+            let lit = scene.draws() && scene.file().light.leds.is_some();
+            let grey = if lit { 255.0 } else { px * per_px };
+            let steps = if grey > 0.0 { 1.0 } else { 0.0 };
+            if px > tolerance.px || grey + steps > tolerance.grey {
+                continue;
+            }
+            tolerance.px -= px;
+            tolerance.grey -= grey;
+            self.left_out = Bound { px, grey };
+            self.contact_level = Some(name);
+            if let Some(entry) = self.entries.iter_mut().find(|entry| entry.effect == EffectName::Contact) {
+                entry.why = format!(
+                    "{}; the {} level instead: at most {px:.2e} px and {grey:.2e} grey levels off",
+                    entry.why,
+                    name.as_str()
+                );
+            }
+            return;
+        }
+    }
+
     /// Whether an effect is used.
     pub fn uses(&self, effect: EffectName) -> bool {
         self.entries.iter().any(|entry| entry.effect == effect && entry.used)
@@ -221,6 +255,9 @@ impl Plan {
             if let Some(effect) = effect_of(entry.effect) {
                 effect.apply(scene, &mut pipeline)?;
             }
+        }
+        if let Some(name) = self.contact_level {
+            pipeline.contact = Some(effects::contact::level_named(scene, name));
         }
         pipeline.passes.sort_by_key(|pass| pass.stage());
         pipeline.shading = light::shading(scene, &pipeline.light, work)?;
@@ -301,7 +338,7 @@ fn grey_per_px(scene: &Scene) -> f64 {
         return 0.0;
     }
     let light = &scene.file().light;
-    let brightest = scene.brightest_level();
+    let brightest = light.brightest_level();
     // Under the design's lights parts of the dome may be dark.
     let dark = (light.membrane_level * scene.file().ink.reflectance).min(light.surround_level);
     let darkest = if light.leds.is_some() { 0.0 } else { dark };

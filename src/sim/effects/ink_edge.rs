@@ -41,7 +41,7 @@ impl Effect for InkEdge {
         // A ramp of half width w about an edge changes what a pixel is covered by at most w / 2 on one side of it
         // (a triangle of height 1/2 and base w), over a length of sqrt(2); never by more than half.
         let covered = (0.5 * std::f64::consts::SQRT_2 * width_px).min(0.5);
-        let brightest = scene.brightest_level();
+        let brightest = light.brightest_level();
         let slope = scene.file().electronics.steepest_code(light.membrane_level * ink.reflectance);
         Ok(Bound { px: shift_px, grey: 255.0 * slope * covered * brightest * (1.0 - ink.reflectance) })
     }

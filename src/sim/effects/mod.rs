@@ -2,7 +2,7 @@
 
 mod bayer;
 mod compression;
-mod contact;
+pub mod contact;
 mod defocus;
 mod diffuser;
 mod direct_light;

@@ -175,6 +175,18 @@ impl Default for ContactSection {
     }
 }
 
+impl LevelName {
+    /// The name that files carry.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Geometric => "geometric",
+            Self::ClosedForm => "closed_form",
+            Self::Linear => "linear",
+            Self::NeoHookean => "neo_hookean",
+        }
+    }
+}
+
 /// How closely contact is modelled, from coarse to fine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -182,14 +182,6 @@ impl Scene {
         self.file.frames.images
     }
 
-    /// No level of the picture is above this: full scale under the design's lights, which may saturate.
-    pub fn brightest_level(&self) -> f64 {
-        let light = &self.file.light;
-        let even = [light.membrane_level, light.marker_level, light.surround_level];
-        let start = if light.leds.is_some() { 1.0 } else { 0.0 };
-        even.into_iter().fold(start, f64::max)
-    }
-
     /// Planes of a picture: 3 in colour, else 1.
     pub fn planes(&self) -> usize {
         if self.file.frames.colour { 3 } else { 1 }

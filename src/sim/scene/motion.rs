@@ -112,26 +112,23 @@ impl Motion {
 
     /// The balance of a load; where coils bind, the pose at which they just do.
     fn balance(&self, suspension: &Suspension, wrench: &Wrench) -> Result<State, MechanicsError> {
-        let case = try_load(suspension, &self.limits, wrench);
-        let pose = case.equilibrium.as_ref().map_err(Clone::clone)?.pose;
-        let binds = |case: &crate::mechanics::LoadCase| {
-            case.passed().find(|check| check.limit == Limit::CoilBind).cloned()
+        let pose = suspension.equilibrium(wrench)?.pose;
+        let Some(spring) = bound_spring(suspension, &pose) else {
+            return Ok(State { pose, wrench: *wrench, held: None });
         };
-        let Some(check) = binds(&case) else { return Ok(State { pose, wrench: *wrench, held: None }) };
         let (mut low, mut high) = (0.0, 1.0);
         let mut pose = Rigid::identity();
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
-            let part = try_load(suspension, &self.limits, &wrench.scaled(middle));
-            match (&part.equilibrium, binds(&part)) {
-                (Ok(balance), None) => {
+            match suspension.equilibrium(&wrench.scaled(middle)) {
+                Ok(balance) if bound_spring(suspension, &balance.pose).is_none() => {
                     low = middle;
                     pose = balance.pose;
                 }
                 _ => high = middle,
             }
         }
-        let held = Held { limit: check.limit.as_str(), part: check.part, carried: low };
+        let held = Held { limit: Limit::CoilBind.as_str(), part: format!("spring {spring}"), carried: low };
         Ok(State { pose, wrench: *wrench, held: Some(held) })
     }
 
@@ -149,6 +146,16 @@ impl Motion {
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
+}
+
+/// The spring whose coils lie deepest on each other, by number; `None` where none do.
+fn bound_spring(suspension: &Suspension, pose: &Rigid) -> Option<usize> {
+    let spec = suspension.spec();
+    let room_mm = spec.spring.solid_compression_mm() - suspension.rest_compression_mm();
+    let pressed = spec.upper_ends_mm.iter().map(|end| end.z - pose.point(*end).z).enumerate();
+    let (number, pressed_mm) = pressed.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    // Rounding beyond the bound is not binding; the same slack as the envelope's.
+    (pressed_mm > room_mm * (1.0 + 1e-12)).then_some(number)
 }
 
 fn wrench_key(key: &WrenchKey, at_mm: DVec3) -> (f64, Wrench) {

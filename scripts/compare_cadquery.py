@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Time CadQuery on an upper platform and two mould halves like thumb24's, beside our whole set of parts.
 
-    cargo build --release --example parts
-    scripts/compare_cadquery.py target/release/examples/parts designs/thumb24.json [runs]
+    scripts/compare_cadquery.py $(scripts/compare_cadquery.py --program) designs/thumb24.json [runs]
+
+`--program` builds `benches/parts.rs` and prints where it is.
 
 CadQuery makes the three parts with the design's main features, each in a process of its own (imports included), and
 writes STL at the same chord tolerance. domecast makes every part with STL, 3MF, STEP, pictures, assembly and all
@@ -10,6 +11,7 @@ checks, in one process. The two take turns; medians of wall and processor time a
 because times depend on the machine; the ratio is what counts.
 """
 
+import json
 import os
 import resource
 import statistics
@@ -81,7 +83,18 @@ def main(ours, design, runs=3):
     print(f"domecast takes {our_wall / peer_wall:.3f} of CadQuery's wall time, {our_cpu / peer_cpu:.3f} of its processor time")
 
 
+def program():
+    """Builds the bench and returns its path."""
+    built = subprocess.run(["cargo", "bench", "--bench", "parts", "--no-run", "--message-format", "json"],
+                           check=True, capture_output=True, text=True)
+    made = [json.loads(line) for line in built.stdout.splitlines() if line.startswith("{")]
+    return [m["executable"] for m in made if m.get("executable")][-1]
+
+
 if __name__ == "__main__":
+    if sys.argv[1:] == ["--program"]:
+        print(program())
+        sys.exit()
     if len(sys.argv) not in (3, 4):
         sys.exit(__doc__)
     main(*sys.argv[1:])

@@ -1,6 +1,9 @@
-//! Where the white markers go under load, as limits of a load: lens, mask, and the platform's opening.
+//! Where the white markers go under load: lens, mask, and the platform's opening. As limits for the load envelope,
+//! and as the fault of a design that claims a load under which a marker is lost.
 
-use crate::design::Design;
+use serde_json::json;
+
+use crate::design::{Design, DesignError};
 use crate::mechanics::{Check, Limit};
 use crate::numeric::Rigid;
 use crate::optics::SensorOptics;
@@ -53,6 +56,41 @@ impl MarkerSight {
         }
         checks
     }
+
+    /// Whether every marker of the design is in sight at a pose; `when` says which: "at rest", "under the load ..".
+    ///
+    /// # Errors
+    /// The marker and the limit that it is past.
+    pub fn require(&self, design: &Design, pose: &Rigid, when: &str) -> Result<(), DesignError> {
+        let Some(passed) = self.checks(pose).into_iter().find(Check::is_passed) else { return Ok(()) };
+        let Check { limit, part, value, bound, unit } = &passed;
+        let index = part.rsplit(' ').next().and_then(|id| id.parse::<usize>().ok()).unwrap_or(0);
+        let place = markers_of(design).get(index).map_or(glam::DVec3::ZERO, |m| m.position_mm);
+        // A point that is not seen at all uses twice what there is.
+        let lost = *value >= 2.0 * bound;
+        let (problem, what) = match limit {
+            Limit::MarkerOutOfLens if lost => {
+                let name = unseen_by(design, pose, index);
+                (format!("the lens cannot see the marker's edge ({name})"), "the lens")
+            }
+            Limit::MarkerOutOfLens => (format!("the marker's edge is at {value:.3} {unit}"), "the lens"),
+            Limit::MarkerOutOfMask if lost => {
+                ("the marker's edge is outside the frame".into(), "runtime.mask_radius_px")
+            }
+            Limit::MarkerOutOfMask => (
+                format!("the marker's edge is {value:.2} {unit} from the mask's centre"),
+                "runtime.mask_radius_px",
+            ),
+            _ => (format!("the marker is behind the window's edge, {value:.3} of the way"), "the window"),
+        };
+        Err(DesignError::at(
+            format!("white_markers.positions_mm[{index}]"),
+            json!([place.x, place.y]),
+            format!("{when}, {problem}"),
+            format!("inside of {what}, at most {bound:.3} {unit}, at rest and under every claimed load"),
+        )
+        .with_help("move the markers inwards, the camera deeper, stiffen the springs, or claim less load"))
+    }
 }
 
 /// Largest part of the window that a ray uses between two heights of the platform.
@@ -66,4 +104,11 @@ fn window_use(optics: &SensorOptics, seen: EdgeRay, window: &ViewCone, heights: 
         if along > 0.0 { window.used(origin + direction * along) } else { 0.0 }
     };
     [0.0, 0.25, 0.5, 0.75, 1.0].map(at).into_iter().fold(0.0, f64::max)
+}
+
+/// Name of the optics' limit that hides a marker at a pose.
+fn unseen_by(design: &Design, pose: &Rigid, index: usize) -> &'static str {
+    let Some(marker) = markers_of(design).get(index).copied() else { return "not_finite" };
+    let Ok(placed) = design.optics().at_pose(pose) else { return "unreachable" };
+    marker.outline_px(&placed).map_or_else(|limit| limit.as_str(), |_| "beyond_field_of_view")
 }

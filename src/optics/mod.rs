@@ -26,7 +26,7 @@ mod tube;
 
 pub use jacobian::PixelMotion;
 pub use limit::Limit;
-pub use sensor::{SensorOptics, SurfacePoint};
+pub use sensor::{SensorOptics, SolvedPixel, SurfacePoint};
 pub use spec::{Channel, Layer, OpticsError, OpticsSpec};
 pub use tube::LightTube;
 

@@ -46,7 +46,7 @@ const LEAF: usize = 4;
 impl MeshDistance {
     pub(super) fn new(mesh: &TriMesh) -> Result<Self, ContactError> {
         for vertex in &mesh.vertices_mm {
-            if let Some(value) = vertex.to_array().into_iter().find(|v| !(v.abs() <= 1e6)) {
+            if let Some(value) = vertex.to_array().into_iter().find(|v| v.is_nan() || v.abs() > 1e6) {
                 let allowed = "finite, at most 1e6";
                 return Err(ContactError::Dimension { field: "mesh.vertices_mm", value, allowed });
             }

@@ -50,8 +50,11 @@ pub struct Pressed {
 
 /// Contact solves that a balance may take.
 const MOST_SOLVES: u32 = 80;
-/// The balance is found when its residual is below this part of the load, or of a newton.
-const TOLERANCE: f64 = 1e-8;
+/// The search ends when the residual is below this part of the load; ten times that still counts as
+/// balanced.
+const TOLERANCE: f64 = 1e-7;
+/// Loads below this one are balanced as closely as it is, N.
+const LEAST_SCALE_N: f64 = 0.05;
 
 /// One trial of the unknowns.
 struct Trial {
@@ -181,7 +184,8 @@ impl Task<'_> {
         let mut fresh = true;
         let mut best_size = trial.size;
         while solves < MOST_SOLVES {
-            let scale = trial.wrench.force_n.length().max(self.force.map_or(0.0, |f| f.1.abs())).max(1.0);
+            let scale =
+                trial.wrench.force_n.length().max(self.force.map_or(0.0, |f| f.1.abs())).max(LEAST_SCALE_N);
             if trial.size <= TOLERANCE * scale {
                 break;
             }
@@ -226,7 +230,7 @@ impl Task<'_> {
     }
 
     fn finish(&self, trial: Trial, x: &DVector<f64>, iterations: u32) -> Result<Pressed, ContactError> {
-        let scale = trial.wrench.force_n.length().max(1.0);
+        let scale = trial.wrench.force_n.length().max(LEAST_SCALE_N);
         let displacement = Displacement::from_array(std::array::from_fn(|i| x[i]));
         let solid = self.suspension.spec().spring.solid_compression_mm();
         let bound = self.suspension.springs_at(&displacement).ok().and_then(|springs| {
@@ -237,7 +241,7 @@ impl Task<'_> {
                 .max_by(|a, b| a.1.compression_mm.total_cmp(&b.1.compression_mm))
                 .map(|(number, _)| number)
         });
-        let status = if trial.size > 100.0 * TOLERANCE * scale {
+        let status = if trial.size > 10.0 * TOLERANCE * scale {
             PressStatus::NotBalanced { residual_n: trial.size }
         } else {
             bound.map_or(PressStatus::Balanced, |spring| PressStatus::SpringsBind { spring })

@@ -23,6 +23,10 @@ const MOST_ROUNDS: u32 = 60;
 pub(super) const SETTLED: f64 = 1e-8;
 /// A node may be left this part of the radius inside the object.
 pub(super) const PENETRATION: f64 = 1e-6;
+/// What the first planes are taken to move by, as a part of the radius.
+const FIRST_ROUND: f64 = 1e-3;
+/// A round's own error over what the last one moved.
+const CLOSENESS: f64 = 0.01;
 /// Iterations of one quadratic program.
 const MOST_STEPS: u32 = 2000;
 
@@ -205,10 +209,12 @@ impl<'a> Touch<'a> {
 
     pub fn run(&mut self) -> Rounds {
         let radius = self.elastomer.dome_radius_mm;
-        let mut moved_mm = f64::INFINITY;
+        let mut moved_mm = FIRST_ROUND * radius;
         for count in 1..=MOST_ROUNDS {
-            let pressures = self.press();
-            self.rub(&pressures);
+            // A round is solved as closely as the planes deserve: well within what they still move.
+            let wanted = (CLOSENESS * moved_mm).max(0.02 * SETTLED * radius);
+            let pressures = self.press(wanted);
+            self.rub(&pressures, wanted);
             moved_mm = self.displace();
             if moved_mm <= SETTLED * radius {
                 return Rounds { count, moved_mm, settled: true };
@@ -219,7 +225,7 @@ impl<'a> Touch<'a> {
     }
 
     /// Pressures for the planes, friction held; returns them.
-    fn press(&mut self) -> Vec<f64> {
+    fn press(&mut self, wanted_mm: f64) -> Vec<f64> {
         let n = self.candidates.len();
         let width = 3 * n;
         let mut a = Dense { n, values: vec![0.0; n * n] };
@@ -248,8 +254,7 @@ impl<'a> Touch<'a> {
             );
             x.push(self.candidates[i].force_n.dot(ni).max(0.0));
         }
-        let tolerance = 0.02 * SETTLED * self.elastomer.dome_radius_mm;
-        let ended = solve(&a, &c, Bounds::Positive, &mut x, tolerance, MOST_STEPS);
+        let ended = solve(&a, &c, Bounds::Positive, &mut x, wanted_mm, MOST_STEPS);
         self.work += (6 * n * n) as f64 + f64::from(ended.iterations + 12) * (n * n) as f64;
         for (i, candidate) in self.candidates.iter_mut().enumerate() {
             let t = DVec3::new(tangential[3 * i], tangential[3 * i + 1], tangential[3 * i + 2]);
@@ -259,7 +264,7 @@ impl<'a> Touch<'a> {
     }
 
     /// Friction for the pressures.
-    fn rub(&mut self, pressures: &[f64]) {
+    fn rub(&mut self, pressures: &[f64], wanted_mm: f64) {
         let touched: Vec<usize> = (0..pressures.len()).filter(|i| pressures[*i] > 0.0).collect();
         for (i, candidate) in self.candidates.iter_mut().enumerate() {
             if pressures[i] <= 0.0 || self.elastomer.friction == 0.0 {
@@ -300,8 +305,7 @@ impl<'a> Touch<'a> {
             }
             radii.push(self.elastomer.friction * pressures[i]);
         }
-        let tolerance = 0.2 * SETTLED * self.elastomer.dome_radius_mm;
-        let ended = solve(&a, &c, Bounds::Discs(&radii), &mut x, tolerance, MOST_STEPS);
+        let ended = solve(&a, &c, Bounds::Discs(&radii), &mut x, wanted_mm, MOST_STEPS);
         self.work += (24 * n * n) as f64 + f64::from(ended.iterations + 12) * (4 * n * n) as f64;
         for (row, &i) in touched.iter().enumerate() {
             let [u, v] = axes[row];

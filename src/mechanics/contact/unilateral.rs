@@ -125,7 +125,7 @@ fn largest_eigenvalue(a: &Dense) -> f64 {
     for _ in 0..12 {
         a.times(&x, &mut y);
         value = dot(&y, &y).sqrt();
-        if !(value > 0.0) {
+        if value.is_nan() || value <= 0.0 {
             break;
         }
         for (x, y) in x.iter_mut().zip(&y) {

@@ -124,7 +124,7 @@ impl SurfaceField {
         let element = (s as usize).min(self.elements - 1);
         let (n, _) = quadratic(2.0 * (s - element as f64) - 1.0);
         if let Some(raster) = self.raster.get() {
-            return self.from_raster(raster, element, n, azimuth);
+            return self.interpolate(raster, element, n, azimuth);
         }
         let (step_sine, step_cosine) = azimuth.sin_cos();
         let (mut cosine, mut sine) = (1.0, 0.0);
@@ -182,7 +182,7 @@ impl SurfaceField {
     }
 
     /// The elements' own quadratic along the meridian, a cubic (Catmull-Rom) along the ring.
-    fn from_raster(&self, raster: &[DVec3], element: usize, n: [f64; 3], azimuth: f64) -> DVec3 {
+    fn interpolate(&self, raster: &[DVec3], element: usize, n: [f64; 3], azimuth: f64) -> DVec3 {
         let count = self.azimuths;
         let s = azimuth.rem_euclid(TAU) / TAU * count as f64;
         let (base, t) = (s.floor() as usize % count, s - s.floor());

@@ -52,7 +52,7 @@ pub(super) fn points(nodes_mm: &[DVec3; 8]) -> Option<[Point; 8]> {
             jacobian += DMat3::from_cols(*x * g.x, *x * g.y, *x * g.z);
         }
         let volume = jacobian.determinant();
-        if !(volume > 0.0) {
+        if volume.is_nan() || volume <= 0.0 {
             return None;
         }
         let back = jacobian.inverse().transpose();
@@ -80,7 +80,7 @@ pub(super) fn respond(
             f += DMat3::from_cols(*u * g.x, *u * g.y, *u * g.z);
         }
         let j = f.determinant();
-        if !(j > 0.05) {
+        if j.is_nan() || j <= 0.05 {
             return None;
         }
         let back = f.inverse().transpose();

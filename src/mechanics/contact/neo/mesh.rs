@@ -137,7 +137,7 @@ impl Bricks {
     pub fn surround(&self, at_mm: DVec3) -> [(usize, f64); 4] {
         let n = self.half;
         let size = at_mm.abs().max_element();
-        if !(size > 0.0) {
+        if size.is_nan() || size <= 0.0 {
             return [(0, 0.0); 4];
         }
         let cell = |v: f64, lowest: i32| {
@@ -148,8 +148,8 @@ impl Bricks {
         let v = at_mm / size;
         let a = v.abs();
         // The face whose coordinate is largest; its point as a lattice triple.
-        let (s, t, lattice): ((i32, f64), (i32, f64), fn(i32, i32, i32, bool) -> Lattice);
-        let positive;
+        let (s, t, positive);
+        let lattice: fn(i32, i32, i32, bool) -> Lattice;
         if a.z >= a.x.max(a.y) {
             (s, t, positive) = (cell(v.x, -n), cell(v.y, -n), true);
             lattice = |s, t, n, _| (s, t, n);

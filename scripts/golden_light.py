@@ -165,7 +165,7 @@ def diffused_light(generator):
 
 def irradiance(light, samples):
     """Mean irradiance of the membrane in bins of polar angle and azimuth, for a flux of 1."""
-    pixels, albedo, fov = 100, 0.01, 156.0
+    pixels, albedo, fov = 400, 0.01, 156.0
     scene = mi.load_dict(
         {
             "type": "scene",
@@ -192,6 +192,9 @@ def irradiance(light, samples):
     )
     integrator = mi.load_dict({"type": "ptracer", "max_depth": 8})
     image = np.array(integrator.render(scene, scene.sensors()[0], spp=samples, seed=1)).reshape(pixels, pixels)
+    # each pixel in quarters of its sides, so that the bins' edges do not step
+    image = image.repeat(4, axis=0).repeat(4, axis=1)
+    pixels *= 4
     at = ((np.arange(pixels) + 0.5) / pixels * 2 - 1) * math.tan(math.radians(fov / 2))
     x, y = np.meshgrid(at, at)
     cos = 1 / np.sqrt(1 + x * x + y * y)
@@ -212,7 +215,7 @@ def irradiance(light, samples):
 def dots():
     """Small caps of the dome: rings about the pole."""
     places = []
-    for ring, polar_deg in enumerate([6, 17, 28, 39, 50, 58]):
+    for ring, polar_deg in enumerate([6, 17, 28, 39, 51]):
         count = 3 + 3 * ring
         for k in range(count):
             polar, azimuth = math.radians(polar_deg), 2 * math.pi * (k + 0.37 * ring) / count
@@ -310,8 +313,8 @@ def main():
         "polar_edges_deg": POLAR,
         "azimuths": AZIMUTHS,
         "square_side_mm": 1.0,
-        "square": irradiance(square_light(1.0), 100 if check else 2500),
-        "diffused": irradiance(diffused_light(generator), 100 if check else 2500),
+        "square": irradiance(square_light(1.0), 8 if check else 160),
+        "diffused": irradiance(diffused_light(generator), 8 if check else 160),
         "pupil_z_mm": PUPIL_Z,
         "focal_px": FOCAL,
         "size_px": [WIDTH, HEIGHT],

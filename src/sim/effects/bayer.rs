@@ -112,7 +112,8 @@ impl Pass for Demosaic {
             let down = row_of(if y + 1 < height { y + 1 } else { height - 2 });
             let here = row_of(y);
             for x in 0..width {
-                let (left, right) = (if x > 0 { x - 1 } else { 1 }, if x + 1 < width { x + 1 } else { width - 2 });
+                let (left, right) =
+                    (if x > 0 { x - 1 } else { 1 }, if x + 1 < width { x + 1 } else { width - 2 });
                 let at = y * width + x;
                 let own = colour(self.pattern, x, y);
                 if own == 1 {

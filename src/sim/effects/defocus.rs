@@ -62,7 +62,7 @@ impl Effect for Defocus {
         let (width, height) = scene.image_size();
         let steps = steps_for(Widths::of(scene, focus).largest()) as u64;
         let pixels = (width * height * scene.planes()) as u64;
-        Cost { once: (width * height) as u64, per_frame: 2 * steps * pixels / PIXELS_PER_UNIT }
+        Cost { once: 0, per_frame: 2 * steps * pixels / PIXELS_PER_UNIT }
     }
 
     fn apply(&self, scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
@@ -108,7 +108,8 @@ impl Widths {
 
     /// Largest slope, px^2 per px.
     fn steepest(&self) -> f64 {
-        let along = self.values.chunks(self.columns).flat_map(|row| row.windows(2).map(|w| (w[1] - w[0]).abs()));
+        let along =
+            self.values.chunks(self.columns).flat_map(|row| row.windows(2).map(|w| (w[1] - w[0]).abs()));
         let down = self.values.iter().zip(self.values.iter().skip(self.columns)).map(|(a, b)| (a - b).abs());
         std::f64::consts::SQRT_2 * along.chain(down).fold(0.0, f64::max) / STEP as f64
     }

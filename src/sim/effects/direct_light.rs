@@ -16,9 +16,9 @@ impl Effect for DirectLight {
     }
 
     fn calls_for(&self, scene: &Scene) -> Option<String> {
-        let lights = &scene.design().sections().leds.list;
-        let (red, green) = (lights.len(), scene.file().light.leds.as_ref().map_or(0.0, |l| l.power));
-        lit_by_leds(scene).then(|| format!("{red} lights at {green} of their flux instead of an even light"))
+        let light = scene.file().light.leds.as_ref().filter(|_| lit_by_leds(scene))?;
+        let count = scene.design().sections().leds.list.len();
+        Some(format!("{count} lights at {} of their flux instead of an even light", light.power))
     }
 
     fn bound(&self, _scene: &Scene) -> Result<Bound, SimError> {

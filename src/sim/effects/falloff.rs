@@ -15,8 +15,9 @@ impl Effect for Falloff {
     fn calls_for(&self, scene: &Scene) -> Option<String> {
         let radius = scene.optics().dome_radius_mm();
         let distance = scene.design().sections().leds.center_radius_mm;
-        lit_by_leds(scene)
-            .then(|| format!("lights {distance} mm from the axis of a dome of radius {radius} mm: near, and aslant"))
+        lit_by_leds(scene).then(|| {
+            format!("lights {distance} mm from the axis of a dome of radius {radius} mm: near, and aslant")
+        })
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {

@@ -22,6 +22,8 @@ mod refraction;
 mod rolling_shutter;
 mod sheet_motion;
 mod speed;
+#[cfg(test)]
+mod tests;
 mod vignetting;
 
 use super::effect::Effect;

@@ -139,7 +139,7 @@ fn normal(bits: u32) -> f32 {
         let q = p - 0.5;
         let r = q * q;
         let above = ((((-3.969683028665376e1 * r + 2.209460984245205e2) * r - 2.759285104469687e2) * r
-            + 1.383577518672690e2)
+            + 1.38357751867269e2)
             * r
             - 3.066479806614716e1)
             * r
@@ -211,7 +211,9 @@ mod tests {
     #[test]
     fn mean_and_variance_are_as_stated_from_one_electron_to_full_scale() {
         let full = 8000.0;
-        for (electrons, read) in [(1.0, 0.0), (8.0, 3.0), (39.0, 2.0), (41.0, 2.0), (500.0, 5.0), (6000.0, 5.0)] {
+        for (electrons, read) in
+            [(1.0, 0.0), (8.0, 3.0), (39.0, 2.0), (41.0, 2.0), (500.0, 5.0), (6000.0, 5.0)]
+        {
             // A fine converter, so that its own noise, step^2 / 12, is known and small.
             let sensor = Sensor { electrons: full, read, steps: 65535.0 };
             let mut frame = picture(electrons / full, 1);
@@ -222,8 +224,14 @@ mod tests {
             let n: f64 = 120_000.0;
             // Reading below zero is cut off by the converter: only where that cannot happen is the mean exact.
             if electrons > 5.0 * read {
-                assert!((mean - f64::from(electrons)).abs() < 5.0 * (expected / n).sqrt(), "{electrons}: {mean}");
-                assert!((variance / expected - 1.0).abs() < 5.0 * (3.0 / n).sqrt(), "{electrons}: {variance}");
+                assert!(
+                    (mean - f64::from(electrons)).abs() < 5.0 * (expected / n).sqrt(),
+                    "{electrons}: {mean}"
+                );
+                assert!(
+                    (variance / expected - 1.0).abs() < 5.0 * (3.0 / n).sqrt(),
+                    "{electrons}: {variance}"
+                );
             }
         }
     }

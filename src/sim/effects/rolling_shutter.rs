@@ -38,7 +38,8 @@ impl Effect for RollingShutter {
     }
 
     fn apply(&self, scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
-        pipeline.timing.rolling = readout_s(scene).map(|readout_s| Rolling { readout_s, bands: bands(scene) });
+        pipeline.timing.rolling =
+            readout_s(scene).map(|readout_s| Rolling { readout_s, bands: bands(scene) });
         Ok(())
     }
 }

@@ -92,3 +92,50 @@ fn largest_px_per_mm(scene: &Scene) -> f64 {
     let seen = dots.chain(markers).filter_map(|at| scene.optics().project_with_jacobian(at).ok());
     NEARER * seen.map(|(_, by_point)| by_point.norm()).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec2;
+
+    fn scene(name: &str) -> Scene {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes");
+        Scene::load(&folder.join(name)).unwrap()
+    }
+
+    /// Pixels of all markers and some dots at a time.
+    fn pixels(scene: &Scene, time_s: f64) -> Vec<Option<DVec2>> {
+        let state = scene.motion().at(scene.suspension(), time_s).unwrap();
+        let optics = scene.optics().at_pose(&state.pose).unwrap();
+        let dots = scene.dots().iter().step_by(7).map(|dot| dot.center_mm);
+        let points = dots.chain(scene.markers().iter().map(|marker| marker.position_mm));
+        points.map(|point| optics.project(point).ok()).collect()
+    }
+
+    #[test]
+    fn nothing_is_faster_than_the_bound() {
+        for name in ["push.json", "twist.json", "dim.json"] {
+            let scene = scene(name);
+            let bound = fastest_px_per_s(&scene).unwrap();
+            let (step, end) = (0.01, scene.time_s(scene.frame_count()));
+            let mut fastest = 0.0_f64;
+            let mut before = pixels(&scene, 0.0);
+            for k in 1..=(end / step) as u32 {
+                let now = pixels(&scene, f64::from(k) * step);
+                for (a, b) in before.iter().zip(&now) {
+                    if let (Some(a), Some(b)) = (a, b) {
+                        fastest = fastest.max(a.distance(*b) / step);
+                    }
+                }
+                before = now;
+            }
+            println!("{name}: {fastest:.1} px/s, bound {bound:.1}");
+            assert!(fastest <= bound && fastest > 0.02 * bound, "{name}: {fastest} {bound}");
+        }
+    }
+
+    #[test]
+    fn a_sensor_at_rest_has_no_speed() {
+        assert_eq!(fastest_px_per_s(&scene("still.json")), None);
+    }
+}

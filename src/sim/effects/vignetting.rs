@@ -26,7 +26,10 @@ impl Effect for Vignetting {
         let power = scene.file().electronics.vignetting_exponent;
         (scene.draws() && power > 0.0).then(|| {
             let edge = scene.optics().lens().max_field_angle_rad();
-            format!("cos^{power} of the field angle: {:.3} of the light at the lens's edge", fall(edge, power))
+            format!(
+                "cos^{power} of the field angle: {:.3} of the light at the lens's edge",
+                fall(edge, power)
+            )
         })
     }
 
@@ -41,10 +44,7 @@ impl Effect for Vignetting {
     fn cost(&self, scene: &Scene) -> Cost {
         let (width, height) = scene.image_size();
         let pixels = (width * height) as u64;
-        Cost {
-            once: pixels * FACTOR_UNITS,
-            per_frame: scene.planes() as u64 * pixels / PIXELS_PER_UNIT,
-        }
+        Cost { once: pixels * FACTOR_UNITS, per_frame: scene.planes() as u64 * pixels / PIXELS_PER_UNIT }
     }
 
     fn apply(&self, scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
@@ -91,7 +91,8 @@ impl Pass for Darkening {
             units += self.factors.len() as u64 * FACTOR_UNITS;
         }
         for plane in &mut frame.planes {
-            let (Some(values), Some(factors)) = (plane.get_mut(pixels.clone()), self.factors.get(pixels.clone()))
+            let (Some(values), Some(factors)) =
+                (plane.get_mut(pixels.clone()), self.factors.get(pixels.clone()))
             else {
                 continue;
             };

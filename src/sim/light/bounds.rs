@@ -29,13 +29,14 @@ pub fn brightest_level(scene: &Scene) -> Result<f64, SimError> {
     let Some(light) = &scene.file().light.leds else { return Ok(0.0) };
     let sections = scene.design().sections();
     let m = sections.leds.lobe_exponent;
-    // Bare; or behind a diffuser, whose lobe has its largest density, for light along the sheet, at most
-    // 1 / integral of cos exp(..), which for widths of 3 degrees and more is below 2 / width^3.
+    // Bare; or behind a diffuser, whose lobe squeezes into the hemisphere what would leave it: for lobes of m at
+    // least 1, which send little along the sheet, that less than doubles the densest direction (tested). For others,
+    // light along the sheet has the density 1 / integral of cos exp(..), below 2 / width^3.
     let bare = (m + 1.0) / TAU;
     let diffuse = sections.leds.diffuser.map_or(0.0, |d| {
         let width = d.lobe_width_deg.to_radians();
-        let narrow = 2.0 / width.powi(3).min(1.0);
-        d.transmittance * (d.lambert_fraction / PI + (1.0 - d.lambert_fraction) * narrow)
+        let lobe = if m >= 1.0 { 2.0 * bare } else { 2.0 / width.powi(3).min(1.0) };
+        d.transmittance * (d.lambert_fraction / PI + (1.0 - d.lambert_fraction) * lobe)
     });
     let per_sr = bare.max(diffuse);
     let bottom = scene.design().sheet_underside_z_mm();

@@ -117,7 +117,9 @@ impl Hollow {
             let z = if k & 4 == 0 { bottom } else { top };
             part_from_own.transform_point3(DVec3::new(side(1, reach.x), side(2, reach.y), z)).z
         };
-        (0..8).map(corner).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)))
+        (0..8)
+            .map(corner)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)))
     }
 
     /// The part of the ray from `from` (0) to `to` (1) that lies inside.

@@ -100,7 +100,8 @@ impl DomeRoom {
                     let mut near = 0.0;
                     for shift in 0..rings.patches {
                         let source = rings.direction(from, shift);
-                        let (value, tangent) = mirrored(optics, source, target * radius_mm, target, underside, near);
+                        let (value, tangent) =
+                            mirrored(optics, source, target * radius_mm, target, underside, near);
                         near = tangent;
                         mirror[(to * rings.rings + from) * rings.patches + shift] =
                             value * patch_mm2(rings, radius_mm);
@@ -171,8 +172,7 @@ impl DomeRoom {
         for ring in 0..self.rings.rings {
             for patch in 0..self.rings.patches {
                 let source = self.rings.direction(ring, patch);
-                let (value, tangent) =
-                    mirrored(optics, source, point_mm, DVec3::Z, Underside::Fresnel, near);
+                let (value, tangent) = mirrored(optics, source, point_mm, DVec3::Z, Underside::Fresnel, near);
                 near = tangent;
                 sum += value * exitance[ring * self.rings.patches + patch];
             }

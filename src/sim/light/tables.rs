@@ -13,7 +13,7 @@ use super::radiosity::{DomeRoom, Rings, Underside};
 use crate::optics::SensorOptics;
 
 /// Cells of the coarsest table, and of those that are tried after it.
-const CELLS: [usize; 3] = [36, 60, 96];
+const CELLS: [usize; 2] = [36, 60];
 
 /// Radii of the shells for moved points, parts of the dome's.
 pub(super) const SHELLS: [f64; 3] = [1.0, 0.86, 0.72];

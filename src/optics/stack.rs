@@ -131,11 +131,7 @@ impl Path<'_> {
         self.climb_above(n0, reach_mm, reach_mm / at_axis)
     }
 
-<<<<<<< HEAD
-    /// The climb from `t`, which must not lie above the solution.
-=======
     /// The climb from `t`, which must not lie above the solution, and its steps.
->>>>>>> light
     fn climb_above(&self, n0: f64, reach_mm: f64, mut t: f64) -> Result<(f64, u32), Limit> {
         if t == 0.0 {
             return Ok((0.0, 0));

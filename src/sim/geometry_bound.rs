@@ -93,7 +93,7 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
     for (frame, state, touch) in states(scene, &frames)? {
         let time_s = scene.time_s(frame);
         let mut at = |eye: &Eye, geometry: Geometry| {
-            Instant::new(scene, eye, geometry, time_s, state.clone(), touch.clone(), false, &mut uncounted)
+            Instant::new(scene, eye, geometry, time_s, state.clone(), touch.clone(), None, &mut uncounted)
         };
         let (a, b) = (at(&a_eye, with)?, at(&b_eye, without)?);
         let mut now = Vec::new();

@@ -239,8 +239,8 @@ fn plain(value: &mut Value) {
     for at in [0, 1] {
         value["optics"]["layers"][at]["index"] = json!(1.0);
     }
-    value["pattern"]["unseen"] = json!("leave_out");
-    value["pattern"]["unprintable"] = json!("leave_out");
+    value["pattern"]["unseen"] = json!("drop");
+    value["pattern"]["unprintable"] = json!("drop");
     value["pattern"]["pitch_px"] = json!(12);
 }
 

@@ -8,6 +8,7 @@ use super::pipeline::Geometry;
 use super::scene::{Scene, State};
 use super::touch::Between;
 use super::work::Work;
+use crate::mechanics::contact::Level;
 use crate::numeric::Rigid;
 
 /// Counted work of one point: a straight ray through the lens, and what each effect adds.
@@ -46,7 +47,7 @@ pub struct Instant {
 }
 
 impl Instant {
-    /// The sensor in a state.
+    /// The sensor in a state; a dent is laid out as a table where its nodes' distance is given.
     ///
     /// # Errors
     /// A pose that cannot be.
@@ -58,7 +59,7 @@ impl Instant {
         time_s: f64,
         state: State,
         touch: Option<Between>,
-        lit: bool,
+        dent_step_mm: Option<f64>,
         work: &mut Work,
     ) -> Result<Self, SimError> {
         let pose = if geometry.sheet_motion {
@@ -68,8 +69,8 @@ impl Instant {
             Rigid::identity()
         };
         let eye = eye.at(&pose)?;
-        let dent = touch.as_ref().filter(|between| lit && between.is_dented()).and_then(|between| {
-            let (dent, nodes) = Dent::new(between, scene.optics().dome_radius_mm(), DENT_STEP_MM)?;
+        let dent = touch.as_ref().filter(|between| between.is_dented()).and_then(|between| {
+            let (dent, nodes) = Dent::new(between, scene.optics().dome_radius_mm(), dent_step_mm?)?;
             work.add(EffectName::Contact, nodes * units::NODE);
             Some(dent)
         });
@@ -77,8 +78,14 @@ impl Instant {
     }
 }
 
-/// Distance of the dent's nodes, mm: about a pixel and a half.
-const DENT_STEP_MM: f64 = 0.15;
+/// Distance of the dent's nodes, mm: about a pixel and a half. Between the nodes of finite elements the table's cubics
+/// are smoother than the elements themselves, whose slopes jump from one to the next.
+pub(super) fn dent_step_mm(level: Option<Level>) -> f64 {
+    match level {
+        Some(Level::Linear { element_mm } | Level::NeoHookean { element_mm }) => (0.5 * element_mm).max(0.15),
+        _ => 0.15,
+    }
+}
 
 /// Counts the work of projecting points with the effects that take part.
 pub fn count_points(geometry: Geometry, channels: usize, central: bool, points: u64, work: &mut Work) {

@@ -8,7 +8,7 @@ use super::effect::EffectName;
 use super::eye::Eye;
 use super::field::LensField;
 use super::frame::{Frame, Image8};
-use super::instant::{Instant, count_points};
+use super::instant::{Instant, count_points, dent_step_mm};
 use super::picture::{Painter, Parts};
 use super::pipeline::{PassContext, Pipeline, Stage};
 use super::plan::Plan;
@@ -125,7 +125,8 @@ impl<'a> Renderer<'a> {
             None => self.scene.state_at(frame, time_s)?,
         };
         let lit = self.pipeline.shading.is_some() && self.field.is_some();
-        Instant::new(self.scene, &self.eye, self.pipeline.geometry, time_s, state, touch, lit, work)
+        let step_mm = lit.then(|| dent_step_mm(self.pipeline.contact));
+        Instant::new(self.scene, &self.eye, self.pipeline.geometry, time_s, state, touch, step_mm, work)
     }
 
     fn rate_hz(&self) -> f64 {

@@ -46,6 +46,8 @@ enum Course {
 
 /// Bisections of the load down to the part that is just carried: 2^-40 of it.
 const HALVINGS: u32 = 40;
+/// Part of the travel from which a platform that goes no further is held by its coils, not by the end of the law.
+const NEARLY_BOUND: f64 = 1.0 - 1e-6;
 
 impl Motion {
     /// The motion of a scene; keys are in order of time.
@@ -112,10 +114,13 @@ impl Motion {
 
     /// The balance of a load; where coils bind, the pose at which they just do.
     fn balance(&self, suspension: &Suspension, wrench: &Wrench) -> Result<State, MechanicsError> {
-        let pose = suspension.equilibrium(wrench)?.pose;
-        let Some(spring) = bound_spring(suspension, &pose) else {
-            return Ok(State { pose, wrench: *wrench, held: None });
-        };
+        // Far beyond the bound the law may have no balance at all: then the part of the load tells which limit is first.
+        let whole = suspension.equilibrium(wrench);
+        if let Ok(balance) = &whole
+            && bound_spring(suspension, &balance.pose).is_none()
+        {
+            return Ok(State { pose: balance.pose, wrench: *wrench, held: None });
+        }
         let (mut low, mut high) = (0.0, 1.0);
         let mut pose = Rigid::identity();
         for _ in 0..HALVINGS {
@@ -128,6 +133,10 @@ impl Motion {
                 _ => high = middle,
             }
         }
+        let Some(spring) = bound_spring_within(suspension, &pose, NEARLY_BOUND) else {
+            whole?;
+            return Ok(State { pose, wrench: *wrench, held: None });
+        };
         let held = Held { limit: Limit::CoilBind.as_str(), part: format!("spring {spring}"), carried: low };
         Ok(State { pose, wrench: *wrench, held: Some(held) })
     }
@@ -150,12 +159,17 @@ impl Motion {
 
 /// The spring whose coils lie deepest on each other, by number; `None` where none do.
 fn bound_spring(suspension: &Suspension, pose: &Rigid) -> Option<usize> {
+    // Rounding beyond the bound is not binding; the same slack as the envelope's.
+    bound_spring_within(suspension, pose, 1.0 + 1e-12)
+}
+
+/// The same for a part of the springs' travel.
+fn bound_spring_within(suspension: &Suspension, pose: &Rigid, part: f64) -> Option<usize> {
     let spec = suspension.spec();
     let room_mm = spec.spring.solid_compression_mm() - suspension.rest_compression_mm();
     let pressed = spec.upper_ends_mm.iter().map(|end| end.z - pose.point(*end).z).enumerate();
     let (number, pressed_mm) = pressed.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    // Rounding beyond the bound is not binding; the same slack as the envelope's.
-    (pressed_mm > room_mm * (1.0 + 1e-12)).then_some(number)
+    (pressed_mm > room_mm * part).then_some(number)
 }
 
 fn wrench_key(key: &WrenchKey, at_mm: DVec3) -> (f64, Wrench) {

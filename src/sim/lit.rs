@@ -5,6 +5,8 @@
 //! tolerance, the square is filled by the biquadratic surface through the nine; else it falls into four, down to
 //! single pixels. Pixels are their own nodes, so nothing is worked out twice.
 
+use std::ops::Range;
+
 use glam::DVec2;
 
 use super::dent::Dent;
@@ -159,20 +161,43 @@ impl<const N: usize> Lit<N> {
         }
     }
 
-    /// Brightness of a pixel; where its own ray misses the dome (the rim covers a part of it), that of the nearest
-    /// pixel towards `inwards` that shows it.
-    pub fn level(&self, x: usize, y: usize, inwards: DVec2) -> [f32; N] {
+    /// Brightness of a row's pixels from a column on, as many as wanted: its own, or that of the nearest pixel that shows the dome.
+    ///
+    /// A pixel without a share in the dome has none.
+    pub fn row<'a>(
+        &'a self,
+        y: usize,
+        columns: Range<usize>,
+        shares: &'a [f32],
+        inwards: DVec2,
+    ) -> impl Iterator<Item = [f32; N]> + 'a {
+        let place = |x: usize| y * self.width + x;
+        let range = place(columns.start)..place(columns.end);
+        let levels = self.levels.get(range.clone()).unwrap_or_default();
+        let known = self.known.get(range).unwrap_or_default();
+        columns.zip(levels.iter().zip(known)).zip(shares).map(move |((x, (level, known)), share)| match known
+        {
+            Known::Exact => *level,
+            _ if *share <= 0.0 => [0.0; N],
+            _ => self.near(x, y, inwards),
+        })
+    }
+
+    /// Brightness of the nearest pixel towards `inwards` that shows the dome: for one whose own ray misses it (the
+    /// rim covers a part of it).
+    #[cold]
+    fn near(&self, x: usize, y: usize, inwards: DVec2) -> [f32; N] {
         let at = |x: usize, y: usize| {
             let place = y * self.width + x;
             self.levels.get(place).copied().filter(|_| self.known.get(place) == Some(&Known::Exact))
         };
         let from = DVec2::new(x as f64, y as f64);
         let step = (inwards - from).normalize_or_zero();
-        let near = |k: u32| {
+        let beside = |k: u32| {
             let place = (from + step * f64::from(k)).round().max(DVec2::ZERO);
             at(place.x as usize, place.y as usize)
         };
-        (0..=4).find_map(near).unwrap_or([0.0; N])
+        (0..=4).find_map(beside).unwrap_or([0.0; N])
     }
 
     fn ask_corners(

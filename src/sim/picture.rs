@@ -265,12 +265,18 @@ fn blend<const N: usize>(
     let (width, height) = (frame.width(), frame.height());
     for (y, x, part) in coverage.rows(width, height).filter(|(y, ..)| rows.contains(y)) {
         let (seen, part) = inside(field.row(y), x, part);
-        for (lane, plane) in frame.planes.iter_mut().skip(first).take(N).enumerate() {
-            let Some(values) = plane.get_mut(y * width + seen.start..y * width + seen.end) else { continue };
-            for ((value, share), column) in values.iter_mut().zip(part).zip(seen.clone()) {
-                if *share > 0.0 {
-                    let level = lit.level(column, y, center)[lane];
-                    *value += share * (level - *value);
+        // A picture has one plane or three.
+        let mut planes = frame.planes.iter_mut().skip(first);
+        let mut rows_of: [&mut [f32]; N] = std::array::from_fn(|_| {
+            planes
+                .next()
+                .and_then(|p| p.get_mut(y * width + seen.start..y * width + seen.end))
+                .unwrap_or_default()
+        });
+        for (k, (share, level)) in part.iter().zip(lit.row(y, seen.clone(), part, center)).enumerate() {
+            for (lane, values) in rows_of.iter_mut().enumerate() {
+                if let Some(value) = values.get_mut(k) {
+                    *value += share * (level[lane] - *value);
                 }
             }
         }

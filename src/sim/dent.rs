@@ -4,6 +4,9 @@
 //! with `s = (x^2 + y^2) / R^2`, `k = sqrt(1 - s/4)`; it is smooth over the whole dome. Between the nodes the
 //! displacement is Catmull and Rom's cubic in each direction, whose derivative is continuous: the normals have no
 //! steps.
+//!
+//! About the pressed part the nodes lie close; where the rest of the dome moves as well, it does so smoothly, and a wide
+//! chart with fewer nodes serves.
 
 use glam::DVec3;
 
@@ -15,9 +18,22 @@ const NODES: [usize; 2] = [12, 160];
 /// Displacements of less than this bend nothing that a picture shows, mm.
 const STILL_MM: f64 = 1e-4;
 
-/// A table of the displaced membrane.
+/// Distance of the wide chart's nodes, mm.
+const WIDE_STEP_MM: f64 = 0.6;
+
+/// How far beyond the pressed part the nodes lie close, mm.
+const CLOSE_MARGIN_MM: f64 = 1.5;
+
+/// Tables of the displaced membrane.
 #[derive(Debug, Clone)]
 pub struct Dent {
+    close: Option<Chart>,
+    wide: Option<Chart>,
+}
+
+/// One table.
+#[derive(Debug, Clone)]
+struct Chart {
     middle: DVec3,
     side: DVec3,
     up: DVec3,
@@ -39,8 +55,8 @@ pub struct Dented {
 }
 
 impl Dent {
-    /// The table of a touched dome, with nodes no further apart than `step_mm` where their number allows; `None`
-    /// where nothing moves. The second value is the number of nodes.
+    /// The tables of a touched dome, with nodes no further apart than `step_mm` about the pressed part where their
+    /// number allows; `None` where nothing moves. The second value is the number of nodes.
     pub fn new(between: &Between, radius_mm: f64, step_mm: f64) -> Option<(Self, u64)> {
         let extents = between.extents();
         let middle = extents.iter().map(|e| e.direction).sum::<DVec3>().normalize_or_zero();
@@ -53,9 +69,63 @@ impl Dent {
             return None;
         }
         // Where the rest of the dome moves as well, the chart reaches the farthest point of the rim.
-        let whole = middle.z.clamp(-1.0, 1.0).acos() + std::f64::consts::FRAC_PI_2;
+        let whole = |middle: DVec3| middle.z.clamp(-1.0, 1.0).acos() + std::f64::consts::FRAC_PI_2;
         let far = extents.iter().any(|e| e.beyond_mm > STILL_MM);
-        let angle = if far { whole } else { angle.min(whole) };
+        let angle = if far { whole(middle) } else { angle.min(whole(middle)) };
+        let pressed = between
+            .pressed_cap()
+            .map(|(at, half)| (at, (half + CLOSE_MARGIN_MM / radius_mm).min(whole(at))))
+            .filter(|(_, half)| *half < 0.7 * angle);
+        let chart = |middle, angle, step_mm| Chart::new(between, radius_mm, middle, angle, step_mm);
+        let dent = match pressed {
+            Some((at, half)) => Self {
+                close: Some(chart(at, half, step_mm)),
+                wide: Some(chart(middle, angle, step_mm.max(WIDE_STEP_MM))),
+            },
+            None => Self { close: None, wide: Some(chart(middle, angle, step_mm)) },
+        };
+        let nodes = dent.close.iter().chain(&dent.wide).map(|chart| chart.moved.len() as u64).sum();
+        Some((dent, nodes))
+    }
+
+    /// The deformed membrane at a point of the undeformed dome; `None` outside the charts, where it does not move.
+    pub fn at(&self, rest_mm: DVec3) -> Option<Dented> {
+        let close = self.close.as_ref().and_then(|chart| chart.at(rest_mm));
+        close.or_else(|| self.wide.as_ref()?.at(rest_mm))
+    }
+
+    /// Where a ray that meets the undeformed dome at `rest_mm` along the unit direction `inside` meets the deformed
+    /// one: the undeformed place of that point, and how it moved. `None` where the membrane does not move.
+    ///
+    /// The point sought is `p` with `p + u(p)` on the ray: `p` is where the ray, moved back by `u`, meets the
+    /// sphere. Repeating that shrinks the error by the slope of `u`, which is below 1 for a membrane that does
+    /// not fold.
+    pub fn meet(&self, rest_mm: DVec3, inside: DVec3) -> Option<(DVec3, Dented)> {
+        let radius_mm = rest_mm.length();
+        let mut place = rest_mm;
+        let mut dented = self.at(place)?;
+        for _ in 0..MOST_STEPS {
+            let base = rest_mm - dented.displacement_mm;
+            // |base + s inside| = R; the root near zero.
+            let b = base.dot(inside);
+            let c = radius_mm * radius_mm - base.length_squared();
+            let root = (b * b + c).max(0.0).sqrt();
+            let s = if b > 0.0 { c / (b + root) } else { root - b };
+            let next = base + inside * s;
+            let step = (next - place).length_squared();
+            place = next * (radius_mm / next.length().max(1e-12));
+            dented = self.at(place)?;
+            if step < CLOSE_MM * CLOSE_MM {
+                break;
+            }
+        }
+        Some((place, dented))
+    }
+}
+
+impl Chart {
+    /// The chart of a cap.
+    fn new(between: &Between, radius_mm: f64, middle: DVec3, angle: f64, step_mm: f64) -> Self {
         let side = middle.any_orthonormal_vector();
         let up = middle.cross(side);
         let reach_mm = 2.0 * radius_mm * (0.5 * angle).sin();
@@ -63,24 +133,16 @@ impl Dent {
         // Two nodes beyond the edge on each side, for the cubics.
         let half_mm = reach_mm * (nodes as f64 + 4.0) / nodes as f64;
         let per_step = (nodes as f64 - 1.0) / (2.0 * half_mm);
-        let mut dent = Self { middle, side, up, radius_mm, half_mm, nodes, per_step, moved: Vec::new() };
+        let mut chart = Self { middle, side, up, radius_mm, half_mm, nodes, per_step, moved: Vec::new() };
         let mut at_mm = Vec::with_capacity(nodes * nodes);
         for row in 0..nodes {
             for column in 0..nodes {
                 let place = |i: usize| i as f64 / per_step - half_mm;
-                at_mm.push(dent.point(place(column), place(row)));
+                at_mm.push(chart.point(place(column), place(row)));
             }
         }
-        dent.moved = between.displacements_mm(&at_mm);
-        Some((dent, (nodes * nodes) as u64))
-    }
-
-    /// Directions from the middle of the base to the edge of the table's region, for its image.
-    pub fn outline(&self, count: usize) -> impl Iterator<Item = DVec3> + '_ {
-        (0..count).map(move |k| {
-            let (sin, cos) = (std::f64::consts::TAU * k as f64 / count as f64).sin_cos();
-            self.point(self.half_mm * cos, self.half_mm * sin)
-        })
+        chart.moved = between.displacements_mm(&at_mm);
+        chart
     }
 
     fn point(&self, x: f64, y: f64) -> DVec3 {
@@ -89,8 +151,8 @@ impl Dent {
         self.middle * (self.radius_mm * (1.0 - 0.5 * s)) + (self.side * x + self.up * y) * k
     }
 
-    /// The deformed membrane at a point of the undeformed dome; `None` outside the chart, where it does not move.
-    pub fn at(&self, rest_mm: DVec3) -> Option<Dented> {
+    /// As [`Dent::at`], of this chart.
+    fn at(&self, rest_mm: DVec3) -> Option<Dented> {
         let along = rest_mm.dot(self.middle) / self.radius_mm;
         let stretch = (2.0 / (1.0 + along).max(1e-9)).sqrt();
         let (x, y) = (rest_mm.dot(self.side) * stretch, rest_mm.dot(self.up) * stretch);
@@ -125,33 +187,6 @@ impl Dent {
         let normal = (tangent_x + by_x * self.per_step).cross(tangent_y + by_y * self.per_step);
         let rest_normal = rest_mm / self.radius_mm;
         Some(Dented { displacement_mm: u, normal: normal.try_normalize().unwrap_or(rest_normal) })
-    }
-
-    /// Where a ray that meets the undeformed dome at `rest_mm` along the unit direction `inside` meets the deformed
-    /// one: the undeformed place of that point, and how it moved. `None` where the membrane does not move.
-    ///
-    /// The point sought is `p` with `p + u(p)` on the ray: `p` is where the ray, moved back by `u`, meets the
-    /// sphere. Repeating that shrinks the error by the slope of `u`, which is below 1 for a membrane that does
-    /// not fold.
-    pub fn meet(&self, rest_mm: DVec3, inside: DVec3) -> Option<(DVec3, Dented)> {
-        let mut place = rest_mm;
-        let mut dented = self.at(place)?;
-        for _ in 0..MOST_STEPS {
-            let base = rest_mm - dented.displacement_mm;
-            // |base + s inside| = R; the root near zero.
-            let b = base.dot(inside);
-            let c = self.radius_mm * self.radius_mm - base.length_squared();
-            let root = (b * b + c).max(0.0).sqrt();
-            let s = if b > 0.0 { c / (b + root) } else { root - b };
-            let next = base + inside * s;
-            let step = (next - place).length_squared();
-            place = next * (self.radius_mm / next.length().max(1e-12));
-            dented = self.at(place)?;
-            if step < CLOSE_MM * CLOSE_MM {
-                break;
-            }
-        }
-        Some((place, dented))
     }
 }
 

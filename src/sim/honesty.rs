@@ -199,6 +199,7 @@ fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> f64 {
 fn honest(first: u64, count: u64) {
     let designs = designs();
     let (mut out, mut tightest): (usize, f64) = (0, 0.0);
+    let mut compared = 0;
     for seed in first..first + count {
         let mut dice = Dice(seed);
         let design = designs[(dice.next() * designs.len() as f64) as usize].clone();
@@ -215,9 +216,14 @@ fn honest(first: u64, count: u64) {
         assert!(px <= tolerance.px, "seed {seed}: {px} px: {value}");
         assert!(grey <= tolerance.grey, "seed {seed}: {grey} grey levels: {value}");
         out += left_out;
+        compared += 1;
         tightest = tightest.max(px / tolerance.px);
     }
-    println!("{out} effects left out in {count} scenes; closest to its tolerance: {tightest:.3}");
+    println!("{out} effects left out in {compared} scenes; closest to its tolerance: {tightest:.3}");
+    assert!(
+        compared >= count * 9 / 10,
+        "only {compared} of {count} scenes can be: the others are beyond the envelope"
+    );
     assert!(out as u64 > count / 4, "the plan leaves out too little to be tested: {out}");
 }
 
@@ -228,7 +234,7 @@ fn plans_keep_their_word() {
 
 #[test]
 fn long_plans_keep_their_word() {
-    honest(1000, 220);
+    honest(1000, 240);
 }
 
 /// A design that calls for nothing: a pinhole, layers like air, one index.

@@ -122,7 +122,8 @@ fn add_edge(values: &mut [f32], stride: usize, from: DVec2, to: DVec2, share: f6
     }
     let (sign, a, b) = if from.y < to.y { (share, from, to) } else { (-share, to, from) };
     let per_row = (b.x - a.x) / (b.y - a.y);
-    let first = a.y.floor() as usize;
+    // Places are not negative: the cast is the floor.
+    let first = a.y as usize;
     let mut x = a.x;
     let mut y = a.y;
     for (index, row) in values.chunks_exact_mut(stride).enumerate().skip(first) {
@@ -139,10 +140,9 @@ fn add_edge(values: &mut [f32], stride: usize, from: DVec2, to: DVec2, share: f6
 /// Adds the part of an edge inside one row: signed height `dy`, between two columns.
 fn add_piece(row: &mut [f32], dy: f64, x0: f64, x1: f64) {
     let (low, high) = if x0 < x1 { (x0, x1) } else { (x1, x0) };
-    let first = low.floor();
-    let last = high.ceil();
-    let start = first as usize;
-    if last <= first + 1.0 {
+    let start = low as usize;
+    let first = start as f64;
+    if high <= first + 1.0 {
         // Inside one pixel: the part right of the edge's middle is covered.
         let middle = 0.5 * (low + high) - first;
         add(row, start, dy * (1.0 - middle));

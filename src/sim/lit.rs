@@ -18,7 +18,7 @@ use crate::optics::SensorOptics;
 /// Side of the largest squares, px; a power of two.
 const LARGEST: usize = 16;
 /// Squares that reach into the dent are divided at least down to this, px.
-const IN_DENT: usize = 4;
+const IN_DENT: usize = 8;
 /// Rays are traced and lit this many at a time.
 const BATCH: usize = 512;
 

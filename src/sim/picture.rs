@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::DVec2;
 
-use super::coverage::{Coverage, clip_to_image};
+use super::coverage::{Coverage, clip, clip_to_image};
 use super::effect::EffectName;
 use super::field::{LensField, cap_box, inside, rim_polygon};
 use super::frame::Frame;
@@ -81,7 +81,8 @@ impl Painter {
         let own = instant.eye.channels() == planes;
         for channel in 0..if own { planes } else { 1 } {
             let Some(optics) = instant.eye.optics(channel) else { continue };
-            self.coverage.fill(&clip_to_image(&rim_polygon(optics), width, height));
+            let rim = clip_to_image(&rim_polygon(optics), width, height);
+            self.coverage.fill(&clip_to_rows(rim, rows, height));
             let together = if own { channel..channel + 1 } else { 0..planes };
             let mut extra = Work::default();
             let spent = if channel == 0 { &mut *work } else { &mut extra };
@@ -179,7 +180,7 @@ impl Painter {
             let rings = parts.points.rings(index);
             for (channel, plane) in frame.planes.iter_mut().enumerate() {
                 if channel < channels {
-                    let Some(spot) = spots.dot(index, channel) else {
+                    let Some(spot) = spots.dot(index, channel).filter(|spot| spot.meets(rows)) else {
                         self.coverage.fill(&[]);
                         continue;
                     };
@@ -219,7 +220,7 @@ impl Painter {
             };
             for (channel, plane) in frame.planes.iter_mut().enumerate() {
                 if channel < spots.channels() {
-                    let Some(spot) = spots.marker(index, channel) else {
+                    let Some(spot) = spots.marker(index, channel).filter(|spot| spot.meets(rows)) else {
                         self.coverage.fill(&[]);
                         continue;
                     };
@@ -244,9 +245,18 @@ impl Painter {
     }
 }
 
+/// The part of a polygon in some rows of a picture.
+fn clip_to_rows(polygon: Vec<DVec2>, rows: &Range<usize>, height: usize) -> Vec<DVec2> {
+    if *rows == (0..height) {
+        return polygon;
+    }
+    let kept = clip(&polygon, -DVec2::Y, 0.5 - rows.start as f64);
+    clip(&kept, DVec2::Y, rows.end as f64 - 0.5)
+}
+
 /// How far the middle of a square may be from what its corners promise, grey levels: what is left between the
 /// nodes, of the third order, is then a fraction of a level.
-const SMOOTH_GREY: f64 = 1.0;
+const SMOOTH_GREY: f64 = 2.0;
 /// Level at which the code's slope is taken for that.
 const DARK_LEVEL: f64 = 0.05;
 /// Room around the pressed part in which the membrane still bends sharply, mm.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::SimError;
 use super::effect::EffectName;
+use super::effects;
 use super::eye::Eye;
 use super::field::LensField;
 use super::frame::{Frame, Image8};
@@ -31,6 +32,8 @@ pub struct Renderer<'a> {
     points: Points,
     field: Option<LensField>,
     effects: Vec<EffectTruth>,
+    /// The most that any image moves from a frame's time to the first or last light that it gathers, px.
+    moved_px: f64,
     setup: Work,
 }
 
@@ -87,7 +90,13 @@ impl<'a> Renderer<'a> {
         let at_rest = eye.at(&Rigid::identity())?;
         let lens = at_rest.optics(eye.reference()).filter(|_| scene.draws()).map(|optics| optics.lens());
         let field = lens.map(|lens| LensField::new(lens, width, height));
-        Ok(Self { scene, pipeline, eye, points, field, effects: effects_of(plan), setup })
+        let timing = &pipeline.timing;
+        let gathered_s =
+            timing.exposure.map_or(0.0, |e| e.exposure_s) + timing.rolling.map_or(0.0, |r| r.readout_s);
+        // A dome that is touched or let go moves at once.
+        let sudden = if scene.objects().is_empty() { 0.0 } else { 0.25 * height as f64 };
+        let moved_px = sudden + 0.5 * gathered_s * effects::speed::fastest_px_per_s(scene).unwrap_or(0.0);
+        Ok(Self { scene, pipeline, eye, points, field, effects: effects_of(plan), moved_px, setup })
     }
 
     /// What putting the effects together took.
@@ -265,7 +274,7 @@ impl<'a> Renderer<'a> {
                 } else {
                     let instant = self.instant(number, *time_s, around, spent)?;
                     self.count(spent);
-                    let spots = self.points.see(scene, &instant);
+                    let spots = self.points.see_rows(scene, &instant, (now_spots, self.moved_px), &band.rows);
                     scratch.painter.draw(parts, &instant, &spots, band.rows.clone(), target, spent);
                     seen.push(spots);
                 }

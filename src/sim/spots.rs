@@ -1,5 +1,7 @@
 //! Where dots and markers appear: centres, outlines as drawn, centroids.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 
 use super::coverage::{area_moment, clip, clip_to_image};
@@ -40,6 +42,20 @@ pub struct Spot {
     pub area_px2: f64,
     /// Centroid of what is inside the picture.
     pub centroid_px: DVec2,
+}
+
+impl Spot {
+    /// Whether any of it may lie in some rows.
+    pub fn meets(&self, rows: &Range<usize>) -> bool {
+        self.within(rows, 0.0)
+    }
+
+    fn within(&self, rows: &Range<usize>, more_px: f64) -> bool {
+        let reach = self.polygon.iter().map(|p| (p.y - self.center_px.y).abs()).fold(0.0, f64::max);
+        // The outermost ring of a soft edge lies at most at twice the outline.
+        let reach = 2.0 * reach + 1.0 + more_px;
+        self.center_px.y + reach >= rows.start as f64 && self.center_px.y - reach <= rows.end as f64
+    }
 }
 
 /// All images of an instant: by item (dots, then markers), then channel.
@@ -131,13 +147,33 @@ impl Points {
 
     /// All images at an instant.
     pub fn see(&self, scene: &Scene, instant: &Instant) -> Spots {
+        self.see_some(scene, instant, &|_, _| true)
+    }
+
+    /// The images at an instant that lie in some rows or near them, by where they are at another instant,
+    /// from which none has moved by more than `moved_px`.
+    pub fn see_rows(
+        &self,
+        scene: &Scene,
+        instant: &Instant,
+        (then, moved_px): (&Spots, f64),
+        rows: &Range<usize>,
+    ) -> Spots {
+        self.see_some(scene, instant, &|item, channel| {
+            then.dot(item, channel).is_none_or(|spot| spot.within(rows, moved_px))
+        })
+    }
+
+    fn see_some(&self, scene: &Scene, instant: &Instant, wanted: &dyn Fn(usize, usize) -> bool) -> Spots {
         let moved = self.moved(instant);
         let items = moved.as_ref().unwrap_or(&self.items);
         let channels = instant.eye.channels();
         let mut spots = Vec::with_capacity(items.len() * channels);
         for (item, points) in items.iter().enumerate() {
             for channel in 0..channels {
-                spots.push(self.spot(scene, instant, channel, item, points, moved.is_some()));
+                let spot = wanted(item, channel)
+                    .then(|| self.spot(scene, instant, channel, item, points, moved.is_some()));
+                spots.push(spot.flatten());
             }
         }
         let surface_mm = items.iter().take(self.dots).map(|points| points[0]).collect();

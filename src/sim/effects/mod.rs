@@ -21,7 +21,7 @@ mod pupil_shift;
 mod refraction;
 mod rolling_shutter;
 mod sheet_motion;
-mod speed;
+pub mod speed;
 #[cfg(test)]
 mod tests;
 mod vignetting;

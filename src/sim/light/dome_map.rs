@@ -51,8 +51,8 @@ impl DomeGrid {
 
     /// Values at all nodes, row by row, of a function of the direction; rows are shared among threads.
     ///
-    /// A node beyond the rim, which no direction has, gets the line through the rim continued: twice the
-    /// rim's value less the value as far inside. Where no look-up comes it gets zeros.
+    /// A node beyond the rim, which no direction has, gets the parabola through the rim and two places inside
+    /// continued, as far apart as it lies outside. Where no look-up comes it gets zeros.
     pub fn fill_in_parallel<const K: usize>(
         &self,
         value: impl Fn(DVec3) -> [f64; K] + Sync,
@@ -78,7 +78,8 @@ impl DomeGrid {
             _ => {
                 let rim = value(direction_from_disc(place / radius));
                 let inside = value(direction_from_disc(place * ((2.0 - radius) / radius)));
-                std::array::from_fn(|k| 2.0 * rim[k] - inside[k])
+                let deeper = value(direction_from_disc(place * ((3.0 - 2.0 * radius) / radius)));
+                std::array::from_fn(|k| 3.0 * (rim[k] - inside[k]) + deeper[k])
             }
         }
     }
@@ -87,7 +88,7 @@ impl DomeGrid {
         if radius <= 1.0 {
             1
         } else if radius <= 1.0 + 2.0 * std::f64::consts::SQRT_2 * self.cell() {
-            2
+            3
         } else {
             0
         }

@@ -8,5 +8,7 @@ pub mod printing {}
 pub mod casting {}
 #[doc = include_str!("guide/force.md")]
 pub mod force {}
+#[doc = include_str!("guide/accuracy.md")]
+pub mod accuracy {}
 #[doc = include_str!("guide/formats.md")]
 pub mod formats {}

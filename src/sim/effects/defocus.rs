@@ -11,7 +11,7 @@ use glam::DVec2;
 use crate::optics::SensorOptics;
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
 use crate::sim::frame::Frame;
-use crate::sim::light::bounds;
+use crate::sim::light::bounds::{self, LightBounds};
 use crate::sim::pipeline::{Pass, PassContext, Stage};
 use crate::sim::scene::electronics::FocusSection;
 use crate::sim::{Pipeline, Scene, SimError, Work};
@@ -47,7 +47,7 @@ impl Effect for Defocus {
         let keeps = (1.0 - largest / steps as f64).powi(2 * steps as i32);
         let light = &scene.file().light;
         let brightest = match light.leds {
-            Some(_) => bounds::brightest_level(scene)?.max(1.0),
+            Some(_) => LightBounds::of(scene)?.brightest.max(1.0),
             None => light.brightest_level(),
         };
         let change = (1.0 - keeps) * brightest;

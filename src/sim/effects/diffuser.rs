@@ -1,7 +1,8 @@
 //! The tape before the lights: it spreads their lobes and takes its share.
 
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::light::{bounds, lit_by_leds, shade};
+use crate::sim::light::bounds::{self, LightBounds};
+use crate::sim::light::{lit_by_leds, shade};
 use crate::sim::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -21,7 +22,7 @@ impl Effect for Diffuser {
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        bounds::all_of_it(scene)
+        Ok(bounds::grey(scene, LightBounds::of(scene)?.diffuser))
     }
 
     fn cost(&self, _scene: &Scene) -> Cost {

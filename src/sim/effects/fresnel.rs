@@ -2,7 +2,8 @@
 
 use super::direct_light::SAMPLES;
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::light::{bounds, lit_by_leds, shade};
+use crate::sim::light::bounds::{self, LightBounds};
+use crate::sim::light::{lit_by_leds, shade};
 use crate::sim::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -23,7 +24,7 @@ impl Effect for Fresnel {
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        bounds::all_of_it(scene)
+        Ok(bounds::grey(scene, LightBounds::of(scene)?.fresnel))
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

@@ -1,7 +1,8 @@
 //! The membrane lights itself: straight across the dome, and by way of the sheet's underside.
 
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::light::{bounds, lit_by_leds, shade};
+use crate::sim::light::bounds::{self, LightBounds};
+use crate::sim::light::{lit_by_leds, shade};
 use crate::sim::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -19,9 +20,7 @@ impl Effect for Interreflection {
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        // Of all the light on the membrane, this part at most comes from the membrane.
-        let most = bounds::brightest_level(scene)? * largest_reflectance(scene);
-        Ok(Bound::grey(bounds::grey_of_change(scene.file().electronics.gamma, most)))
+        Ok(bounds::grey(scene, LightBounds::of(scene)?.interreflection))
     }
 
     fn cost(&self, _scene: &Scene) -> Cost {

@@ -1,7 +1,8 @@
 //! The platform stands in the light's way: the lip before the lights, the pits' walls, the window's edge.
 
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::light::{bounds, lit_by_leds, shade};
+use crate::sim::light::bounds::{self, LightBounds};
+use crate::sim::light::{lit_by_leds, shade};
 use crate::sim::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -23,7 +24,7 @@ impl Effect for PlatformShadow {
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        bounds::all_of_it(scene)
+        Ok(bounds::grey(scene, LightBounds::of(scene)?.platform_shadow))
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

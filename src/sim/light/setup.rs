@@ -53,31 +53,6 @@ fn drives(scene: &Scene) -> Result<Vec<f64>, SimError> {
     Ok((0..count).map(|i| light.power * each(i)).collect())
 }
 
-/// For each light of the design, the flux that each channel sees of it, mW.
-///
-/// # Errors
-/// Numbers for other lights than the design has.
-pub fn source_power(scene: &Scene) -> Result<Vec<Channels>, SimError> {
-    let Some(light) = &scene.file().light.leds else { return Ok(Vec::new()) };
-    let leds = &scene.design().sections().leds;
-    let flux = leds.radiant_flux_mw.to_array();
-    let drives = drives(scene)?;
-    Ok(leds
-        .list
-        .iter()
-        .zip(drives)
-        .map(|(led, drive)| {
-            let mut sum = [0.0; 3];
-            for &color in colors(led.color) {
-                for (total, response) in sum.iter_mut().zip(seen(color, light.crosstalk)) {
-                    *total += drive * flux[color as usize] * response;
-                }
-            }
-            sum
-        })
-        .collect())
-}
-
 /// Height of the highest point of each emitter, with or without the diffuser in front, mm.
 pub fn emitter_tops_mm(design: &Design) -> Vec<f64> {
     let leds = &design.sections().leds;

@@ -160,7 +160,7 @@ impl LitDome {
 }
 
 /// Share of the light that leaves through the sheet into the air of the camera.
-fn leaves(optics: &crate::optics::SensorOptics, momentum: f64, beside: bool) -> f64 {
+pub(super) fn leaves(optics: &crate::optics::SensorOptics, momentum: f64, beside: bool) -> f64 {
     let layers = optics.layers();
     let count = if beside && layers.len() > 2 { layers.len() - 1 } else { layers.len() };
     let indices: Vec<f64> = layers[..count].iter().map(|l| l.index_for(optics.channel())).collect();

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::bounds::Samples;
 use super::cavity::Cavities;
 use super::direct::{DirectLight, Emitter, EmitterRule};
 use super::dome_map::{DomeGrid, bicubic};
@@ -99,6 +100,7 @@ pub struct Prepared {
     still: OnceLock<Tables<1>>,
     shells: OnceLock<Vec<Tables<3>>>,
     rooms: OnceLock<Vec<DomeRoom>>,
+    pub(super) samples: OnceLock<Samples>,
 }
 
 impl Prepared {
@@ -122,7 +124,7 @@ impl Prepared {
 }
 
 /// Designs and choices whose tables are kept; the oldest goes first.
-const KEPT: usize = 16;
+const KEPT: usize = 24;
 
 /// The tables for a key: text of the design and flags of the effects. What is kept never changes what comes out,
 /// only when it is worked out.

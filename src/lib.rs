@@ -14,4 +14,5 @@ pub mod optics;
 pub mod parts;
 pub mod pose;
 pub mod sim;
+pub mod track;
 pub mod transfer;

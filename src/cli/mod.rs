@@ -8,6 +8,7 @@ mod check;
 mod output;
 mod points;
 mod schema;
+mod track;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -93,6 +94,8 @@ enum Command {
     },
     /// Print the JSON schema of the design file.
     Schema,
+    /// From frames to markers, pose, wrench and local displacement.
+    Track(Box<track::TrackArguments>),
     /// Fit the pad's map to a measured test print, and write it into a new design file.
     CalibratePrint {
         /// CSV of `id,x_mm,y_mm` (seen from outside, pole at the origin) or `id,phi_deg,theta_deg`, optionally
@@ -149,6 +152,7 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
             calibrate_optics::run(output, centroids, constants, out.as_deref(), *rest_frames)
         }
         Command::Schema => schema::run(output),
+        Command::Track(arguments) => track::run(output, arguments),
         Command::CalibratePrint { measured, design, out, marks } => {
             calibrate_print::run(output, measured, design, out.as_deref(), *marks)
         }

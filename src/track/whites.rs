@@ -1,0 +1,264 @@
+//! White markers in the frame: candidates by contrast, then a fit of what a disc beside the dome looks like.
+//!
+//! A marker lies 0.2 mm beside the dome's rim, whose membrane is bright too: a centroid over a window would take some
+//! of it in. So the picture of it is fitted: a disc on the sheet, the rim, three levels, the disc's place free.
+
+use glam::{DMat2, DVec2};
+use nalgebra::{SMatrix, SVector};
+
+use super::frame::Plane;
+use crate::optics::SensorOptics;
+use crate::pose::Marker;
+
+/// Half of the width over which an edge goes from one level to the other, px.
+const EDGE_PX: f64 = 1.1;
+/// Pixels that far outside of the outline are part of the fit: the ground around.
+const GROUND_PX: f64 = 2.6;
+const MOST_STEPS: u32 = 12;
+const SETTLED_PX: f64 = 1e-3;
+/// Least difference between marker and ground, levels.
+const LEAST_RISE: f64 = 12.0;
+/// Largest half of a window, px.
+const MOST_HALF: i32 = 40;
+
+/// A marker as it was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Disc {
+    pub centroid_px: DVec2,
+    pub sd_px: f64,
+}
+
+/// How a marker's surroundings map to the image.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View {
+    /// Pixels by mm on the sheet.
+    px_by_mm: DMat2,
+    mm_by_px: DMat2,
+    place_mm: DVec2,
+    radius_mm: f64,
+    rim_mm: f64,
+    half: i32,
+}
+
+impl View {
+    /// At the pose of the optics; `None` where the marker is not seen, or wider than what is looked at.
+    pub fn new(optics: &SensorOptics, marker: &Marker) -> Option<Self> {
+        let motion = optics.project_with_motion(marker.position_mm).ok()?;
+        let m = motion.by_point;
+        let px_by_mm = DMat2::from_cols_array(&[m[(0, 0)], m[(1, 0)], m[(0, 1)], m[(1, 1)]]);
+        let radius_mm = 0.5 * marker.diameter_mm;
+        let mm_by_px = px_by_mm.inverse();
+        // A point has no picture of its own: a pixel stands for it.
+        let radius_mm = radius_mm.max(0.5 / px_by_mm.determinant().abs().sqrt().max(1e-9));
+        let reach = radius_mm * (px_by_mm.x_axis.length() + px_by_mm.y_axis.length());
+        let half = (reach + GROUND_PX + 1.0).ceil();
+        let usable = mm_by_px.is_finite() && half.is_finite() && half <= f64::from(MOST_HALF);
+        usable.then_some(Self {
+            px_by_mm,
+            mm_by_px,
+            place_mm: marker.position_mm.truncate(),
+            radius_mm,
+            rim_mm: optics.dome_radius_mm(),
+            half: half as i32,
+        })
+    }
+
+    /// Brightness in the middle less that around, levels.
+    fn rise(&self, plane: &Plane<'_>, x: i32, y: i32) -> f64 {
+        let mut middle = 0;
+        for dy in -1..=1 {
+            for dx in -1..=1 {
+                middle += i32::from(plane.at(x + dx, y + dy));
+            }
+        }
+        let mut around = 0;
+        for k in 0..8 {
+            const H: f64 = std::f64::consts::FRAC_1_SQRT_2;
+            const ROUND: [[f64; 2]; 8] =
+                [[1.0, 0.0], [H, H], [0.0, 1.0], [-H, H], [-1.0, 0.0], [-H, -H], [0.0, -1.0], [H, -H]];
+            let [cos, sin] = ROUND[k];
+            let edge = self.px_by_mm * (DVec2::new(cos, sin) * self.radius_mm);
+            let out = edge * (1.0 + 1.6 / edge.length().max(0.5));
+            around += i32::from(plane.at(x + out.x.round() as i32, y + out.y.round() as i32));
+        }
+        f64::from(middle) / 9.0 - f64::from(around) / 8.0
+    }
+
+    /// The places within `reach_px` of `start` that look most like a marker, the best first, at least its own size
+    /// apart; `white`: the level that they must pass, if one is fixed. Returns how many of `out` are filled.
+    pub fn candidates(
+        &self,
+        plane: &Plane<'_>,
+        start: DVec2,
+        reach_px: f64,
+        white: Option<u8>,
+        out: &mut [(f64, DVec2)],
+    ) -> usize {
+        let mut count = 0;
+        let (cx, cy) = (start.x.round() as i32, start.y.round() as i32);
+        let reach = reach_px.clamp(1.0, 2000.0).ceil() as i32;
+        // Far searches look at every other pixel first; markers are wider than that.
+        let step = if reach > 24 { 2 } else { 1 };
+        let apart = 0.7 * f64::from(self.half);
+        let rows = (cy - reach).max(1)..=(cy + reach).min(plane.height() as i32 - 2);
+        for y in rows.step_by(step) {
+            let columns = (cx - reach).max(1)..=(cx + reach).min(plane.width() as i32 - 2);
+            for x in columns.step_by(step) {
+                let level = plane.at(x, y);
+                if white.is_some_and(|white| level <= white) || level < LEAST_RISE as u8 {
+                    continue;
+                }
+                let at = DVec2::new(f64::from(x), f64::from(y));
+                if at.distance(start) > reach_px {
+                    continue;
+                }
+                let rise = self.rise(plane, x, y);
+                if rise < LEAST_RISE {
+                    continue;
+                }
+                let near = out[..count].iter().position(|(_, p)| p.distance(at) < apart);
+                match near {
+                    Some(i) if out[i].0 < rise => out[i] = (rise, at),
+                    Some(_) => {}
+                    None if count < out.len() => {
+                        out[count] = (rise, at);
+                        count += 1;
+                    }
+                    None => {
+                        let least = (0..count).min_by(|a, b| out[*a].0.total_cmp(&out[*b].0));
+                        if let Some(i) = least.filter(|i| out[*i].0 < rise) {
+                            out[i] = (rise, at);
+                        }
+                    }
+                }
+            }
+        }
+        out[..count].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        count
+    }
+
+    /// The disc near `start`, at most `stray_px` from it: Gauss-Newton on the pixels, for the place, the levels of
+    /// ground, disc and dome.
+    pub fn fit(&self, plane: &Plane<'_>, start: DVec2, stray_px: f64) -> Option<Disc> {
+        let mut at = start;
+        let mut normal = SMatrix::<f64, 5, 5>::zeros();
+        let (mut left, mut count) = (0.0, 0.0);
+        let mut levels = SVector::<f64, 3>::zeros();
+        let mut settled = false;
+        for _ in 0..MOST_STEPS {
+            let inside = at.x > 2.0
+                && at.y > 2.0
+                && at.x < plane.width() as f64 - 3.0
+                && at.y < plane.height() as f64 - 3.0;
+            if !(inside && at.distance(start) <= stray_px) {
+                return None;
+            }
+            // First the levels alone, at this place; then the place with them.
+            let alone = self.sums(plane, at, None)?;
+            levels = solve_levels(&alone.normal, &alone.right)?;
+            let sums = self.sums(plane, at, Some(&levels))?;
+            let step = solve_all(&sums.normal, &sums.right)?;
+            (normal, left, count) = (sums.normal, sums.left, sums.count);
+            let shift = DVec2::new(step[3], step[4]).clamp_length_max(1.5);
+            at += shift;
+            if shift.length() < SETTLED_PX {
+                settled = true;
+                break;
+            }
+        }
+        let rise = levels[1];
+        let rms = (left / (count - 5.0).max(1.0)).max(1.0 / 12.0).sqrt();
+        // What is a disc leaves a small part of its rise unexplained.
+        if !settled || !(rise > LEAST_RISE && rms < 0.25 * rise) {
+            return None;
+        }
+        let inverse = with_floor(&normal).cholesky()?.inverse();
+        let sd_px = rms * (0.5 * (inverse[(3, 3)] + inverse[(4, 4)])).max(0.0).sqrt();
+        at.is_finite().then_some(Disc { centroid_px: at, sd_px })
+    }
+
+    /// Normal equations over the window: columns ground, disc, dome, and the place (with `levels` known).
+    fn sums(&self, plane: &Plane<'_>, at: DVec2, levels: Option<&SVector<f64, 3>>) -> Option<Sums> {
+        let mut normal = SMatrix::<f64, 5, 5>::zeros();
+        let mut right = SVector::<f64, 5>::zeros();
+        let (mut left, mut count) = (0.0, 0.0);
+        let (cx, cy) = (at.x.round() as i32, at.y.round() as i32);
+        let transposed = self.mm_by_px.transpose();
+        for y in cy - self.half..=cy + self.half {
+            for x in cx - self.half..=cx + self.half {
+                let u = self.mm_by_px * (DVec2::new(f64::from(x), f64::from(y)) - at);
+                let distance = u.length();
+                let slope = transposed * (u / distance.max(1e-9));
+                let steep = slope.length().max(1e-9);
+                let outside = (distance - self.radius_mm) / steep;
+                if outside > GROUND_PX {
+                    continue;
+                }
+                let (disc, disc_slope) = edge(outside);
+                let place = self.place_mm + u;
+                let from_axis = place.length().max(1e-9);
+                let rim_slope = (transposed * (place / from_axis)).length().max(1e-9);
+                let (dome, _) = edge((from_axis - self.rim_mm) / rim_slope);
+                let value = f64::from(plane.at(x, y));
+                let mut row = [1.0, disc, dome * (1.0 - disc), 0.0, 0.0];
+                let mut rest = value;
+                if let Some(levels) = levels {
+                    // The outline moves with the place: outside falls by the unit normal.
+                    let by_place = slope / steep * (-disc_slope * (levels[1] - dome * levels[2]));
+                    row[3] = by_place.x;
+                    row[4] = by_place.y;
+                    rest -= levels[0] + levels[1] * disc + levels[2] * row[2];
+                }
+                for i in 0..5 {
+                    right[i] += row[i] * rest;
+                    for j in 0..=i {
+                        normal[(i, j)] += row[i] * row[j];
+                    }
+                }
+                left += rest * rest;
+                count += 1.0;
+            }
+        }
+        for i in 0..5 {
+            for j in i + 1..5 {
+                normal[(i, j)] = normal[(j, i)];
+            }
+        }
+        (count > 12.0).then_some(Sums { normal, right, left, count })
+    }
+}
+
+/// Normal equations over a window.
+struct Sums {
+    normal: SMatrix<f64, 5, 5>,
+    right: SVector<f64, 5>,
+    /// Sum of squared residuals, and the number of pixels.
+    left: f64,
+    count: f64,
+}
+
+/// From 1 inside to 0 outside of an outline, and the slope, over the distance from it, px.
+fn edge(outside_px: f64) -> (f64, f64) {
+    let t = (0.5 - outside_px / (2.0 * EDGE_PX)).clamp(0.0, 1.0);
+    (t * t * (3.0 - 2.0 * t), -6.0 * t * (1.0 - t) / (2.0 * EDGE_PX))
+}
+
+/// A rim that hardly enters the window has no level of its own.
+fn with_floor(normal: &SMatrix<f64, 5, 5>) -> SMatrix<f64, 5, 5> {
+    let mut floored = *normal;
+    floored[(2, 2)] += 0.5;
+    for i in 3..5 {
+        floored[(i, i)] += 1e-6;
+    }
+    floored
+}
+
+fn solve_levels(normal: &SMatrix<f64, 5, 5>, right: &SVector<f64, 5>) -> Option<SVector<f64, 3>> {
+    let matrix = with_floor(normal).fixed_view::<3, 3>(0, 0).into_owned();
+    Some(matrix.cholesky()?.solve(&right.fixed_rows::<3>(0).into_owned()))
+}
+
+fn solve_all(normal: &SMatrix<f64, 5, 5>, right: &SVector<f64, 5>) -> Option<SVector<f64, 5>> {
+    let step = with_floor(normal).cholesky()?.solve(right);
+    step.iter().all(|v| v.is_finite()).then_some(step)
+}

@@ -8,6 +8,7 @@ mod check;
 mod output;
 mod points;
 mod schema;
+mod simulate;
 mod track;
 
 use std::path::PathBuf;
@@ -92,8 +93,19 @@ enum Command {
         #[arg(long, default_value_t = 1)]
         rest_frames: usize,
     },
+    /// Draw what the sensor will see, with the exact truth, using only the effects that the scene calls for.
+    Simulate {
+        /// The scene file.
+        scene: PathBuf,
+        #[command(flatten)]
+        options: simulate::SimulateOptions,
+    },
     /// Print the JSON schema of the design file.
-    Schema,
+    Schema {
+        /// That of the scene file instead.
+        #[arg(long)]
+        scene: bool,
+    },
     /// From frames to markers, pose, wrench and local displacement.
     Track(Box<track::TrackArguments>),
     /// Fit the pad's map to a measured test print, and write it into a new design file.
@@ -151,7 +163,8 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::CalibrateOptics { centroids, constants, out, rest_frames } => {
             calibrate_optics::run(output, centroids, constants, out.as_deref(), *rest_frames)
         }
-        Command::Schema => schema::run(output),
+        Command::Simulate { scene, options } => simulate::run(output, scene, options),
+        Command::Schema { scene } => schema::run(output, *scene),
         Command::Track(arguments) => track::run(output, arguments),
         Command::CalibratePrint { measured, design, out, marks } => {
             calibrate_print::run(output, measured, design, out.as_deref(), *marks)

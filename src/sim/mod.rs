@@ -4,22 +4,38 @@
 //! can be and what it costs, and leaves out what the scene's tolerance can spare; the used effects put their
 //! parts into a [`Pipeline`], and a renderer draws frames and tells the exact truth about them.
 
+mod coverage;
 mod effect;
 mod effects;
 mod error;
+mod eye;
 mod frame;
+mod geometry_bound;
+mod instant;
 pub mod light;
+mod outline;
+mod picture;
 pub mod pipeline;
 mod plan;
+mod render;
+pub mod run;
 pub mod scene;
 mod shading;
+mod truth;
+mod video;
 mod work;
 
-pub use effect::{Bound, Cost, Effect, EffectName};
+pub use effect::{Bound, Cost, Effect, EffectChoice, EffectChoices, EffectName};
 pub use error::SimError;
 pub use frame::{Frame, Image8};
+pub use instant::Instant;
 pub use pipeline::Pipeline;
 pub use plan::{Entry, Plan};
+pub use render::{Drawn, Renderer};
 pub use scene::Scene;
 pub use shading::{Shading, SurfaceSample};
+pub use truth::{DotTruth, EffectTruth, FrameTruth, MarkerTruth};
 pub use work::Work;
+
+#[cfg(test)]
+mod tests;

@@ -2,10 +2,9 @@
 
 use serde::Serialize;
 
-use super::effect::{Bound, Cost, Effect, EffectName};
+use super::effect::{Bound, Cost, Effect, EffectChoice, EffectName};
 use super::effects;
 use super::scene::Scene;
-use super::scene::file::EffectChoice;
 use super::{Pipeline, SimError, Work, light};
 
 /// What the plan says of one effect.

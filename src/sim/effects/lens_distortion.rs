@@ -1,7 +1,9 @@
-//! The lens bends the image: without it, a pinhole.
+//! The lens bends the image: without it, a pinhole of the same camera matrix.
 
-use crate::camera::Model;
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
+use crate::sim::geometry_bound::{called_for, shift_px};
+use crate::sim::instant::{Points, units};
+use crate::sim::pipeline::Geometry;
 use crate::sim::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -14,21 +16,16 @@ impl Effect for LensDistortion {
 
     fn calls_for(&self, scene: &Scene) -> Option<String> {
         let spec = scene.optics().lens().spec();
-        let bends = match spec.model {
-            Model::Pinhole => false,
-            Model::BrownConrady => spec.distortion.iter().any(|k| *k != 0.0),
-            // Without coefficients it is still equidistant, not perspective.
-            Model::KannalaBrandt => true,
-        };
-        bends.then(|| format!("the lens is {}", spec.model))
+        called_for(scene).lens_distortion.then(|| format!("the lens is {}, not a pinhole", spec.model))
     }
 
-    fn bound(&self, _scene: &Scene) -> Result<Bound, SimError> {
-        Ok(Bound::UNBOUNDED)
+    fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
+        let with = called_for(scene);
+        Ok(Bound::px(shift_px(scene, with, Geometry { lens_distortion: false, ..with })?))
     }
 
-    fn cost(&self, _scene: &Scene) -> Cost {
-        Cost::default()
+    fn cost(&self, scene: &Scene) -> Cost {
+        Cost { once: 0, per_frame: Points::count(scene) * units::LENS }
     }
 
     fn apply(&self, _scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {

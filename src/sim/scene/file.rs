@@ -1,7 +1,5 @@
 //! The scene file, as it is written.
 
-use std::collections::BTreeMap;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +7,7 @@ use super::electronics::ElectronicsSection;
 use super::light::LightSection;
 use super::objects::ObjectSection;
 use crate::design::sections::Why;
-use crate::sim::effect::EffectName;
+use crate::sim::effect::EffectChoices;
 
 /// What the sensor is made to feel, how it is lit and recorded, and how exact the frames shall be.
 ///
@@ -57,9 +55,9 @@ pub struct SceneFile {
     /// The printed dots as they came out.
     #[serde(default)]
     pub ink: InkSection,
-    /// Effects that shall be used, or not, whatever the plan says; by name.
+    /// Effects that shall be used, or not, whatever the plan says.
     #[serde(default)]
-    pub effects: BTreeMap<EffectName, EffectChoice>,
+    pub effects: EffectChoices,
     /// What is written besides frames and truth.
     #[serde(default)]
     pub output: OutputSection,
@@ -208,18 +206,6 @@ pub struct BrokenDot {
     /// Direction in which the missing part lies, in the image at rest, from +x towards +y, degrees.
     #[serde(default)]
     pub direction_deg: f64,
-}
-
-/// What a scene may say of an effect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum EffectChoice {
-    /// The plan decides: the default.
-    Plan,
-    /// Used wherever the scene calls for it, however small it is.
-    Always,
-    /// Never used, however large: the scene is simulated as if the effect did not exist.
-    Never,
 }
 
 /// What is written besides frames and truth.

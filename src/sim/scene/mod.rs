@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use crate::design::Design;
+use crate::design::{Design, DesignError};
 use crate::layout::Layout;
 use crate::mechanics::Suspension;
 use crate::optics::SensorOptics;
@@ -21,8 +21,7 @@ pub use file::SceneFile;
 pub use motion::{Held, Motion, State};
 
 use super::SimError;
-use super::effect::EffectName;
-use file::EffectChoice;
+use super::effect::{EffectChoice, EffectName};
 
 /// Points that carry a dot's outline.
 pub const RIM_POINTS: usize = 8;
@@ -76,6 +75,23 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn new(file: SceneFile, folder: &Path, design: Design) -> Result<Self, SimError> {
         resolve::resolve(file, folder, design)
+    }
+
+    /// Takes another number of frames or another seed than the file's.
+    ///
+    /// # Errors
+    /// No frame at all.
+    pub fn override_run(&mut self, frames: Option<u32>, seed: Option<u64>) -> Result<(), SimError> {
+        if let Some(count) = frames {
+            if count == 0 {
+                return Err(
+                    DesignError::at("frames.count", 0, "there is no frame to draw", "at least 1").into()
+                );
+            }
+            self.file.frames.count = count;
+        }
+        self.file.seed = seed.unwrap_or(self.file.seed);
+        Ok(())
     }
 
     /// The scene as written; every rule between its fields holds.
@@ -156,6 +172,6 @@ impl Scene {
 
     /// What the scene says of an effect.
     pub fn choice(&self, effect: EffectName) -> EffectChoice {
-        self.file.effects.get(&effect).copied().unwrap_or(EffectChoice::Plan)
+        self.file.effects.of(effect)
     }
 }

@@ -1,0 +1,193 @@
+//! How much of each pixel a polygon covers, exactly.
+
+use glam::DVec2;
+
+/// Coverage of the pixels of a box by a polygon, 0 to 1.
+#[derive(Debug, Default, Clone)]
+pub struct Coverage {
+    left: i64,
+    top: i64,
+    width: usize,
+    height: usize,
+    values: Vec<f32>,
+}
+
+/// No polygon covers a wider box; a larger one is clipped first.
+const LARGEST_BOX_PX: f64 = 20_000.0;
+
+impl Coverage {
+    /// Fills in a simple polygon, of either sense; its points are px, pixel centres whole numbers.
+    ///
+    /// Each edge adds the area between itself and the box's right side to the pixels that it crosses, with the
+    /// sign of its direction; a running sum along each row then gives the covered area of every pixel, without
+    /// any sampling. A polygon that is not finite, empty or wider than 20000 px covers nothing.
+    pub fn fill(&mut self, polygon: &[DVec2]) {
+        self.values.clear();
+        (self.width, self.height) = (0, 0);
+        let mut low = DVec2::INFINITY;
+        let mut high = DVec2::NEG_INFINITY;
+        for point in polygon {
+            if !point.is_finite() {
+                return;
+            }
+            low = low.min(*point);
+            high = high.max(*point);
+        }
+        if polygon.len() < 3 || (high - low).max_element() > LARGEST_BOX_PX || low.abs().max_element() > 1e9 {
+            return;
+        }
+        // Pixel i covers i - 0.5 to i + 0.5.
+        let origin = (low + 0.5).floor();
+        let far = (high + 0.5).floor();
+        (self.left, self.top) = (origin.x as i64, origin.y as i64);
+        self.width = (far.x - origin.x) as usize + 1;
+        self.height = (far.y - origin.y) as usize + 1;
+        // One more column takes what an edge in the last one leaves for its right neighbour.
+        let stride = self.width + 1;
+        self.values.resize(stride * self.height, 0.0);
+        let local = |point: DVec2| point + 0.5 - origin;
+        let Some(last) = polygon.last() else { return };
+        let mut from = local(*last);
+        for point in polygon {
+            let to = local(*point);
+            add_edge(&mut self.values, stride, from, to);
+            from = to;
+        }
+        for row in self.values.chunks_exact_mut(stride) {
+            let mut sum = 0.0;
+            for value in row {
+                sum += *value;
+                *value = sum.abs().min(1.0);
+            }
+        }
+    }
+
+    /// Rows of the box inside a picture: the picture's row and first column, and the coverage from there.
+    pub fn rows(&self, width: usize, height: usize) -> impl Iterator<Item = (usize, usize, &[f32])> {
+        let stride = self.width + 1;
+        let rows = self.values.chunks_exact(stride).enumerate();
+        rows.filter_map(move |(index, row)| {
+            let y = usize::try_from(self.top + index as i64).ok().filter(|y| *y < height)?;
+            let skip = usize::try_from(-self.left).unwrap_or(0).min(self.width);
+            let x = usize::try_from(self.left).unwrap_or(0);
+            let count = (self.width - skip).min(width.saturating_sub(x));
+            let part = row.get(skip..skip + count).filter(|part| !part.is_empty())?;
+            Some((y, x, part))
+        })
+    }
+
+    /// Pixels of the box.
+    pub fn area(&self) -> usize {
+        self.width * self.height
+    }
+}
+
+/// Adds an edge to the accumulation: for each row that it crosses, its height there, split between the pixels by
+/// the area to its right.
+fn add_edge(values: &mut [f32], stride: usize, from: DVec2, to: DVec2) {
+    if from.y == to.y {
+        return;
+    }
+    let (sign, a, b) = if from.y < to.y { (1.0, from, to) } else { (-1.0, to, from) };
+    let per_row = (b.x - a.x) / (b.y - a.y);
+    let first = a.y.floor() as usize;
+    let mut x = a.x;
+    let mut y = a.y;
+    for (index, row) in values.chunks_exact_mut(stride).enumerate().skip(first) {
+        if y >= b.y {
+            break;
+        }
+        let end = b.y.min((index + 1) as f64);
+        let next_x = if end == b.y { b.x } else { a.x + per_row * (end - a.y) };
+        add_piece(row, sign * (end - y), x, next_x);
+        (x, y) = (next_x, end);
+    }
+}
+
+/// Adds the part of an edge inside one row: signed height `dy`, between two columns.
+fn add_piece(row: &mut [f32], dy: f64, x0: f64, x1: f64) {
+    let (low, high) = if x0 < x1 { (x0, x1) } else { (x1, x0) };
+    let first = low.floor();
+    let last = high.ceil();
+    let start = first as usize;
+    if last <= first + 1.0 {
+        // Inside one pixel: the part right of the edge's middle is covered.
+        let middle = 0.5 * (low + high) - first;
+        add(row, start, dy * (1.0 - middle));
+        add(row, start + 1, dy * middle);
+        return;
+    }
+    // Over several pixels: the covered area of each is an integral of the edge's share of the row so far.
+    let per_px = dy / (high - low);
+    let share = |to: f64| per_px * (to - low);
+    // Area right of the edge within pixel i, summed: the integral of the height over the pixel.
+    let mut done = 0.0;
+    let mut pixel = start;
+    let mut from = low;
+    while from < high {
+        let end = high.min((pixel + 1) as f64);
+        let height = share(end) - share(from);
+        // Part of the pixel right of this piece's middle.
+        let middle = 0.5 * (from + end) - pixel as f64;
+        let covered = height * (1.0 - middle);
+        add(row, pixel, covered + done);
+        done = height - covered;
+        from = end;
+        pixel += 1;
+    }
+    add(row, pixel, done);
+}
+
+fn add(row: &mut [f32], index: usize, value: f64) {
+    if let Some(place) = row.get_mut(index) {
+        *place += value as f32;
+    }
+}
+
+/// Area (signed) and first moment of a polygon.
+pub fn area_moment(polygon: &[DVec2]) -> (f64, DVec2) {
+    let Some(origin) = polygon.first().copied() else { return (0.0, DVec2::ZERO) };
+    let mut area = 0.0;
+    let mut moment = DVec2::ZERO;
+    let mut from = polygon.last().map_or(DVec2::ZERO, |p| *p - origin);
+    for point in polygon {
+        let to = *point - origin;
+        let cross = from.perp_dot(to);
+        area += 0.5 * cross;
+        moment += (from + to) * (cross / 6.0);
+        from = to;
+    }
+    (area, moment + origin * area)
+}
+
+/// The part of a polygon where `normal . p <= offset` (Sutherland and Hodgman); right for convex polygons, and
+/// for others where the cut leaves one piece.
+pub fn clip(polygon: &[DVec2], normal: DVec2, offset: f64) -> Vec<DVec2> {
+    let mut kept = Vec::with_capacity(polygon.len() + 2);
+    let Some(mut from) = polygon.last().copied() else { return kept };
+    let mut from_out = normal.dot(from) - offset;
+    for to in polygon.iter().copied() {
+        let to_out = normal.dot(to) - offset;
+        if (from_out > 0.0) != (to_out > 0.0) {
+            kept.push(from + (to - from) * (from_out / (from_out - to_out)));
+        }
+        if to_out <= 0.0 {
+            kept.push(to);
+        }
+        (from, from_out) = (to, to_out);
+    }
+    kept
+}
+
+/// The part of a polygon inside a picture's raster.
+pub fn clip_to_image(polygon: &[DVec2], width: usize, height: usize) -> Vec<DVec2> {
+    let (right, bottom) = (width as f64 - 0.5, height as f64 - 0.5);
+    let inside = |p: &DVec2| p.x >= -0.5 && p.y >= -0.5 && p.x <= right && p.y <= bottom;
+    if polygon.iter().all(inside) {
+        return polygon.to_vec();
+    }
+    let mut kept = clip(polygon, -DVec2::X, 0.5);
+    kept = clip(&kept, -DVec2::Y, 0.5);
+    kept = clip(&kept, DVec2::X, right);
+    clip(&kept, DVec2::Y, bottom)
+}

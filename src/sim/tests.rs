@@ -1,0 +1,166 @@
+use std::path::Path;
+
+use glam::DVec2;
+use proptest::prelude::*;
+
+use super::coverage::{Coverage, area_moment, clip};
+use super::outline::RimFit;
+use super::*;
+
+fn scene(name: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes").join(name);
+    Scene::load(&path).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// A scene of the named design's folder, from JSON text without version, name and design.
+fn scene_of(text: &str) -> Result<Scene, SimError> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes");
+    let whole = format!(r#"{{ "version": 1, "name": "t", "design": "../thumb24.json", {text} }}"#);
+    Scene::from_text(&whole, &folder)
+}
+
+fn sum_of(coverage: &Coverage) -> (f64, DVec2) {
+    let (mut area, mut moment) = (0.0, DVec2::ZERO);
+    for (y, x, part) in coverage.rows(1000, 1000) {
+        for (k, value) in part.iter().enumerate() {
+            area += f64::from(*value);
+            moment += DVec2::new((x + k) as f64, y as f64) * f64::from(*value);
+        }
+    }
+    (area, moment / area)
+}
+
+proptest! {
+    // A convex polygon's coverage sums to its area, whatever its place and direction.
+    #[test]
+    fn coverage_sums_to_the_area(
+        x in 20.0..40.0f64, y in 20.0..40.0f64, r in 0.3..12.0f64, flat in 0.1..1.0f64, turn in 0.0..6.3f64,
+        corners in 3usize..40, back in any::<bool>(),
+    ) {
+        let mut polygon: Vec<DVec2> = (0..corners).map(|k| {
+            let p = DVec2::from_angle(std::f64::consts::TAU * k as f64 / corners as f64);
+            DVec2::new(x, y) + DVec2::from_angle(turn).rotate(DVec2::new(p.x * r, p.y * r * flat))
+        }).collect();
+        if back { polygon.reverse(); }
+        let mut coverage = Coverage::default();
+        coverage.fill(&polygon);
+        let (area, moment) = area_moment(&polygon);
+        let (drawn, center) = sum_of(&coverage);
+        prop_assert!((drawn - area.abs()).abs() < 2e-5 * (1.0 + area.abs()), "{drawn} {area}");
+        // The pixels' own centroids differ from what they cover by the sampling of the edge only.
+        prop_assert!((center - moment / area).length() < 0.5 / (1.0 + r));
+    }
+
+    #[test]
+    fn coverage_matches_a_fine_raster(x in 5.0..7.0f64, y in 5.0..7.0f64, r in 1.0..4.0f64, turn in 0.0..6.3f64) {
+        let polygon: Vec<DVec2> = (0..5).map(|k| {
+            DVec2::new(x, y) + DVec2::from_angle(turn + std::f64::consts::TAU * f64::from(k) / 5.0) * r
+        }).collect();
+        let mut coverage = Coverage::default();
+        coverage.fill(&polygon);
+        let inside = |p: DVec2| (0..5).all(|k| {
+            let (a, b) = (polygon[k], polygon[(k + 1) % 5]);
+            (b - a).perp_dot(p - a) >= 0.0
+        });
+        for (row, left, part) in coverage.rows(100, 100) {
+            for (k, value) in part.iter().enumerate() {
+                let count = (0..64).flat_map(|i| (0..64).map(move |j| (i, j))).filter(|(i, j)| {
+                    let at = |n: i32| (f64::from(n) + 0.5) / 64.0 - 0.5;
+                    inside(DVec2::new((left + k) as f64 + at(*i), row as f64 + at(*j)))
+                }).count();
+                prop_assert!((count as f64 / 4096.0 - f64::from(*value)).abs() < 0.015);
+            }
+        }
+    }
+
+    #[test]
+    fn a_cut_leaves_what_lies_before_it(angle in 0.0..6.3f64, left in 0.05..0.95f64) {
+        let circle: Vec<DVec2> = (0..400).map(|k| DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / 400.0)).collect();
+        let normal = DVec2::from_angle(angle);
+        let kept = clip(&circle, normal, 2.0 * left - 1.0);
+        let half = (2.0 * left - 1.0f64).acos();
+        let segment = half - half.sin() * half.cos();
+        prop_assert!((area_moment(&kept).0 - (std::f64::consts::PI - segment)).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn an_ellipse_keeps_its_area_and_centre() {
+    let fit = RimFit::new(4.0, 0.003);
+    let rim = std::array::from_fn(|k| {
+        let a = std::f64::consts::TAU * k as f64 / 8.0;
+        DVec2::new(10.0 + 4.0 * a.cos() - 0.5 * a.sin(), 7.0 + 2.0 * a.sin())
+    });
+    let mut polygon = Vec::new();
+    fit.polygon(&rim, &mut polygon);
+    let (area, moment) = area_moment(&polygon);
+    assert!((area - 8.0 * std::f64::consts::PI).abs() < 1e-9, "{area}");
+    assert!((moment / area - DVec2::new(10.0, 7.0)).length() < 1e-12);
+}
+
+/// Centroid of the darkness around a place of one channel.
+fn measured(image: &Image8, channel: usize, near: [f64; 2], ground: f64) -> DVec2 {
+    let (x0, y0) = (near[0].round() as i64, near[1].round() as i64);
+    let (mut sum, mut moment) = (0.0, DVec2::ZERO);
+    for y in y0 - 8..=y0 + 8 {
+        for x in x0 - 8..=x0 + 8 {
+            let at = (y as usize * image.width + x as usize) * image.channels + channel;
+            let weight = ground - f64::from(image.bytes[at]);
+            sum += weight;
+            moment += DVec2::new(x as f64, y as f64) * weight;
+        }
+    }
+    moment / sum
+}
+
+#[test]
+fn the_truth_is_what_is_drawn() {
+    for name in ["still.json", "push.json", "twist.json"] {
+        let scene = scene(name);
+        let plan = Plan::everything(&scene).unwrap();
+        let renderer = Renderer::new(&scene, &plan).unwrap();
+        for frame in [0, scene.frame_count() / 3, scene.frame_count() - 1] {
+            let drawn = renderer.frame(frame).unwrap();
+            let image = drawn.image.unwrap();
+            let mut seen = 0;
+            for dot in &drawn.truth.black_dots {
+                for (channel, told) in dot.centroid_rgb_px.unwrap().into_iter().enumerate() {
+                    let told = told.unwrap();
+                    let found = measured(&image, channel, told, 153.0);
+                    assert!(
+                        (found - DVec2::from(told)).length() < 0.02,
+                        "{name} {frame} {} {found} {told:?}",
+                        dot.id
+                    );
+                    seen += 1;
+                }
+            }
+            assert!(seen > 450);
+        }
+    }
+}
+
+#[test]
+fn faults_are_named() {
+    let fault = |text: &str, field: &str| match scene_of(text).map(|_| ()) {
+        Err(SimError::Input(error)) => assert_eq!(error.field, field, "{error}"),
+        other => panic!("{text}: {other:?}"),
+    };
+    let frames = r#""frames": { "count": 1, "rate_hz": 30 }"#;
+    let tolerance = r#""tolerance": { "px": 0.1, "grey": 1 }"#;
+    assert!(scene_of(&format!("{frames}, {tolerance}")).is_ok());
+    fault(&format!(r#""frames": {{ "count": 0, "rate_hz": 30 }}, {tolerance}"#), "frames.count");
+    fault(&format!(r#"{frames}, "tolerance": {{ "px": 0, "grey": 1 }}"#), "tolerance.px");
+    fault(&format!(r#"{frames}, "tolerance": {{ "px": 1, "grey": -1 }}"#), "tolerance.grey");
+    fault(
+        &format!(r#"{frames}, {tolerance}, "effects": {{ "gravity_waves": "always" }}"#),
+        "effects.gravity_waves",
+    );
+    fault(
+        &format!(r#"{frames}, {tolerance}, "ink": {{ "broken": [{{ "id": 9999, "left": 0.5 }}] }}"#),
+        "ink.broken[0].id",
+    );
+    let keys = r#"[{ "time_s": 1, "force_n": [0,0,-1] }, { "time_s": 1, "force_n": [0,0,-1] }]"#;
+    fault(&format!(r#"{frames}, {tolerance}, "motion": {{ "wrench": {keys} }}"#), "motion.wrench[1].time_s");
+    fault(&format!(r#"{frames}, {tolerance}, "colour": true"#), "colour");
+}

@@ -152,10 +152,7 @@ impl Plane<'_> {
 
     /// A square of side `side` with its top left pixel at (x, y), row by row; beyond the border the nearest pixels.
     pub fn square_into<T: From<u8>>(&self, x: i32, y: i32, side: usize, out: &mut [T]) {
-        let inside = x >= 0
-            && y >= 0
-            && x as usize + side <= self.width
-            && y as usize + side <= self.height;
+        let inside = x >= 0 && y >= 0 && x as usize + side <= self.width && y as usize + side <= self.height;
         for (dy, row) in out.chunks_exact_mut(side).take(side).enumerate() {
             if inside {
                 self.row_into(x as usize, y as usize + dy, row);

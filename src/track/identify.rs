@@ -84,11 +84,12 @@ impl Buckets {
         let clamp = |v: f64, end: usize| ((v / BUCKET_PX).max(0.0) as usize).min(end - 1);
         let (x0, x1) = (clamp(at.x - reach_px, self.across), clamp(at.x + reach_px, self.across));
         let (y0, y1) = (clamp(at.y - reach_px, self.down), clamp(at.y + reach_px, self.down));
-        (y0..=y1).flat_map(move |y| {
-            let row = y * self.across;
-            self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize
-        })
-        .map(|slot| self.items[slot] as usize)
+        (y0..=y1)
+            .flat_map(move |y| {
+                let row = y * self.across;
+                self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize
+            })
+            .map(|slot| self.items[slot] as usize)
     }
 }
 

@@ -11,17 +11,17 @@
 //!
 //! | paper | here | why |
 //! |---|---|---|
-//! | undistort the frame | lens and layers on *points* (`optics`); the frame only if asked for ([`Undistorted`]) | a remapped frame is interpolated: it costs milliseconds and blurs by up to half a pixel; points are exact |
+//! | undistort the frame | lens and layers on *points* (`optics`); the frame only if asked for ([`Undistorted`]) | a remapped frame is interpolated, which costs time for every pixel and blurs; points are exact |
 //! | Gaussian blur | only before the search of the whole frame | a centroid over a hundred grey pixels is the better filter, and a blur moves none |
 //! | circular mask | its pixels found once, as row spans of the raw frame | the same pixels, without touching a frame |
-//! | sharpen | on request ([`Steps::sharpen`]) | it lifts thresholded edges, but raises noise by half; half-height levels need none |
+//! | sharpen | on request ([`Steps::sharpen`]) | it lifts thresholded edges, but white noise five times (the root of 29); half-height levels need none |
 //! | grey | one channel, green unless asked otherwise ([`Channel`]) | the constants' indices are those of green: grey mixes three images that dispersion holds up to 2 px apart |
 //! | low / high threshold | half way between local ground and mark ([`Thresholds`]); the paper's fixed ones on request | an edge at half height is where the outline is, whatever the light |
-//! | morphology | on request; else blobs are judged by area and fullness | opening a 7 px dot eats a third of it |
-//! | components, centroids | the same in the search; then grey-weighted centroids against the local ground | a binary centroid of a 7 px dot is good to 0.1 px, a grey one to 0.02 |
+//! | morphology | on request; else blobs are judged by area and fullness | opening eats at the edge of dots that are seven pixels wide |
+//! | components, centroids | the same in the search; then grey-weighted centroids against the local ground | a binary centroid has whole pixels to count; a grey one of a 7 px dot is good to 0.02 px |
 //! | pyramidal Lucas-Kanade | where the pose and the last frame put each dot, then its centroid; flow on request ([`Motion`]) | flow drifts, centroids do not; the platform's part of the motion is known exactly from the white markers |
 //! | solvePnP | least squares on raw pixels through lens, layers and disc | plain PnP is biased by millimetres behind a sheet |
-//! | wrench linear in the pose | the springs' law by compression ([`Springs`]) | the stiffness of springs in a row of magnets changes by a tenth over the travel |
+//! | wrench linear in the pose | the springs' law by compression ([`Springs`]) | springs between magnets are not linear over their travel |
 
 mod dots;
 mod error;
@@ -47,11 +47,8 @@ pub use frame::{Frame, FrameFault};
 pub use options::{Channel, Motion, Reference, Steps, Thresholds, TrackOptions};
 pub use overlay::{OverlayError, overlay_png};
 pub use report::{CSV_HEADER, DOTS_CSV_HEADER, write_csv, write_dots_csv, write_json};
-pub use result::{DotResult, MarkerResult, Tracked};
+pub use result::{DotResult, MOST_FALSE_DOTS, MarkerResult, Tracked};
 pub use springs::Springs;
 pub use status::{MarkState, Problem, Problems};
 pub use tracker::Tracker;
 pub use undistort::Undistorted;
-
-#[cfg(test)]
-mod tests;

@@ -102,7 +102,8 @@ impl SensorModel {
             return Err(TrackError::at("mask", "is no circle in the undistorted frame"));
         }
         let springs = constants.springs.as_ref().map(Springs::new).transpose()?;
-        let deepest = constants.springs.as_ref().and_then(|s| s.stiffness_at.last()).map(|e| e.compression_mm);
+        let deepest =
+            constants.springs.as_ref().and_then(|s| s.stiffness_at.last()).map(|e| e.compression_mm);
         let most_shift_mm = deepest.map_or(MOST_SHIFT_MM, |d| d.clamp(0.5, 100.0) + 2.0);
         let markers = constants.markers();
         // Eight residuals less six of the pose: the solver's gate lets 1.84 times its noise pass as rms.
@@ -149,9 +150,12 @@ fn dots_of(constants: &Constants, optics: &SensorOptics) -> Result<Vec<DotModel>
             spacing_px: f64::INFINITY,
         };
         match model.look(optics, center_px) {
-            Some((_, shape)) if shape.radius_px > 0.0 && shape.radius_px <= MOST_RADIUS_PX => model.shape = shape,
+            Some((_, shape)) if shape.radius_px > 0.0 && shape.radius_px <= MOST_RADIUS_PX => {
+                model.shape = shape
+            }
             _ => {
-                let problem = format!("makes an image that is not seen whole or wider than {MOST_RADIUS_PX} px");
+                let problem =
+                    format!("makes an image that is not seen whole or wider than {MOST_RADIUS_PX} px");
                 return fault(index, ".diameter_mm", problem);
             }
         }
@@ -197,7 +201,10 @@ fn reach_of(
         match marker.image(optics) {
             Ok(image) => places.push(image.centroid_px),
             Err(limit) => {
-                return Err(TrackError::at(format!("white_markers[{index}]"), format!("is not seen at rest ({limit})")));
+                return Err(TrackError::at(
+                    format!("white_markers[{index}]"),
+                    format!("is not seen at rest ({limit})"),
+                ));
             }
         }
     }
@@ -206,7 +213,9 @@ fn reach_of(
     for down in [-1.0, 0.0, deepest_mm.unwrap_or(3.0).clamp(0.0, 100.0)] {
         for turn in 0..8 {
             let (sin, cos) = (f64::from(turn) * std::f64::consts::FRAC_PI_4).sin_cos();
-            for (shift, tilt, twist) in [(1.5, 0.0, 0.2), (0.0, 0.14, -0.2), (0.0, 0.0, 0.2), (1.0, 0.1, -0.2)] {
+            for (shift, tilt, twist) in
+                [(1.5, 0.0, 0.2), (0.0, 0.14, -0.2), (0.0, 0.0, 0.2), (1.0, 0.1, -0.2)]
+            {
                 let displacement = Displacement {
                     translation_mm: DVec3::new(shift * cos, shift * sin, -down),
                     rotation_rad: DVec3::new(-tilt * sin, tilt * cos, twist),

@@ -49,7 +49,7 @@ fn one(out: &mut impl Write, name: &str, value: Option<f64>) -> io::Result<()> {
     }
 }
 
-/// One JSON object with a line's end; the names are those of `shared` readers: `frame`, `status`, `pose`, `wrench`, ...
+/// One JSON object with a line's end: `frame`, `status`, `problems`, `pose`, `wrench`, `black_dots`, `white_markers`.
 ///
 /// # Errors
 /// Those of the writer.
@@ -75,7 +75,13 @@ pub fn write_json(out: &mut impl Write, tracked: &Tracked) -> io::Result<()> {
     six(out, "wrench_sd", tracked.wrench_sd.as_ref())?;
     write!(out, ",\"black_dots\":[")?;
     for (i, dot) in tracked.black_dots.iter().enumerate() {
-        write!(out, "{}{{\"id\":{},\"state\":\"{}\"", if i == 0 { "" } else { "," }, dot.id, dot.state.as_str())?;
+        write!(
+            out,
+            "{}{{\"id\":{},\"state\":\"{}\"",
+            if i == 0 { "" } else { "," },
+            dot.id,
+            dot.state.as_str()
+        )?;
         pair(out, "image_px", dot.image_px)?;
         pair(out, "centroid_px", dot.centroid_px)?;
         one(out, "sd_px", dot.sd_px)?;

@@ -97,7 +97,10 @@ impl Springs {
             return Err(TrackError::at("springs.stiffness", "has numbers that are not finite"));
         }
         if constants.stiffness_at.len() > MOST_ENTRIES {
-            return Err(TrackError::at("springs.stiffness_at", format!("has more than {MOST_ENTRIES} entries")));
+            return Err(TrackError::at(
+                "springs.stiffness_at",
+                format!("has more than {MOST_ENTRIES} entries"),
+            ));
         }
         let mut table: Vec<Entry> = Vec::with_capacity(constants.stiffness_at.len());
         for (index, entry) in constants.stiffness_at.iter().enumerate() {
@@ -109,7 +112,11 @@ impl Springs {
             }
             table.push(Entry { compression_mm: c, values: Values::of(&matrix_of(&entry.stiffness), c) });
         }
-        Ok(Self { at_mm: DVec3::from_array(constants.at_mm), stiffness: matrix_of(&constants.stiffness), table })
+        Ok(Self {
+            at_mm: DVec3::from_array(constants.at_mm),
+            stiffness: matrix_of(&constants.stiffness),
+            table,
+        })
     }
 
     /// The point that displacements and moments are stated about, rest frame, mm.
@@ -146,7 +153,11 @@ impl Springs {
         // Within half a step of the table's ends the cubic of the last piece goes on; farther it is held.
         let t = ((compression_mm - low.compression_mm) / step).clamp(-1.0, 2.0);
         let beyond = !(0.0..=1.0).contains(&t);
-        let (h00, h10) = if beyond && t < 0.0 { (1.0, t) } else { ((1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t), t * (1.0 - t) * (1.0 - t)) };
+        let (h00, h10) = if beyond && t < 0.0 {
+            (1.0, t)
+        } else {
+            ((1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t), t * (1.0 - t) * (1.0 - t))
+        };
         let (h00, h10, h01, h11) = if beyond && t < 0.0 {
             (h00, h10, 0.0, 0.0)
         } else if beyond {
@@ -184,7 +195,8 @@ impl Springs {
         let force = axial + DVec3::new(dot(&values.force[0]), dot(&values.force[1]), -0.5 * slope.energy(&q));
         let own = DVec3::new(values.secant[3], values.secant[4], values.secant[5]) * d[2];
         let by_turn = DVec3::new(dot(&values.turn[0]), dot(&values.turn[1]), dot(&values.turn[2]));
-        let moment = own + with_turn(displacement.rotation_rad) * by_turn + displacement.translation_mm.cross(force);
+        let moment =
+            own + with_turn(displacement.rotation_rad) * by_turn + displacement.translation_mm.cross(force);
         [force.x, force.y, force.z, moment.x, moment.y, moment.z]
     }
 

@@ -267,7 +267,11 @@ impl Tracker {
             None => {
                 let seen = self.discs.iter().flatten().count();
                 let few = seen < self.model.markers.len();
-                self.result.problems.add(if few { Problem::MarkersMissing } else { Problem::MarkersDoNotFit });
+                self.result.problems.add(if few {
+                    Problem::MarkersMissing
+                } else {
+                    Problem::MarkersDoNotFit
+                });
                 if let Some(pose) = self.pose {
                     // It was movable a frame ago; if not, the optics stay where they are.
                     let _ = self.optics.move_to(&pose);
@@ -504,7 +508,9 @@ impl Tracker {
                     nearest = (from, index);
                 }
             }
-            let Some(model) = self.model.dots.get(nearest.1).filter(|_| nearest.0.is_finite()) else { continue };
+            let Some(model) = self.model.dots.get(nearest.1).filter(|_| nearest.0.is_finite()) else {
+                continue;
+            };
             let part = blob.area_px / model.shape.area_px;
             let near = nearest.0 < 2.5 * model.spacing_px;
             if !own && near && (0.3..4.0).contains(&part) && self.result.false_dots.len() < MOST_FALSE_DOTS {
@@ -525,7 +531,9 @@ impl Tracker {
             let blob = self.identifier.blob_of.get(index).copied().flatten();
             let Some(blob) = blob.and_then(|b| self.scan.blobs().get(b)) else { continue };
             let shape = track.shape;
-            if let Ok(spot) = self.meter.measure(plane, blob.at_px, &shape, 0.3 * self.model.dots[index].spacing_px) {
+            if let Ok(spot) =
+                self.meter.measure(plane, blob.at_px, &shape, 0.3 * self.model.dots[index].spacing_px)
+            {
                 track.spot = Some(spot);
                 track.state = MarkState::Ok;
                 track.start_px = Some(spot.at_px);
@@ -551,7 +559,8 @@ impl Tracker {
         let known = refined.is_some();
         self.scratch.clear();
         let result = &mut self.result;
-        for ((track, model), dot) in self.tracks.iter_mut().zip(&self.model.dots).zip(&mut result.black_dots) {
+        for ((track, model), dot) in self.tracks.iter_mut().zip(&self.model.dots).zip(&mut result.black_dots)
+        {
             *dot = DotResult { id: model.id, state: track.state, ..DotResult::default() };
             if known && track.is_wanted() {
                 dot.undeformed_px = track.expected_px.map(|p| p - track.offset_px);
@@ -606,7 +615,9 @@ impl Tracker {
 
     fn tell_pose(&mut self, refined: Option<&Refined>) {
         let result = &mut self.result;
-        for ((marker, disc), told) in self.model.markers.iter().zip(&self.discs).zip(&mut result.white_markers) {
+        for ((marker, disc), told) in
+            self.model.markers.iter().zip(&self.discs).zip(&mut result.white_markers)
+        {
             let Some(disc) = disc else { continue };
             told.state = MarkState::Ok;
             told.centroid_px = Some(disc.centroid_px);

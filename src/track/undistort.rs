@@ -43,9 +43,11 @@ impl Undistorted {
                 let inside = |p: &DVec2| {
                     p.x >= 0.0 && p.y >= 0.0 && p.x < width as f64 - 1.0 && p.y < height as f64 - 1.0
                 };
-                from.push(raw.ok().filter(inside).map_or([-1, -1], |p| {
-                    [(256.0 * p.x).round() as i32, (256.0 * p.y).round() as i32]
-                }));
+                from.push(
+                    raw.ok()
+                        .filter(inside)
+                        .map_or([-1, -1], |p| [(256.0 * p.x).round() as i32, (256.0 * p.y).round() as i32]),
+                );
             }
         }
         Ok(Self { width, height, from })

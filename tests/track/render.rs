@@ -46,6 +46,8 @@ pub fn still(pose: Rigid) -> Picture<'static> {
 
 /// A frame and where things are in it.
 pub struct Drawn {
+    /// Without noise.
+    levels: Vec<f32>,
     pub bytes: Vec<u8>,
     /// By number, in the order of the constants: image of the centre and centroid of the outline.
     pub dots: Vec<Option<[DVec2; 2]>>,
@@ -67,7 +69,12 @@ impl Coverage {
             high = high.max(*p);
         }
         let clamp = |v: f64, end: usize| (v + 0.5).floor().clamp(0.0, end as f64 - 1.0) as usize;
-        let bounds = [clamp(low.x, self.width), clamp(low.y, self.height), clamp(high.x, self.width), clamp(high.y, self.height)];
+        let bounds = [
+            clamp(low.x, self.width),
+            clamp(low.y, self.height),
+            clamp(high.x, self.width),
+            clamp(high.y, self.height),
+        ];
         let [x0, y0, x1, y1] = bounds;
         for y in y0..=y1 {
             self.cells[y * self.width + x0..=y * self.width + x1].fill(0.0);
@@ -81,7 +88,9 @@ impl Coverage {
             }
             let (sign, top, bottom) = if a.y < b.y { (1.0, a, b) } else { (-1.0, b, a) };
             let slope = (bottom.x - top.x) / (bottom.y - top.y);
-            for y in (top.y.floor().max(y0 as f64) as usize)..=(bottom.y.floor().min(y1 as f64).max(0.0) as usize) {
+            for y in
+                (top.y.floor().max(y0 as f64) as usize)..=(bottom.y.floor().min(y1 as f64).max(0.0) as usize)
+            {
                 let (from, to) = (top.y.max(y as f64), bottom.y.min(y as f64 + 1.0));
                 if to <= from {
                     continue;
@@ -172,8 +181,9 @@ pub fn draw(constants: &Constants, rest: &SensorOptics, picture: &Picture) -> Dr
             let moved = (picture.displace)(p * (radius / p.length()));
             optics.project(moved).ok()
         };
-        let outline: Option<Vec<DVec2>> =
-            around(24).map(|a| see(at + (east * a.cos() + north * a.sin()) * (0.5 * dot.diameter_mm))).collect();
+        let outline: Option<Vec<DVec2>> = around(24)
+            .map(|a| see(at + (east * a.cos() + north * a.sin()) * (0.5 * dot.diameter_mm)))
+            .collect();
         let here = outline.zip(see(at)).filter(|_| !picture.missing.contains(&(dot.id as u32)));
         dots.push(here.map(|(outline, center)| {
             paint(&outline, &|x, _| ink * picture.membrane * shade(x));
@@ -195,10 +205,45 @@ pub fn draw(constants: &Constants, rest: &SensorOptics, picture: &Picture) -> Dr
             [center, centroid(&outline)]
         }));
     }
-    let code = |(pixel, level): (usize, &f64)| {
-        let noise = if picture.noise > 0.0 { picture.noise * noise(picture.seed, pixel) } else { 0.0 };
-        (level + noise).round().clamp(0.0, 255.0) as u8
-    };
-    let bytes = levels.iter().enumerate().map(code).collect();
-    Drawn { bytes, dots, markers }
+    let mut drawn =
+        Drawn { levels: levels.iter().map(|v| *v as f32).collect(), bytes: Vec::new(), dots, markers };
+    drawn.code(picture.noise, picture.seed);
+    drawn
+}
+
+impl Drawn {
+    /// The same picture with other noise.
+    pub fn code(&mut self, sd: f64, seed: u64) {
+        self.bytes.clear();
+        // One draw of noise in a strip, laid over the frame from another place on each row: cheap, and no row is like
+        // the next.
+        const STRIP: usize = 1 << 14;
+        let strip: Vec<f32> = (0..STRIP).map(|i| (sd * noise(seed, i)) as f32).collect();
+        let mut at = hash(seed) as usize;
+        for (pixel, level) in self.levels.iter().enumerate() {
+            if pixel % 509 == 0 {
+                at = hash(seed ^ pixel as u64) as usize;
+            }
+            at += 1;
+            let value = level + strip[at % STRIP];
+            self.bytes.push((value + 0.5).clamp(0.0, 255.0) as u8);
+        }
+    }
+
+    /// Blurred by the mean over squares of `2 reach + 1` pixels, twice.
+    pub fn blur(&mut self, width: usize, reach: usize) {
+        for _ in 0..2 {
+            for step in [1, width] {
+                let from = self.levels.clone();
+                for (pixel, to) in self.levels.iter_mut().enumerate() {
+                    let mut sum = 0.0;
+                    for k in 0..=2 * reach {
+                        let at = (pixel + k * step).saturating_sub(reach * step).min(from.len() - 1);
+                        sum += from[at];
+                    }
+                    *to = sum / (2 * reach + 1) as f32;
+                }
+            }
+        }
+    }
 }

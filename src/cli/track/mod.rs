@@ -233,7 +233,11 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     source.end()?;
     let frames: u64 = counts.values().sum();
     if frames == 0 {
-        return Err(input_fault(&arguments.frames[0], "holds no frame", "PNG or JPEG frames, a video, or raw"));
+        return Err(input_fault(
+            &arguments.frames[0],
+            "holds no frame",
+            "PNG or JPEG frames, a video, or raw",
+        ));
     }
     times.sort_unstable();
     let at = |part: f64| {

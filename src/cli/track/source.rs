@@ -31,7 +31,8 @@ impl FromStr for RawSize {
         let wrong = || "WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb, such as 640x480:rgb".to_owned();
         let (size, kind) = text.split_once(':').unwrap_or((text, "gray"));
         let (width, height) = size.split_once('x').ok_or_else(wrong)?;
-        let number = |t: &str| t.parse::<usize>().ok().filter(|v| (1..=1 << 14).contains(v)).ok_or_else(wrong);
+        let number =
+            |t: &str| t.parse::<usize>().ok().filter(|v| (1..=1 << 14).contains(v)).ok_or_else(wrong);
         let channels = match kind {
             "gray" | "grey" => 1,
             "rgb" => 3,
@@ -153,7 +154,11 @@ impl Source {
         let Some((mut child, path)) = self.video.take() else { return Ok(()) };
         match child.wait() {
             Ok(status) if status.success() => Ok(()),
-            Ok(status) => Err(input_fault(&path, format!("was not read to its end (ffmpeg: {status})"), "a whole video")),
+            Ok(status) => Err(input_fault(
+                &path,
+                format!("was not read to its end (ffmpeg: {status})"),
+                "a whole video",
+            )),
             Err(error) => Err(unreadable(&path, &error)),
         }
     }

@@ -114,7 +114,8 @@ impl Flow {
             shift = step_down(last, now, start, shift / scale)? * scale;
         }
         let to = from + shift;
-        let inside = to.x >= 0.0 && to.y >= 0.0 && to.x < self.now[0].width as f64 && to.y < self.now[0].height as f64;
+        let inside =
+            to.x >= 0.0 && to.y >= 0.0 && to.x < self.now[0].width as f64 && to.y < self.now[0].height as f64;
         inside.then_some(to)
     }
 }
@@ -165,7 +166,8 @@ fn halve(fine: &Level, coarse: &mut Level) {
     for y in 0..coarse.height {
         for x in 0..coarse.width {
             let (cx, cy) = (2 * x as i32, 2 * y as i32);
-            let row = |dy: i32| fine.at(cx - 1, cy + dy) + 2.0 * fine.at(cx, cy + dy) + fine.at(cx + 1, cy + dy);
+            let row =
+                |dy: i32| fine.at(cx - 1, cy + dy) + 2.0 * fine.at(cx, cy + dy) + fine.at(cx + 1, cy + dy);
             let sum = row(-1) + 2.0 * row(0) + row(1);
             coarse.bytes[y * coarse.width + x] = (sum / 16.0 + 0.5) as u8;
         }

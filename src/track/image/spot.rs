@@ -88,8 +88,7 @@ impl Stencil {
         let (mut disc, mut ring) = (Vec::new(), Vec::new());
         for y in -half..=half {
             for x in -half..=half {
-                let place =
-                    Place { x: x as f32, y: y as f32, index: ((y + half) * side + x + half) as u32 };
+                let place = Place { x: x as f32, y: y as f32, index: ((y + half) * side + x + half) as u32 };
                 let distance = f64::from(x * x + y * y).sqrt();
                 // The window may lie half a diagonal off the middle.
                 if distance < reach + 0.5 + 0.75 {
@@ -165,7 +164,10 @@ impl SpotMeter {
         let mut sums = Sums::default();
         for _ in 0..MOST_STEPS {
             let inside = |v: f64, end: usize| v > 0.0 && v < end as f64 - 1.0;
-            if !(inside(at.x, plane.width()) && inside(at.y, plane.height()) && at.distance(start) <= stray_px) {
+            if !(inside(at.x, plane.width())
+                && inside(at.y, plane.height())
+                && at.distance(start) <= stray_px)
+            {
                 return Err(NoSpot::Strayed);
             }
             let next = (at.x.round() as i32, at.y.round() as i32);
@@ -246,7 +248,8 @@ fn finish(sums: &Sums, ground: &Ground, shape: &Shape, at_px: DVec2) -> Result<S
     let area_px = sums.weight / contrast;
     let spread_px2 = sums.square / sums.weight;
     // One spot alone, whole: blur widens the spread, not the area.
-    let sound = area_px > 0.4 * shape.area_px && area_px < 2.2 * shape.area_px && spread_px2 > 0.3 * shape.spread_px2;
+    let sound =
+        area_px > 0.4 * shape.area_px && area_px < 2.2 * shape.area_px && spread_px2 > 0.3 * shape.spread_px2;
     if !sound {
         return Err(NoSpot::Misshapen);
     }
@@ -312,7 +315,10 @@ fn ground_of(stencil: &Stencil, window: &[f32]) -> Option<Ground> {
     }
     let [a, b, c] = plane_through(&s)?;
     // Sum of squared residuals of a least-squares fit: what the fit explains is taken off.
-    let left = f64::from(squares) - f64::from(a) * f64::from(s[6]) - f64::from(b) * f64::from(s[7]) - f64::from(c) * f64::from(s[8]);
+    let left = f64::from(squares)
+        - f64::from(a) * f64::from(s[6])
+        - f64::from(b) * f64::from(s[7])
+        - f64::from(c) * f64::from(s[8]);
     let freedom = (f64::from(s[0]) - 3.0).max(1.0);
     // Quantisation alone leaves a twelfth.
     let noise = (left / freedom).max(1.0 / 12.0).sqrt() as f32;

@@ -143,7 +143,7 @@ impl View {
         let mut at = start;
         let mut normal = SMatrix::<f64, 5, 5>::zeros();
         let (mut left, mut count) = (0.0, 0.0);
-        let mut levels = SVector::<f64, 3>::zeros();
+        let mut levels: Option<SVector<f64, 3>> = None;
         let mut settled = false;
         for _ in 0..MOST_STEPS {
             let inside = at.x > 2.0
@@ -153,12 +153,18 @@ impl View {
             if !(inside && at.distance(start) <= stray_px) {
                 return None;
             }
-            // First the levels alone, at this place; then the place with them.
-            let alone = self.sums(plane, at, None)?;
-            levels = solve_levels(&alone.normal, &alone.right)?;
-            let sums = self.sums(plane, at, Some(&levels))?;
+            // First the levels alone, at the start; then the place with them.
+            let known = match levels {
+                Some(known) => known,
+                None => {
+                    let alone = self.sums(plane, at, None)?;
+                    solve_levels(&alone.normal, &alone.right)?
+                }
+            };
+            let sums = self.sums(plane, at, Some(&known))?;
             let step = solve_all(&sums.normal, &sums.right)?;
             (normal, left, count) = (sums.normal, sums.left, sums.count);
+            levels = Some(known + step.fixed_rows::<3>(0));
             let shift = DVec2::new(step[3], step[4]).clamp_length_max(1.5);
             at += shift;
             if shift.length() < SETTLED_PX {
@@ -166,6 +172,7 @@ impl View {
                 break;
             }
         }
+        let levels = levels?;
         let rise = levels[1];
         let rms = (left / (count - 5.0).max(1.0)).max(1.0 / 12.0).sqrt();
         // What is a disc leaves a small part of its rise unexplained.
@@ -184,10 +191,19 @@ impl View {
         let (mut left, mut count) = (0.0, 0.0);
         let (cx, cy) = (at.x.round() as i32, at.y.round() as i32);
         let transposed = self.mm_by_px.transpose();
+        // A pixel is at most this many mm: beyond that and the ground's width nothing is looked at.
+        let far =
+            self.radius_mm + GROUND_PX * (self.mm_by_px.x_axis.length() + self.mm_by_px.y_axis.length());
+        // So far from the rim there is no dome.
+        let has_rim = self.place_mm.length() - far < self.rim_mm + far;
         for y in cy - self.half..=cy + self.half {
             for x in cx - self.half..=cx + self.half {
                 let u = self.mm_by_px * (DVec2::new(f64::from(x), f64::from(y)) - at);
-                let distance = u.length();
+                let square = u.length_squared();
+                if square > far * far {
+                    continue;
+                }
+                let distance = square.sqrt();
                 let slope = transposed * (u / distance.max(1e-9));
                 let steep = slope.length().max(1e-9);
                 let outside = (distance - self.radius_mm) / steep;
@@ -195,10 +211,14 @@ impl View {
                     continue;
                 }
                 let (disc, disc_slope) = edge(outside);
-                let place = self.place_mm + u;
-                let from_axis = place.length().max(1e-9);
-                let rim_slope = (transposed * (place / from_axis)).length().max(1e-9);
-                let (dome, _) = edge((from_axis - self.rim_mm) / rim_slope);
+                let dome = if has_rim {
+                    let place = self.place_mm + u;
+                    let from_axis = place.length().max(1e-9);
+                    let rim_slope = (transposed * (place / from_axis)).length().max(1e-9);
+                    edge((from_axis - self.rim_mm) / rim_slope).0
+                } else {
+                    0.0
+                };
                 let value = f64::from(plane.at(x, y));
                 let mut row = [1.0, disc, dome * (1.0 - disc), 0.0, 0.0];
                 let mut rest = value;

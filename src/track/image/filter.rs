@@ -35,10 +35,7 @@ pub type Pads = [Vec<u8>; 3];
 /// The binomial blur 1 2 1 / 2 4 2 / 1 2 1 over 16, OpenCV's `GaussianBlur` with a 3 x 3 kernel.
 pub fn blur(width: usize, height: usize, from: &[u8], to: &mut [u8], pads: &mut Pads) {
     by_rows(width, height, from, to, pads, |above, here, below, out| {
-        let w = out.len();
         let column = |i: usize| u16::from(above[i]) + 2 * u16::from(here[i]) + u16::from(below[i]);
-        let (above, here, below) = (&above[..w + 2], &here[..w + 2], &below[..w + 2]);
-        let _ = (above, here, below);
         for (i, to) in out.iter_mut().enumerate() {
             *to = ((column(i) + 2 * column(i + 1) + column(i + 2) + 8) >> 4) as u8;
         }

@@ -1,15 +1,21 @@
-//! Laying out and drawing: time against the number of dots.
+//! Laying out and drawing: time and memory against the number of dots.
 //!
-//! `cargo bench --bench layout`. The time for each number is the whole way from a resolved design to the bytes
-//! of every film; it grows in proportion to the number of dots.
+//! `cargo bench --bench layout`. First a table of one run for each number of dots, from a resolved design to the bytes
+//! of every film and the figures of the report, with the largest memory of the process on Linux; both must grow in
+//! proportion to the dots. Then criterion's medians of laying out and of writing.
 
 use std::hint::black_box;
+use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use domecast::artwork::{FilmLabel, film, to_dxf, to_pdf, to_svg, to_tiff};
 use domecast::design;
+use domecast::layout::report::LayoutReport;
 use domecast::layout::{Layout, LayoutSpec};
 use serde_json::{Value, json};
+
+/// Numbers of dots, with the resolution of the camera that tells them apart over that of the paper's.
+const SIZES: [(u32, f64); 4] = [(300, 1.0), (3_000, 2.0), (30_000, 6.0), (100_000, 12.0)];
 
 /// The paper's sensor with a camera of `scale` times the resolution and about `count` dots.
 fn design_with(count: u32, scale: f64, kind: &str) -> design::Design {
@@ -38,12 +44,63 @@ fn design_with(count: u32, scale: f64, kind: &str) -> design::Design {
     design::from_text(&value.to_string()).expect("a design")
 }
 
+/// The largest memory that the process has held since it was last asked, MB; nothing where Linux does not tell.
+fn peak_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kb: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    // The mark is set back to what is held now.
+    std::fs::write("/proc/self/clear_refs", "5").ok()?;
+    Some(kb / 1024.0)
+}
+
+fn write_films(layout: &Layout, label: &FilmLabel) -> usize {
+    let drawing = film(layout, 0, 1.3, label).expect("a drawing");
+    let films = (
+        to_svg(&drawing),
+        to_pdf(&drawing).expect("PDF"),
+        to_dxf(&drawing, 0.0005).expect("DXF"),
+        to_tiff(&drawing, 2400).expect("TIFF"),
+    );
+    let films = black_box(films);
+    films.0.len() + films.1.len() + films.2.len() + films.3.len()
+}
+
+/// One run of each size, with its memory.
+fn once(label: &FilmLabel) {
+    println!("pattern    dots    lay out s  write s  report s  us a dot  peak MB  films MB");
+    for kind in ["hexagonal", "fill"] {
+        for (count, scale) in SIZES {
+            let design = design_with(count, scale, kind);
+            let spec = LayoutSpec::of_design(&design).expect("a spec");
+            peak_mb();
+            let began = Instant::now();
+            let layout = Layout::new(&spec).expect("a layout");
+            let laid_out = began.elapsed().as_secs_f64();
+            let bytes = write_films(&layout, label);
+            let written = began.elapsed().as_secs_f64();
+            black_box(LayoutReport::new(&design, &spec, &layout));
+            let judged = began.elapsed().as_secs_f64();
+            println!(
+                "{kind:<9} {:>6}  {laid_out:>9.3}  {:>7.3}  {:>8.3}  {:>8.1}  {:>7.0}  {:>8.1}",
+                layout.dots.len(),
+                written - laid_out,
+                judged - written,
+                written / layout.dots.len() as f64 * 1e6,
+                peak_mb().unwrap_or(f64::NAN),
+                bytes as f64 / 1e6
+            );
+        }
+    }
+}
+
 fn lay_out_and_write(criterion: &mut Criterion) {
     let label = FilmLabel { design: "bench".into(), hash: "0".repeat(64) };
+    once(&label);
     for kind in ["hexagonal", "fill"] {
         let mut group = criterion.benchmark_group(kind);
         group.sample_size(10);
-        for (count, scale) in [(300, 1.0), (3_000, 2.0), (30_000, 6.0), (100_000, 12.0)] {
+        for (count, scale) in SIZES {
             let design = design_with(count, scale, kind);
             let spec = LayoutSpec::of_design(&design).expect("a spec");
             group.throughput(Throughput::Elements(u64::from(count)));
@@ -52,15 +109,7 @@ fn lay_out_and_write(criterion: &mut Criterion) {
             });
             let layout = Layout::new(&spec).expect("a layout");
             group.bench_with_input(BenchmarkId::new("write", count), &layout, |bench, layout| {
-                bench.iter(|| {
-                    let drawing = film(layout, 0, 1.3, &label).expect("a drawing");
-                    black_box((
-                        to_svg(&drawing),
-                        to_pdf(&drawing).expect("PDF"),
-                        to_dxf(&drawing, 0.0005).expect("DXF"),
-                        to_tiff(&drawing, 2400).expect("TIFF"),
-                    ))
-                });
+                bench.iter(|| write_films(layout, &label));
             });
         }
         group.finish();

@@ -36,23 +36,24 @@ struct Answer {
     rays: Vec<Option<[f64; 3]>>,
 }
 
-/// Rounds of which the fastest counts, for each piece by itself.
-const ROUNDS: usize = 15;
+/// Rounds of which the median counts, for each piece by itself.
+const ROUNDS: usize = 9;
 
 /// Points timed at a time: shorter than a scheduler's slice, so that a busy
 /// machine does not blur the comparison. The same in the script.
 const PIECE: usize = 1000;
 
-fn best_ns<I, O>(inputs: &[I], outputs: &mut [O], run: impl Fn(&[I], &mut [O])) -> f64 {
+fn median_ns<I, O>(inputs: &[I], outputs: &mut [O], run: impl Fn(&[I], &mut [O])) -> f64 {
     let mut total = 0.0;
     for (inputs, outputs) in inputs.chunks(PIECE).zip(outputs.chunks_mut(PIECE)) {
-        let mut best = f64::INFINITY;
-        for _ in 0..ROUNDS {
+        let mut seconds = [0.0; ROUNDS];
+        for seconds in &mut seconds {
             let start = Instant::now();
             run(black_box(inputs), black_box(outputs));
-            best = best.min(start.elapsed().as_secs_f64());
+            *seconds = start.elapsed().as_secs_f64();
         }
-        total += best;
+        seconds.sort_by(f64::total_cmp);
+        total += seconds[ROUNDS / 2];
     }
     total * 1e9 / inputs.len().max(1) as f64
 }
@@ -85,11 +86,11 @@ fn answer(case: Case) -> Answer {
     let mut rays = vec![Ok(DVec3::Z); pixels.len()];
     let mut hits: Vec<_> = pixels.iter().map(|&p| optics.trace(p)).collect();
     let fits = "slices of one length";
-    let lens_ns = best_ns(&pixels, &mut rays, |p, r| lens.unproject_all(p, r).expect(fits));
-    let trace_ns = best_ns(&pixels, &mut hits, |p, h| optics.trace_all(p, h).expect(fits));
+    let lens_ns = median_ns(&pixels, &mut rays, |p, r| lens.unproject_all(p, r).expect(fits));
+    let trace_ns = median_ns(&pixels, &mut hits, |p, h| optics.trace_all(p, h).expect(fits));
     let points: Vec<DVec3> = hits.iter().flatten().map(|hit| hit.surface_mm).collect();
     let mut back = vec![Ok(DVec2::ZERO); points.len()];
-    let project_ns = best_ns(&points, &mut back, |p, b| optics.project_all(p, b).expect(fits));
+    let project_ns = median_ns(&points, &mut back, |p, b| optics.project_all(p, b).expect(fits));
     Answer {
         name: case.name,
         max_field_angle_deg: lens.max_field_angle_rad().to_degrees(),

@@ -3,8 +3,9 @@
     python3 scripts/check_constants.py output/thumb24 [...]
 
 OpenCV: FileStorage, projectPoints against `image_px` where no layer refracts, solvePnP with the plain
-runtime's constants against the loads of `report/force.json`, through a refraction written here a second
-time. PyYAML: camera_info and camchain. yourdfpy: URDF. mujoco: MJCF, stepped under a known load.
+runtime's constants over the loads of `report/force.json`, through a refraction written here a second
+time; the bounds of the resolution by differences of it. PyYAML, and the rules of the programs that own the forms: camera_info
+and camchain. yourdfpy: URDF. mujoco: MJCF, stepped under a known load.
 """
 import json
 import pathlib
@@ -43,18 +44,16 @@ def refracted_rays(constants, pose, points):
     pupil, R = sensor_from_camera[:3, 3], sensor_from_camera[:3, :3]
     flat = [(l["index"], l["thickness_mm"]) for l in constants["optics"]["layers"][1:] if l["thickness_mm"]]
     gap = -sum(d for _, d in flat) - pupil[2]
-    rays = []
-    for point in points:
-        side = point[:2] - pupil[:2]
-        reach, low, high = np.linalg.norm(side), 0.0, 1.0
-        for _ in range(200):
-            s = 0.5 * (low + high)
-            far = gap * s / np.sqrt(1 - s * s) + sum(d * s / np.sqrt(n * n - s * s) for n, d in flat)
-            low, high = (s, high) if far < reach else (low, s)
+    side = np.asarray(points, float)[:, :2] - pupil[:2]
+    reach = np.linalg.norm(side, axis=1)
+    low, high = np.zeros(len(side)), np.ones(len(side))
+    for _ in range(60):
         s = 0.5 * (low + high)
-        direction = np.r_[s * side / max(reach, 1e-300), np.sqrt(1 - s * s)]
-        rays.append(R.T @ direction)
-    return np.array(rays)
+        far = gap * s / np.sqrt(1 - s * s) + sum(d * s / np.sqrt(n * n - s * s) for n, d in flat)
+        low, high = np.where(far < reach, s, low), np.where(far < reach, high, s)
+    s = 0.5 * (low + high)
+    direction = np.c_[s[:, None] * side / np.maximum(reach, 1e-300)[:, None], np.sqrt(1 - s * s)]
+    return direction @ R
 
 
 def unproject(camera, pixel, ray):
@@ -100,13 +99,32 @@ def displacement(pose, rest, at):
     return np.r_[moved[:3, :3] @ at + moved[:3, 3] - at, cv2.Rodrigues(moved[:3, :3])[0][:, 0]]
 
 
+def posed(d, at):
+    """rest_from_platform of a displacement about `at`."""
+    pose = np.eye(4)
+    pose[:3, :3] = cv2.Rodrigues(np.asarray(d[3:], float))[0]
+    pose[:3, 3] = at + d[:3] - pose[:3, :3] @ at
+    return pose
+
+
+def all_round(d):
+    """A displacement at the four quarter turns about the axis, and mirrored."""
+    for one in (d, d * [1, -1, 1, -1, 1, -1]):
+        for quarter in range(4):
+            c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][quarter]
+            turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], float)
+            yield np.r_[turn @ one[:3], turn @ one[3:]]
+
+
 def check_plain_runtime(constants, report):
+    """Mean wrench bias over the claimed loads, relative to the rest frame, against the linear law."""
     springs = constants["springs"]
     plain = springs.get("plain_runtime")
     if plain is None:
         check("plain runtime", False, "no plain_runtime in the constants")
         return
     at, Ku = np.array(springs["at_mm"]), np.array(constants["camera"]["undistorted_matrix"])
+    K = np.array(springs["stiffness"])
     true = np.array([m["position_mm"] for m in constants["white_markers"]])
     seen_at = np.array([m["apparent_position_mm"] for m in constants["white_markers"]])
     at_rest = undistorted_centroids(constants, np.eye(4))
@@ -114,19 +132,67 @@ def check_plain_runtime(constants, report):
     away = np.abs(own_rest - np.array(plain["rest_pose"])).max()
     check("solvePnP at rest gives rest_pose", away < 2e-4, f"{away:.1e}")
     left, naive = [], []
-    for claim in report["claims"]:
-        pixels = undistorted_centroids(constants, np.array(claim["pose"]))
-        wrench = np.array(claim["wrench"])
+    # The claims at a third, two thirds and in whole, and half and half with each other, all round.
+    claims = [np.array(claim["displacement"]) for claim in report["claims"]]
+    base = [d * part for d in claims for part in (1 / 3, 2 / 3, 1.0)]
+    base += [0.5 * (d + other) for i, one in enumerate(claims) for d in list(all_round(one))[:4] for other in claims[:i]]
+    loads = {tuple(np.round(d, 9)): d for one in base for d in all_round(one)}
+    for d in loads.values():
+        pixels = undistorted_centroids(constants, posed(d, at))
         own = displacement(solve(seen_at, pixels, Ku), np.array(plain["rest_pose"]), at)
         other = displacement(solve(true, pixels, Ku), naive_rest, at)
-        left.append(np.array(plain["stiffness"]) @ own - wrench)
-        naive.append(np.array(springs["stiffness"]) @ other - wrench)
+        left.append(np.array(plain["stiffness"]) @ own - K @ d)
+        naive.append(K @ other - K @ d)
     left, naive = np.abs(left).mean(0), np.abs(naive).mean(0)
+    refracts = any(l["index"] != 1.0 for l in constants["optics"]["layers"])
     for axis, name in enumerate(("Fx", "Fy", "Fz", "Mx", "My", "Mz")):
-        print(f"     {name}: plain runtime {left[axis]:.4f}, naive {naive[axis]:.4f}")
-    factor = 5 if any(l["index"] != 1.0 for l in constants["optics"]["layers"]) else 1
-    check("plain runtime beats the naive one on Fz", left[2] < naive[2] / factor,
-          f"{left[2]:.4f} < {naive[2]:.4f} / {factor}")
+        factor = 10 if refracts and name in ("Fz", "Mx", "My") else 1
+        # What cv2's own solver leaves, and a row that refraction does not bias. A bias of a fiftieth of what a single
+        # frame's noise does to the axis (thumb24-fisheye's Mx, My) does not matter, whatever the naive one is.
+        trifle = report["resolution_at_rest"]["wrench_sd"][axis] / 50
+        check(f"plain runtime against naive, {name}",
+              factor * left[axis] <= naive[axis] * 1.01 + 2e-4 or left[axis] <= min(trifle, naive[axis]),
+              f"{left[axis]:.5f}, naive {naive[axis]:.5f}, one frame's noise {50 * trifle:.5f}")
+
+
+def distorted_centroids(constants, pose):
+    """Centroids of the discs' images in the raw frame."""
+    found = []
+    phi = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    for marker in constants["white_markers"]:
+        ring = np.array(marker["position_mm"]) + marker["diameter_mm"] / 2 * np.stack(
+            [np.cos(phi), np.sin(phi), 0 * phi], axis=1)
+        x = lens_project(constants["camera"], refracted_rays(constants, pose, ring))
+        x, y = x - x.mean(0), np.roll(x - x.mean(0), -1, axis=0)
+        cross = x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]
+        found.append(((x + y) * cross[:, None]).sum(0) / (3 * cross.sum())
+                     + lens_project(constants["camera"], refracted_rays(constants, pose, ring)).mean(0))
+    return np.array(found)
+
+
+def check_resolution(constants, report):
+    """The bound of the report from a Jacobian by differences; without layers, from cv2.solvePnP under noise."""
+    springs, noise = constants["springs"], report["centroid_noise_px"]
+    at, K = np.array(springs["at_mm"]), np.array(springs["stiffness"])
+    step = np.array([1e-3] * 3 + [1e-4] * 3)
+    J = np.stack([(distorted_centroids(constants, posed(h, at)) - distorted_centroids(constants, posed(-h, at))).ravel()
+                  for h in np.diag(step)], axis=1) / (2 * step)
+    covariance = np.linalg.inv(J.T @ J) * noise ** 2
+    sd = np.sqrt(np.diag(covariance)) * np.r_[1, 1, 1, [180 / np.pi] * 3]
+    wrench = np.sqrt(np.diag(K @ covariance @ K.T))
+    said = report["resolution_at_rest"]
+    check("bound of the pose", np.allclose(sd, said["pose_sd"], rtol=2e-2), str(np.round(sd, 5)))
+    check("bound of the wrench", np.allclose(wrench, said["wrench_sd"], rtol=2e-2), str(np.round(wrench, 4)))
+    if any(l["index"] != 1.0 for l in constants["optics"]["layers"]) or constants["camera"]["distortion"]:
+        return
+    rng, camera = np.random.default_rng(1), np.array(constants["camera"]["matrix"])
+    points = np.array([m["position_mm"] for m in constants["white_markers"]])
+    exact, found = distorted_centroids(constants, np.eye(4)), []
+    for _ in range(1500):
+        found.append(displacement(solve(points, exact + rng.normal(0, noise, exact.shape), camera),
+                                  np.array(constants["camera"]["camera_from_sensor"]), at))
+    spread = np.std(found, axis=0) * np.r_[1, 1, 1, [180 / np.pi] * 3]
+    check("cv2.solvePnP under noise meets the bound", np.allclose(spread, said["pose_sd"], rtol=0.1), str(np.round(spread, 5)))
 
 
 def check_layer_free(constants):
@@ -152,27 +218,44 @@ def check_opencv(folder, constants):
 
 
 def check_ros(folder, constants):
+    """What camera_calibration_parsers' parse_yml.cpp reads, key by key: K 3x3, R 3x3, P 3x4, D of rows x cols numbers
+    (five for plumb_bob, eight for rational_polynomial, four for equidistant, as sensor_msgs says)."""
     info = yaml.safe_load((folder / "camera_info.yaml").read_text())
-    camera = constants["camera"]
-    want = {"kannala_brandt": "equidistant"}.get(camera["model"],
-                                                 "plumb_bob" if len(camera["distortion"]) <= 5 else "rational_polynomial")
-    shapes = all(info[n]["rows"] * info[n]["cols"] == len(info[n]["data"]) for n in
-                 ("camera_matrix", "distortion_coefficients", "rectification_matrix", "projection_matrix"))
-    keep = list(info["camera_matrix"]["data"]) == [v for row in camera["matrix"] for v in row]
-    keep &= info["distortion_coefficients"]["data"][:len(camera["distortion"])] == camera["distortion"]
-    check("camera_info.yaml", shapes and keep and info["distortion_model"] == want
-          and info["image_width"] == camera["width"], info["distortion_model"])
+    camera, good = constants["camera"], True
+    for name, rows, cols in (("camera_matrix", 3, 3), ("rectification_matrix", 3, 3), ("projection_matrix", 3, 4)):
+        node = info[name]
+        good &= (node["rows"], node["cols"], len(node["data"])) == (rows, cols, rows * cols)
+        good &= all(isinstance(v, float) for v in node["data"])
+    count = {"plumb_bob": 5, "rational_polynomial": 8, "equidistant": 4}[info["distortion_model"]]
+    node = info["distortion_coefficients"]
+    good &= node["rows"] * node["cols"] == len(node["data"]) == count
+    good &= all(isinstance(info[n], int) for n in ("image_width", "image_height")) and isinstance(info["camera_name"], str)
+    good &= set(info) == {"image_width", "image_height", "camera_name", "camera_matrix", "distortion_model",
+                          "distortion_coefficients", "rectification_matrix", "projection_matrix"}
+    keep = info["camera_matrix"]["data"] == [v for row in camera["matrix"] for v in row]
+    keep &= node["data"][:len(camera["distortion"])] == camera["distortion"] and not any(node["data"][len(camera["distortion"]):])
+    want = {"kannala_brandt": "equidistant"}.get(camera["model"], "plumb_bob" if len(camera["distortion"]) <= 5 else "rational_polynomial")
+    check("camera_info.yaml by its parser's rules", good and keep and info["distortion_model"] == want, info["distortion_model"])
 
 
 def check_kalibr(folder, constants):
+    """The rules of kalibr_common's CameraParameters: model, counts, floats, whole resolution, topic."""
     path, camera = folder / "kalibr.yaml", constants["camera"]
     sayable = camera["model"] != "brown_conrady" or not any(camera["distortion"][4:])
     check("kalibr.yaml stands where it can say the lens", path.exists() == sayable)
-    if path.exists():
-        cam = yaml.safe_load(path.read_text())["cam0"]
-        model = {"kannala_brandt": "equidistant", "pinhole": "none", "brown_conrady": "radtan"}[camera["model"]]
-        check("kalibr.yaml", cam["distortion_model"] == model and len(cam["intrinsics"]) == 4
-              and cam["resolution"] == [camera["width"], camera["height"]], model)
+    if not path.exists():
+        return
+    chain = yaml.safe_load(path.read_text())
+    cam = chain["cam0"]
+    counts = {"radtan": 4, "equidistant": 4, "none": 0}
+    good = list(chain) == ["cam0"] and cam["camera_model"] == "pinhole" and isinstance(cam["rostopic"], str)
+    good &= len(cam["intrinsics"]) == 4 and all(isinstance(v, float) and v >= 0 for v in cam["intrinsics"])
+    good &= len(cam["distortion_coeffs"]) == counts[cam["distortion_model"]]
+    good &= cam["resolution"] == [camera["width"], camera["height"]] and all(isinstance(v, int) for v in cam["resolution"])
+    model = {"kannala_brandt": "equidistant", "pinhole": "none", "brown_conrady": "radtan"}[camera["model"]]
+    K = camera["matrix"]
+    good &= cam["intrinsics"] == [K[0][0], K[1][1], K[0][2], K[1][2]] and cam["distortion_model"] == model
+    check("kalibr.yaml by its reader's rules", good and cam["distortion_coeffs"] == camera["distortion"][:counts[model]], model)
 
 
 def check_robots(folder, constants):
@@ -211,10 +294,17 @@ def check_robots(folder, constants):
     sign = -1.0 if got_force @ force < 0 else 1.0
     check("MJCF: force sensor", np.allclose(sign * got_force, force, atol=1e-4), str(np.round(got_force, 4)))
     check("MJCF: torque sensor", np.allclose(sign * got_moment, moment, atol=2e-5), str(np.round(got_moment, 5)))
+    # A small load, about the whole 6x6: the platform moves as the constants say, couplings included.
     K = np.array(constants["springs"]["stiffness"])
-    moved = (data.sensor("position").data - start) * 1e3
-    check("MJCF: springs give way as the constants say",
-          np.allclose(moved, force / np.diag(K)[:3], atol=0.02 * np.abs(moved).max() + 1e-3), str(np.round(moved, 4)))
+    small = np.r_[0.02, -0.01, -0.05, 0.2, 0.1, -0.15]
+    mujoco.mj_resetData(model, data)
+    for _ in range(20000):
+        lever = data.site("wrench").xpos - data.xipos[body]
+        data.xfrc_applied[body] = np.r_[small[:3], small[3:] * 1e-3 + np.cross(lever, small[:3])]
+        mujoco.mj_step(model, data)
+    moved = np.r_[(data.sensor("position").data - start) * 1e3, cv2.Rodrigues(data.site("wrench").xmat.reshape(3, 3))[0][:, 0]]
+    want = np.linalg.solve(K, small)
+    check("MJCF: the 6x6 gives way as the constants say", np.allclose(moved, want, rtol=2e-3, atol=2e-6), str(np.round(moved, 5)))
 
 
 for argument in sys.argv[1:]:
@@ -227,5 +317,7 @@ for argument in sys.argv[1:]:
     check_ros(folder, constants)
     check_kalibr(folder, constants)
     check_robots(folder, constants)
-    check_plain_runtime(constants, json.loads((root / "report" / "force.json").read_text()))
+    report = json.loads((root / "report" / "force.json").read_text())
+    check_plain_runtime(constants, report)
+    check_resolution(constants, report)
 sys.exit(1 if failed else 0)

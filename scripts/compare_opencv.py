@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """domecast and OpenCV on the same pixels in the same run: speed and error side by side.
 
-    scripts/compare_opencv.py [--points N] [--json FILE]
+    scripts/compare_opencv.py [--points N] [--crates] [--json FILE]
 
 Needs numpy and opencv-python; the Rust side is benches/peer.rs, built and run
-from here. Both sides use one thread. The lenses are tests/cases/published_lenses.json.
+from here, and with --crates the separate project in scripts/compare_crates. Both sides use one thread. The lenses are tests/cases/published_lenses.json.
 
 The truth of each pixel is known before it exists: rays are drawn first, evenly
 in field angle, and projected with the lens formula in extended precision
@@ -14,7 +14,6 @@ angle between the ray that comes back and the ray that was drawn.
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -27,10 +26,13 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 LENSES = ROOT / "tests" / "cases" / "published_lenses.json"
 WRONG_DEG = 0.01
-ROUNDS = 15
-# Timed in pieces of which each counts with its fastest round: a piece is shorter
-# than a scheduler's slice, so a busy machine does not blur the comparison.
+# Timed in pieces of which each counts with the median of its rounds: a piece is
+# shorter than a scheduler's slice, so a busy machine does not blur the comparison.
+# OpenCV and domecast take turns (PASSES), and the median over the turns is shown.
+ROUNDS = 9
+PASSES = 5
 PIECE = 1000
+CRATES = ("opencv-ros-camera", "apex-camera-models")
 CONVERGED = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 
 
@@ -83,12 +85,12 @@ def opencv(lens, pixels, mode):
         call = lambda part: cv2.undistortPoints(part, matrix, dist, None, None, None, CONVERGED)
     planes, total = [], 0.0
     for part in (points[i:i + PIECE] for i in range(0, len(points), PIECE)):
-        best = np.inf
+        seconds = []
         for _ in range(ROUNDS):
             start = time.perf_counter()
             plane = call(part)
-            best = min(best, time.perf_counter() - start)
-        total += best
+            seconds.append(time.perf_counter() - start)
+        total += np.median(seconds)
         planes.append(plane)
     plane = np.concatenate(planes)
     plane = plane.reshape(-1, 2)
@@ -103,27 +105,36 @@ def first_wrong(theta_deg, error):
     return float(theta_deg[wrong].min()) if wrong.any() else None
 
 
+def build_peer():
+    """benches/peer.rs as a program."""
+    lines = subprocess.run(["cargo", "bench", "--bench", "peer", "--no-run", "--message-format=json"],
+                           cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()
+    messages = [json.loads(line) for line in lines if line.startswith("{")]
+    return next(m["executable"] for m in messages
+                if m["reason"] == "compiler-artifact" and m["target"]["name"] == "peer" and m["executable"])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--points", type=int, default=10000)
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--peer", action="append", default=[], metavar="NAME=COMMAND",
-                        help="a program that is called as COMMAND IN.json OUT.json, reads the same cases and "
-                             "writes a list of {name, rays}, null where it gives none; only its error is shown")
+    parser.add_argument("--crates", action="store_true",
+                        help="also ask the Rust crates of scripts/compare_crates; only their error is shown")
+    parser.add_argument("--peer", type=Path, metavar="PROGRAM", help="benches/peer.rs where it is built already")
     args = parser.parse_args()
     cv2.setNumThreads(1)
     lenses = json.loads(LENSES.read_text())
     rng = np.random.default_rng(1)
     work = Path(tempfile.mkdtemp(prefix="compare-"))
 
-    # First pass without pixels: where does each domain end?
+    program = args.peer or build_peer()
+
     def ask(cases):
         (work / "in.json").write_text(json.dumps(cases))
-        subprocess.run(
-            ["cargo", "bench", "--quiet", "--bench", "peer", "--", str(work / "in.json"), str(work / "out.json")],
-            cwd=ROOT, check=True, env=dict(os.environ, RAYON_NUM_THREADS="1"))
+        subprocess.run([str(program), str(work / "in.json"), str(work / "out.json")], check=True)
         return json.loads((work / "out.json").read_text())
 
+    # First pass without pixels: where does each domain end?
     ends = [a["max_field_angle_deg"] for a in ask([dict(lens, pixels=[]) for lens in lenses])]
     drawn = []
     for lens, end in zip(lenses, ends):
@@ -132,14 +143,31 @@ def main():
         rng.shuffle(theta)
         drawn.append((theta, rng.uniform(0, 2 * np.pi, args.points)))
     pixels = [distort(lens, *rays) for lens, rays in zip(lenses, drawn)]
-    ours = ask([dict(lens, pixels=p.tolist()) for lens, p in zip(lenses, pixels)])
+    cases = [dict(lens, pixels=p.tolist()) for lens, p in zip(lenses, pixels)]
+    turns = []
+    for _ in range(PASSES):
+        ours = ask(cases)
+        theirs = [{mode: opencv(lens, p, mode) for mode in ("default", "converged")} for lens, p in zip(lenses, pixels)]
+        turns.append((ours, theirs))
+    for i, mine in enumerate(ours):
+        for key in ("lens_ns", "trace_ns", "project_ns"):
+            mine[key] = float(np.median([turn[0][i][key] for turn in turns]))
+        for mode in ("default", "converged"):
+            theirs[i][mode] = theirs[i][mode][0], float(np.median([turn[1][i][mode][1] for turn in turns]))
+        base = "default" if lenses[i]["model"] == "kannala_brandt" else "converged"
+        for key, name in (("lens_ns", "lens_times"), ("trace_ns", "whole_times")):
+            # The ratio of each turn, so that a change of the machine's speed falls out.
+            mine[name] = float(np.median([turn[1][i][base][1] / turn[0][i][key] for turn in turns[:-1]]
+                                         or [theirs[i][base][1] / mine[key]]))
     peers = {}
-    for peer in args.peer:
-        name, command = peer.split("=", 1)
-        subprocess.run([*command.split(), str(work / "in.json"), str(work / "peer.json")], check=True)
+    for name in CRATES if args.crates else ():
+        manifest = ROOT / "scripts" / "compare_crates" / "Cargo.toml"
+        subprocess.run(["cargo", "run", "--quiet", "--release", "--locked", "--manifest-path", str(manifest),
+                        "--target-dir", str(ROOT / "target" / "compare_crates"), "--", name,
+                        str(work / "in.json"), str(work / "peer.json")], check=True)
         peers[name] = json.loads((work / "peer.json").read_text())
 
-    print(f"OpenCV {cv2.__version__}, {args.points} points a lens, one thread, best of several rounds")
+    print(f"OpenCV {cv2.__version__}, {args.points} points a lens, one thread, medians")
     print("ns: nanoseconds a point; wrong: first field angle (degrees) with an error above 0.01 degrees\n")
     head = ("lens", "domain", "default ns", "wrong", "converged ns", "wrong", "domecast ns", "wrong",
             "worst error", "times", "whole way ns", "times", "project ns")
@@ -149,7 +177,7 @@ def main():
         truth, degrees = rays_of(theta, phi), np.degrees(theta)
         row = {"name": lens["name"], "model": lens["model"], "domain_deg": end, "limit_fold": mine["fold_angle_deg"]}
         for mode in ("default", "converged"):
-            rays, ns = opencv(lens, p, mode)
+            rays, ns = theirs[i][mode]
             error = angle_deg(rays, truth)
             row[mode] = {"ns": ns, "wrong_from_deg": first_wrong(degrees, error),
                          "error_at_60_deg": float(np.max(error[np.abs(degrees - 60) < 0.5])) if end > 60.5 else None}
@@ -158,9 +186,7 @@ def main():
         row["domecast"] = {"ns": mine["lens_ns"], "wrong_from_deg": first_wrong(degrees, error),
                            "worst_error_deg": float(np.nanmax(error)), "trace_ns": mine["trace_ns"],
                            "project_ns": mine["project_ns"], "unanswered": int(np.isnan(error).sum())}
-        base = row["default" if lens["model"] == "kannala_brandt" else "converged"]["ns"]
-        row["lens_times_faster"] = base / mine["lens_ns"]
-        row["whole_way_times_faster"] = base / mine["trace_ns"]
+        row["lens_times_faster"], row["whole_way_times_faster"] = mine["lens_times"], mine["whole_times"]
         show = lambda a: "never" if a is None else f"{a:.1f}"
         print("{:20}{:8.2f}{:12.0f}{:>7}{:14.0f}{:>7}{:13.1f}{:>7}{:13.1e}{:7.1f}{:14.1f}{:7.1f}{:12.1f}".format(
             lens["name"], end, row["default"]["ns"], show(row["default"]["wrong_from_deg"]),
@@ -172,8 +198,11 @@ def main():
             if all(r is None for r in rays):
                 continue
             error = angle_deg(np.array([r if r else [np.nan] * 3 for r in rays]), truth)
-            row[name] = first_wrong(degrees, error)
-            print(f"    {name}: wrong from {show(row[name])}, worst {np.nanmax(error):.2g} degrees")
+            refused = np.isnan(error)
+            row[name] = {"wrong_from_deg": first_wrong(degrees, error), "worst_error_deg": float(np.nanmax(error)),
+                         "refused_from_deg": float(degrees[refused].min()) if refused.any() else None}
+            print(f"    {name}: wrong from {show(row[name]['wrong_from_deg'])}, worst {np.nanmax(error):.2g} degrees, "
+                  f"refused from {show(row[name]['refused_from_deg'])}")
         rows.append(row)
     if args.json:
         args.json.write_text(json.dumps(rows, indent=1))

@@ -1,11 +1,54 @@
-//! domecast: from a parameter file to a dome-shaped camera tactile sensor.
+//! domecast: from a parameter file to a dome-shaped camera tactile sensor that can be printed, cast, assembled and
+//! calibrated.
+//!
+//! # The map
+//!
+//! ```text
+//! design file -> Design -+-> layout --> artwork     what to print
+//!   camera, optics ------+     |
+//!                        +-> parts ---> meshes      what to build
+//!                        +-> constants              what the runtime must know
+//! ```
+//!
+//! | to | look into |
+//! |---|---|
+//! | read a design, or tell what a field means | [`design`] |
+//! | turn pixels into points on the dome and back | [`optics`], over the lens models of [`camera`] |
+//! | lay out dots, judge their evenness, carry them to the plate | [`layout`], [`transfer`] |
+//! | draw films | [`artwork`] |
+//! | make platforms, mould, jig | [`parts`], over the solids of [`mesh`] |
+//! | know what the springs carry | [`mechanics`] |
+//! | find the platform's pose from its white markers | [`pose`] |
+//! | find blobs in a camera's frames | [`frames`] |
+//! | write and read what the runtime needs | [`constants`] |
+//! | replace nominal numbers by measured ones | [`calibrate`] |
+//! | do all of it | [`build`], and [`report`] for its page; [`compare`] two of them |
+//!
+//! Formulas and their sources stand with the functions; [`guide`] tells the five subjects in one page each.
+//!
+//! # In five lines
+//!
+//! ```
+//! use domecast::{design, glam::DVec2};
+//!
+//! let design = design::from_text(include_str!("../designs/thumb24.json"))?;
+//! let seen = design.optics().trace(DVec2::new(400.0, 240.0)).expect("inside the lens's domain");
+//! let back = design.optics().project(seen.surface_mm).expect("it was just seen");
+//! assert!(back.distance(DVec2::new(400.0, 240.0)) < 1e-9);
+//! # Ok::<(), design::DesignError>(())
+//! ```
+pub use glam;
+
 pub mod artwork;
 pub mod build;
 pub mod calibrate;
 pub mod camera;
 pub mod cli;
+pub mod compare;
 pub mod constants;
 pub mod design;
+pub mod frames;
+pub mod guide;
 pub mod layout;
 pub mod mechanics;
 pub mod mesh;
@@ -13,6 +56,7 @@ pub mod numeric;
 pub mod optics;
 pub mod parts;
 pub mod pose;
+pub mod report;
 pub mod sim;
 pub mod track;
 pub mod transfer;

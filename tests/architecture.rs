@@ -4,9 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the ground up; modules in one row do not import each other.
-const ROWS: [&[&str]; 11] = [
+const ROWS: [&[&str]; 13] = [
     &["numeric"],
-    &["camera", "mesh"],
+    &["camera", "mesh", "frames"],
     &["optics"],
     &["pose", "design"],
     &["mechanics", "transfer"],
@@ -14,7 +14,9 @@ const ROWS: [&[&str]; 11] = [
     &["artwork", "parts"],
     &["constants"],
     &["sim", "track", "calibrate"],
-    &["build", "accuracy", "report"],
+    &["accuracy", "report"],
+    &["build"],
+    &["compare"],
     &["cli"],
 ];
 

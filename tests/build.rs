@@ -1,23 +1,18 @@
 //! A build of every design, as a user runs it: the numbers in its files agree with each other.
 
+mod common;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
+use common::domecast;
 use serde_json::Value;
 
 const DESIGNS: [&str; 3] = ["thumb24", "thumb24-fisheye", "thumb24-pinhole"];
 
 fn design_path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("designs").join(format!("{name}.json"))
-}
-
-fn domecast(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_domecast"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("it runs")
 }
 
 fn build(name: &str, folder: &Path) -> PathBuf {

@@ -109,3 +109,21 @@ fn bad_tables_are_told_by_place_and_write_nothing() {
         assert!(!bench.path("constants.measured.json").exists());
     }
 }
+
+#[test]
+fn frames_that_cannot_be_read_are_told() {
+    let bench = Bench::new();
+    let frames = bench.path("frames");
+    fs::create_dir(&frames).expect("a folder");
+    let constants = bench.path("constants.json").display().to_string();
+    let told = || {
+        let ran = run(&["calibrate-optics", &frames.display().to_string(), &constants]);
+        assert_eq!(ran.status.code(), Some(1));
+        String::from_utf8_lossy(&ran.stderr).into_owned()
+    };
+    assert!(told().contains("holds no PNG frame"));
+    fs::write(frames.join("frame_0000.png"), b"no picture").expect("a file");
+    let text = told();
+    assert!(text.contains("frame_0000.png") && text.contains("is not a PNG picture"), "{text}");
+    assert!(!bench.path("constants.measured.json").exists());
+}

@@ -1,21 +1,16 @@
 //! What a person is told when the input is at fault: exit code 1, one message that names file, field,
 //! value and what is allowed, nothing written, and an earlier result left whole.
 
+mod common;
+
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
+use common::domecast;
 use serde_json::{Value, json};
 
 const DESIGN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/designs/thumb24.json");
-
-fn domecast(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_domecast"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("it runs")
-}
 
 fn design() -> Value {
     serde_json::from_str(&fs::read_to_string(DESIGN).expect("the design is there")).expect("it is JSON")

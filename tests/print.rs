@@ -184,11 +184,11 @@ fn a_measured_pad_prints_as_well_as_its_noise_allows() {
             let rejected = report["rejected"].as_array().expect("a list").len();
             assert!((2 * prints..=3 * prints + 1).contains(&rejected), "{report}");
             let rms_mm = report["residual_rms_mm"].as_f64().expect("a number");
-            assert!((0.75 * NOISE_MM..1.15 * NOISE_MM).contains(&rms_mm), "{rms_mm}");
+            assert!((0.85 * NOISE_MM..1.15 * NOISE_MM).contains(&rms_mm), "{rms_mm}");
             if prints > 1 {
                 let scatter_mm = report["scatter_mm"].as_f64().expect("a number");
-                // The view from outside foreshortens what scatters towards the rim.
-                assert!((0.75 * NOISE_MM..1.15 * NOISE_MM).contains(&scatter_mm), "{scatter_mm}");
+                // On the dome, though the view from outside foreshortens what scatters towards the rim.
+                assert!((0.9 * NOISE_MM..1.1 * NOISE_MM).contains(&scatter_mm), "{scatter_mm}");
             }
             let run = domecast(&["build", "new.json", "--out", "second"], at);
             assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
@@ -233,6 +233,24 @@ fn a_table_at_fault_is_refused_with_its_line() {
         assert!(message.contains("measured.csv") && message.contains(place), "{table}: {message}");
         assert!(message.contains(problem), "{table}: {message}");
         assert!(!at.join("new.json").exists());
+    }
+    // Marks that were found on one line, a mirrored picture and inches are named.
+    let line: String = (0..14).map(|id| format!("{id},{},0\n", 0.3 * f64::from(id))).collect();
+    let marks: Vec<(u32, DVec2)> = {
+        assert!(domecast(&["build", "design.json", "--out", "built"], at).status.success());
+        marks(&at.join("built/artwork/print-target.svg"))
+    };
+    let rows = |x: f64, y: f64| -> String {
+        marks.iter().map(|(id, at)| format!("{id},{},{}\n", at.x * x, at.y * y)).collect()
+    };
+    for (rows, problem) in
+        [(line, "map"), (rows(1.0, -1.0), "turned over"), (rows(1.0 / 25.4, 1.0 / 25.4), "wrong unit")]
+    {
+        fs::write(at.join("measured.csv"), format!("id,x_mm,y_mm\n{rows}")).expect("written");
+        let run = domecast(&["calibrate-print", "measured.csv", "design.json", "--out", "new.json"], at);
+        let message = String::from_utf8(run.stderr).expect("UTF-8");
+        assert_eq!(run.status.code(), Some(1), "{message}");
+        assert!(message.contains("measured.csv") && message.contains(problem), "{problem}: {message}");
     }
     // Marks that were all mistaken give no map.
     let mut chance = Chance(7);

@@ -1,21 +1,24 @@
 //! Drawings as PDF: one page at 1:1, vector, each layer an optional-content group that a viewer can hide.
+//!
+//! Notes are drawn in strokes, so that no reader can put another font in place of theirs; the words lie over them
+//! as invisible text, to be searched and copied.
 
 use std::io::Write;
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use glam::DVec2;
+use pdf_writer::types::TextRenderingMode;
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 
 use super::RenderError;
-use super::drawing::{Anchor, Drawing, Ink, Item, Path, Segment, Text};
+use super::drawing::{Drawing, Ink, Item, Path, Segment, Text};
+use super::strokes;
 
 /// PDF's unit is a point, 1/72 inch.
 const POINTS_PER_MM: f64 = 72.0 / 25.4;
 /// Height of the capitals of Helvetica over its size (Adobe's metrics).
 const CAPITALS: f64 = 0.718;
-/// Mean width of Helvetica's letters over its size; for centring a line.
-const MEAN_WIDTH: f64 = 0.5;
 
 /// The drawing as a PDF file. Coordinates are written in mm; the page's transform turns them into points.
 ///
@@ -122,13 +125,28 @@ fn trace(content: &mut Content, path: &Path) {
 }
 
 fn write(content: &mut Content, text: &Text) {
-    let size = text.height_mm / CAPITALS;
-    let back = match text.anchor {
-        Anchor::Start => 0.0,
-        Anchor::Middle => 0.5 * MEAN_WIDTH * size * text.words.chars().count() as f64,
-    };
+    content.set_line_width(strokes::pen_mm(text.height_mm) as f32);
+    let strokes = strokes::of_text(text);
+    for stroke in &strokes {
+        for (i, point) in stroke.iter().enumerate() {
+            let (x, y) = xy(*point);
+            if i == 0 {
+                content.move_to(x, y)
+            } else {
+                content.line_to(x, y)
+            };
+        }
+    }
+    content.stroke();
+    let Some(first) = strokes.first().and_then(|stroke| stroke.first()) else { return };
     // WinAnsi agrees with ASCII; what lies beyond it has no place in a film's notes.
     let bytes: Vec<u8> = text.words.chars().map(|c| if c.is_ascii() { c as u8 } else { b'?' }).collect();
-    let (x, y) = xy(text.at - DVec2::new(back, 0.0));
-    content.begin_text().set_font(Name(b"F1"), size as f32).next_line(x, y).show(Str(&bytes)).end_text();
+    let (x, y) = xy(DVec2::new(first.x, text.at.y));
+    content
+        .begin_text()
+        .set_text_rendering_mode(TextRenderingMode::Invisible)
+        .set_font(Name(b"F1"), (text.height_mm / CAPITALS) as f32)
+        .next_line(x, y)
+        .show(Str(&bytes))
+        .end_text();
 }

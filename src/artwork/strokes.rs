@@ -1,16 +1,19 @@
-//! A lettering of straight strokes, for pictures: a raster has no fonts, and a film must not depend on any.
+//! A lettering of straight strokes: a raster has no fonts, and a film must not depend on any. A reader that lacks a
+//! font takes another, and its wider letters run off the sheet.
 //!
 //! Letters stand on a grid 4 wide and 6 high and are drawn in capitals. Each glyph is a list of strokes, each
 //! stroke a list of grid points "xy".
 
 use glam::DVec2;
 
+use super::drawing::{Anchor, Text};
+
 /// Height of the capitals, grid units.
 const HEIGHT: f64 = 6.0;
 /// From one letter to the next, grid units.
 const ADVANCE: f64 = 5.5;
 /// Width of the pen, grid units.
-pub(super) const PEN: f64 = 0.7;
+const PEN: f64 = 0.7;
 
 /// The strokes of a line of text, mm: base line at `at`, capitals `height_mm` high. A character that has no
 /// glyph is drawn as an empty box.
@@ -30,8 +33,22 @@ pub(super) fn strokes(words: &str, at: DVec2, height_mm: f64) -> Vec<Vec<DVec2>>
     lines
 }
 
+/// The strokes of a text where it stands in its drawing, mm.
+pub(super) fn of_text(text: &Text) -> Vec<Vec<DVec2>> {
+    let back = match text.anchor {
+        Anchor::Start => 0.0,
+        Anchor::Middle => 0.5 * width_mm(&text.words, text.height_mm),
+    };
+    strokes(&text.words, text.at - DVec2::new(back, 0.0), text.height_mm)
+}
+
+/// Width of the pen that draws letters of this height, mm.
+pub(super) fn pen_mm(height_mm: f64) -> f64 {
+    PEN * height_mm / HEIGHT
+}
+
 /// Length of a line of text, mm.
-pub(super) fn width_mm(words: &str, height_mm: f64) -> f64 {
+fn width_mm(words: &str, height_mm: f64) -> f64 {
     words.chars().count() as f64 * ADVANCE * height_mm / HEIGHT
 }
 

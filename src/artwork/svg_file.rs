@@ -3,17 +3,18 @@
 //! One user unit is one millimetre. SVG's y runs down, the drawing's up: a point (x, y) of the drawing is
 //! written as (x, -y), and nothing else is changed, so that a reader gets the drawing's coordinates back by
 //! turning one sign.
+//!
+//! Notes are drawn in strokes, so that they look alike without any font; each line carries its words as a title,
+//! which readers show and programs can search.
 
 use std::fmt::Write;
 
 use svg::Document;
-use svg::node::element::{Description, Group, Path as SvgPath, Text as SvgText, Title};
+use svg::node::element::{Description, Group, Path as SvgPath, Title};
 use svg::node::{Node, Value};
 
-use super::drawing::{Anchor, Drawing, Ink, Item, Layer, Path, Segment, Shape, Text};
-
-/// Height of the capitals as a share of the font size, of the common sans-serif fonts.
-const CAPITALS: f64 = 0.716;
+use super::drawing::{Drawing, Ink, Item, Layer, Path, Segment, Shape, Text};
+use super::strokes;
 
 /// The drawing as an SVG file.
 pub fn to_svg(drawing: &Drawing) -> Vec<u8> {
@@ -80,17 +81,23 @@ fn path(shape: &Shape) -> SvgPath {
     path
 }
 
-fn text(line: &Text) -> SvgText {
-    let mut text = SvgText::new(line.words.as_str())
-        .set("x", number(line.at.x))
-        .set("y", number(-line.at.y))
-        .set("font-family", "Liberation Sans, Arial, Helvetica, sans-serif")
-        .set("font-size", number(line.height_mm / CAPITALS))
-        .set("fill", "#000000");
-    if line.anchor == Anchor::Middle {
-        text.assign("text-anchor", "middle");
+/// A line of text: one path of strokes.
+fn text(line: &Text) -> SvgPath {
+    let mut data = String::new();
+    for stroke in strokes::of_text(line) {
+        let mut command = 'M';
+        for point in stroke {
+            let _ = write!(data, "{command}{},{}", number(point.x), number(-point.y));
+            command = 'L';
+        }
     }
-    text
+    SvgPath::new()
+        .set("class", "note")
+        .set("d", data)
+        .set("fill", "none")
+        .set("stroke", "#000000")
+        .set("stroke-width", number(strokes::pen_mm(line.height_mm)))
+        .add(Title::new(line.words.as_str()))
 }
 
 fn path_data(path: &Path) -> Value {

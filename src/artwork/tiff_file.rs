@@ -11,7 +11,7 @@ use tiff::encoder::{Rational, TiffEncoder};
 use tiff::tags::{CompressionMethod, PhotometricInterpretation, ResolutionUnit, Tag};
 use tiny_skia::{FillRule, Mask, PathBuilder, Stroke, Transform};
 
-use super::drawing::{Drawing, Ink, Item, Path, Segment, Shape, Text};
+use super::drawing::{Drawing, Ink, Item, Path, Segment, Shape};
 use super::{RenderError, strokes};
 
 /// Rows of a band: also the rows of a strip.
@@ -121,8 +121,8 @@ fn ink(drawing: &Drawing, per_mm: f64, to_px: &impl Fn(DVec2) -> DVec2) -> Vec<I
                 add(pixels(path, to_px).and_then(|path| stroked(&path, width_mm * per_mm)));
             }
             Item::Text(text) => {
-                for line in lettering(text) {
-                    let pen = strokes::PEN * text.height_mm / 6.0 * per_mm;
+                for line in strokes::of_text(text) {
+                    let pen = strokes::pen_mm(text.height_mm) * per_mm;
                     add(Path::polyline(&line, false)
                         .ok()
                         .and_then(|path| pixels(&path, to_px))
@@ -132,14 +132,6 @@ fn ink(drawing: &Drawing, per_mm: f64, to_px: &impl Fn(DVec2) -> DVec2) -> Vec<I
         }
     }
     inked
-}
-
-fn lettering(text: &Text) -> Vec<Vec<DVec2>> {
-    let back = match text.anchor {
-        super::drawing::Anchor::Start => 0.0,
-        super::drawing::Anchor::Middle => 0.5 * strokes::width_mm(&text.words, text.height_mm),
-    };
-    strokes::strokes(&text.words, text.at - DVec2::new(back, 0.0), text.height_mm)
 }
 
 fn stroked(path: &tiny_skia::Path, width_px: f64) -> Option<tiny_skia::Path> {

@@ -6,7 +6,6 @@
 
 pub mod check;
 mod manifest;
-pub mod sight;
 mod tree;
 
 pub use manifest::{
@@ -24,6 +23,7 @@ use crate::layout::{Layout, LayoutError, LayoutSpec};
 use crate::mechanics::{Check, claims_of, suspension_of};
 use crate::numeric::Rigid;
 use crate::parts::{self, PartError};
+use crate::report;
 
 /// Why a build could not be made.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -87,6 +87,26 @@ pub struct Build {
     pub manifest: Manifest,
     /// Number of dots.
     pub dot_count: usize,
+    /// What the layout comes to, a sentence each.
+    pub headlines: Vec<String>,
+}
+
+impl Build {
+    /// Lets an open page see that it is out of date: adds the script that asks, and what it asks for. The files
+    /// of a watched build differ from those of a plain one in this alone.
+    pub fn keep_fresh(&mut self) {
+        const PAGE: &str = "report/index.html";
+        const STAMP: &str = "report/fresh-stamp.js";
+        let page = self.tree.files().find(|(path, _)| *path == PAGE).map(|(_, bytes)| bytes.to_vec());
+        let Some(page) = page.and_then(|bytes| String::from_utf8(bytes).ok()) else { return };
+        self.tree.add(PAGE, report::watched(&page).into_bytes());
+        self.tree.add(STAMP, report::stamp(&self.manifest.design.sha256).into_bytes());
+        // the manifest lists all files but itself
+        self.tree.remove(MANIFEST_NAME);
+        let Manifest { design, parts, warnings, .. } = self.manifest.clone();
+        self.manifest = Manifest::new(design, parts, warnings, &self.tree);
+        self.tree.add(MANIFEST_NAME, pretty(&self.manifest));
+    }
 }
 
 /// Makes everything; `step` is told what is being made. Nothing is written to the disk.
@@ -95,7 +115,7 @@ pub struct Build {
 /// The first fault of the design that only shows when it is laid out, loaded or made.
 pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
     make(design, step).map_err(|error| match error {
-        BuildError::Design(error) => with_value(design, *error).into(),
+        BuildError::Design(error) => design.beside_suspicions(with_value(design, *error)).into(),
         ours @ BuildError::Ours(_) => ours,
     })
 }
@@ -111,25 +131,35 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
     let sha256 = sha256_hex(design.text().as_bytes());
 
     step("trying the claimed loads");
-    try_claims(design)?;
+    let sight = try_claims(design)?;
     step("laying out the dots");
     let (spec, layout) = lay_out(design)?;
     step("writing the constants");
-    let springs = constants::springs_of(design)?;
+    let springs = constants::springs_of(design, sight)?;
     let constants = constants::with_springs(design, &layout, &springs)?;
     tree.add("constants/constants.json", constants.to_json().into_bytes());
     // four pieces of work that share nothing but what they read, on as many threads as there are
     step("drawing the artwork, making the parts, driving the loads to their limits");
     let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
     let ((films, judged), (parts, forces)) = rayon::join(
-        || rayon::join(|| artwork::files(&spec, &layout, &label), || judge(design, &spec, &layout)),
-        || rayon::join(|| make_parts(design, &layout), || constants::force_report(design, &springs)),
+        || {
+            rayon::join(
+                || artwork::files(&spec, &layout, &label),
+                || LayoutReport::new(design, &spec, &layout),
+            )
+        },
+        || {
+            rayon::join(
+                || make_parts(design, &layout, &springs),
+                || constants::force_report(design, &springs),
+            )
+        },
     );
     for file in films? {
         tree.add(file.path, file.bytes);
     }
-    tree.add("artwork/layout.json", judged);
-    let (made, files) = parts?;
+    tree.add("artwork/layout.json", pretty(&judged));
+    let MadeParts { made, files, poses } = parts?;
     for file in files {
         tree.add(file.path, file.bytes);
     }
@@ -143,53 +173,78 @@ fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError
             bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
         })
         .collect();
-    for (path, text) in forces?.files() {
+    let forces = forces?;
+    for (path, text) in forces.files() {
         tree.add(path, text.into_bytes());
     }
     step("writing what other programs read");
     tree.add("constants/constants.schema.json", constants::Constants::schema().into_bytes());
-    let forms = constants::formats::format_files(design, &constants, &made, &Default::default());
+    let forms = constants::formats::format_files(design, &constants, &made);
     for (path, text) in forms.files {
         tree.add(path, text.into_bytes());
     }
     warnings.extend(forms.left_out.into_iter().map(|message| Warning { field: "constants".into(), message }));
     warnings.extend(
-        layout.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
+        judged.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
     );
+
+    step("writing the page");
+    let told: Vec<(String, String)> =
+        warnings.iter().map(|warning| (warning.field.clone(), warning.message.clone())).collect();
+    let page = report::page(&report::Subject {
+        design,
+        layout: &layout,
+        judged: &judged,
+        constants: &constants,
+        forces: &forces,
+        parts: &made,
+        poses: &poses,
+        warnings: &told,
+        hash: &sha256,
+        files: &tree.files().collect::<Vec<_>>(),
+    });
+    tree.add("report/index.html", page.into_bytes());
 
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
     let manifest = Manifest::new(record, records, warnings, &tree);
-    // numbers, strings and lists only: nothing here can fail to be written
-    let mut text = serde_json::to_string_pretty(&manifest).unwrap_or_default();
-    text.push('\n');
-    tree.add(MANIFEST_NAME, text.into_bytes());
-    Ok(Build { tree, manifest, dot_count: layout.dots.len() })
+    tree.add(MANIFEST_NAME, pretty(&manifest));
+    Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines: judged.headlines() })
 }
 
-/// The figures of the layout, as a file.
-fn judge(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<u8> {
+/// A file for programs.
+fn pretty(value: &impl serde::Serialize) -> Vec<u8> {
     // numbers, strings and lists only: nothing here can fail to be written
-    let mut text = serde_json::to_string_pretty(&LayoutReport::new(design, spec, layout)).unwrap_or_default();
+    let mut text = serde_json::to_string_pretty(value).unwrap_or_default();
     text.push('\n');
     text.into_bytes()
 }
 
 /// The parts, checked in their assembly, and their files.
+struct MadeParts {
+    made: Vec<parts::Part>,
+    files: Vec<parts::PartFile>,
+    /// Names of the positions at which the assembly was checked.
+    poses: Vec<String>,
+}
+
 fn make_parts(
     design: &Design,
     layout: &Layout,
-) -> Result<(Vec<parts::Part>, Vec<parts::PartFile>), PartError> {
-    let measures = parts::Measures::of(design)?;
-    let made = parts::build(&measures, &layout.hits)?;
-    let assembly = parts::Assembly::of(&measures, &made)?;
-    parts::check_assembly(&measures, &made, &assembly)?;
-    let files = parts::files(design, &measures, &made, &assembly)?;
-    Ok((made, files))
+    springs: &constants::DesignSprings,
+) -> Result<MadeParts, PartError> {
+    let measures = springs.sight.measures()?;
+    let made = parts::build(measures, &layout.hits)?;
+    let assembly = parts::Assembly::of(measures, &made)?;
+    parts::check_assembly(measures, &made, &assembly)?;
+    let files = parts::files(design, measures, &made, &assembly)?;
+    let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
+    Ok(MadeParts { made, files, poses })
 }
 
-/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight.
-fn try_claims(design: &Design) -> Result<(), DesignError> {
-    sight::markers(design, &Rigid::identity(), "at rest")?;
+/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight; gives back who watches them.
+fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
+    let sight = constants::MarkerSight::of(design);
+    sight.require(design, &Rigid::identity(), "at rest")?;
     let suspension = suspension_of(design)?;
     for (index, (claim, case)) in
         design.sections().loads.claims.iter().zip(claims_of(design, &suspension)).enumerate()
@@ -223,9 +278,9 @@ fn try_claims(design: &Design) -> Result<(), DesignError> {
             )
         })?;
         let pose = balance.displacement.to_pose(suspension.at_mm());
-        sight::markers(design, &pose, &format!("under the load \"{}\"", claim.name))?;
+        sight.require(design, &pose, &format!("under the load \"{}\"", claim.name))?;
     }
-    Ok(())
+    Ok(sight)
 }
 
 /// The layout of a design's dots, and what it was made from.

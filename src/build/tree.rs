@@ -71,6 +71,11 @@ impl Tree {
         self.files.insert(path.into(), bytes);
     }
 
+    /// Takes a file out; one that is not there is no fault.
+    pub fn remove(&mut self, path: &str) {
+        self.files.remove(path);
+    }
+
     /// The files in order of their paths.
     pub fn files(&self) -> impl Iterator<Item = (&str, &[u8])> {
         self.files.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice()))

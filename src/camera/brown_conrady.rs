@@ -22,24 +22,20 @@ use glam::{DMat2, DVec2, DVec3};
 use nalgebra::{Matrix2x3, Matrix3x2};
 
 use super::LensLimit;
-use super::inverse::{RadialInverse, Start};
-use super::limit::{Domain, END_ROUNDING};
+use super::brown_formula::{factor_of, first_fold, image_of, image_with_slope, radius};
+use super::inverse::{LEFT_OVER, RadialInverse};
+use super::lanes::Lanes;
+use super::limit::Domain;
 use super::perspective::{
     NEAR_RIGHT_ANGLE_RAD, half_view_rad, plane_by_ray, plane_point, ray_by_image, ray_of,
 };
-use crate::numeric::Polynomial;
+use crate::numeric::{MAX_ITERATIONS, bracketed_newton};
 
-/// Relative distance that the domain keeps from a pole of the rational form.
-const POLE_MARGIN: f64 = 1e-9;
+/// Most first Newton steps in two dimensions; a lens has as many as it needs.
+const MOST_FIRST_STEPS: u32 = 5;
 
-/// Undamped Newton steps in two dimensions before the damped solve begins.
-const QUICK_PLANE_STEPS: u32 = 5;
-
-/// Newton steps in two dimensions, damped ones included.
-const MAX_PLANE_STEPS: u32 = 100;
-
-/// Halvings of one damped step.
-const MAX_HALVINGS: u32 = 30;
+/// No inverse takes more evaluations of the formula than this.
+pub(super) const MAX_STEPS: u32 = MOST_FIRST_STEPS + 2 + 1 + MAX_ITERATIONS;
 
 /// The lens of `plumb_bob` and `rational_polynomial` calibrations.
 #[derive(Debug, Clone)]
@@ -55,28 +51,8 @@ pub(super) struct BrownConrady {
     tangential_bend: f64,
     max_radius: f64,
     inverse: RadialInverse,
-}
-
-/// `L`, and its derivative by `u`.
-#[inline]
-fn factor(n: &[f64; 3], d: &[f64; 3], u: f64) -> (f64, f64) {
-    let top = 1.0 + u * (n[0] + u * (n[1] + u * n[2]));
-    let top_slope = n[0] + u * (2.0 * n[1] + u * 3.0 * n[2]);
-    if *d == [0.0; 3] {
-        return (top, top_slope);
-    }
-    let inverse = 1.0 / (1.0 + u * (d[0] + u * (d[1] + u * d[2])));
-    let bottom_slope = d[0] + u * (2.0 * d[1] + u * 3.0 * d[2]);
-    let value = top * inverse;
-    (value, (top_slope - value * bottom_slope) * inverse)
-}
-
-/// `rho = r L` and its derivative by `r`.
-#[inline]
-fn radius(n: &[f64; 3], d: &[f64; 3], r: f64) -> (f64, f64) {
-    let u = r * r;
-    let (value, slope) = factor(n, d, u);
-    (r * value, value + 2.0 * u * slope)
+    /// Newton steps that the tangential terms need before the last ones.
+    first_steps: u32,
 }
 
 impl BrownConrady {
@@ -96,7 +72,21 @@ impl BrownConrady {
         let inverse = RadialInverse::new(|r| radius(&numerator, &denominator, r), end)?;
         let tangential_bend = 6.0 * q.length();
         let max_radius = inverse.end_image() + 3.0 * q.length() * end * end;
-        Some(Self { numerator, denominator, q, domain, end, tangential_bend, max_radius, inverse })
+        let mut lens = Self {
+            numerator,
+            denominator,
+            q,
+            domain,
+            end,
+            tangential_bend,
+            max_radius,
+            inverse,
+            first_steps: 0,
+        };
+        if q != DVec2::ZERO {
+            lens.first_steps = lens.clone().needed_first_steps();
+        }
+        Some(lens)
     }
 
     pub fn domain(&self) -> &Domain {
@@ -110,21 +100,20 @@ impl BrownConrady {
     }
 
     fn image(&self, x: DVec2) -> DVec2 {
-        let u = x.length_squared();
-        let (l, _) = factor(&self.numerator, &self.denominator, u);
-        x * (l + 2.0 * self.q.dot(x)) + self.q * u
+        let (n, d) = (&self.numerator, &self.denominator);
+        if *d == [0.0; 3] { image_of::<false>(n, d, self.q, x) } else { image_of::<true>(n, d, self.q, x) }
     }
 
     #[inline]
     fn image_with_slope(&self, x: DVec2) -> (DVec2, DMat2) {
-        let u = x.length_squared();
-        let (l, slope) = factor(&self.numerator, &self.denominator, u);
-        let on_axis = l + 2.0 * self.q.dot(x);
-        let (s, q) = (2.0 * slope, self.q);
-        let xx = on_axis + s * x.x * x.x + 4.0 * q.x * x.x;
-        let xy = s * x.x * x.y + 2.0 * (q.x * x.y + q.y * x.x);
-        let yy = on_axis + s * x.y * x.y + 4.0 * q.y * x.y;
-        (x * on_axis + q * u, DMat2::from_cols(DVec2::new(xx, xy), DVec2::new(xy, yy)))
+        let (n, d) = (&self.numerator, &self.denominator);
+        let (image, slope) = if *d == [0.0; 3] {
+            image_with_slope::<false>(n, d, self.q, x)
+        } else {
+            image_with_slope::<true>(n, d, self.q, x)
+        };
+        let matrix = DMat2::from_cols(DVec2::new(slope.xx, slope.xy), DVec2::new(slope.xy, slope.yy));
+        (image, matrix)
     }
 
     pub fn project(&self, ray: DVec3) -> Result<DVec2, LensLimit> {
@@ -137,210 +126,182 @@ impl BrownConrady {
         Ok((image, plane_by_ray(ray, point, slope)))
     }
 
+    /// The unit ray of an image point; `slack` is how far rounding may have
+    /// moved the point.
     #[inline]
-    pub fn unproject(&self, image: DVec2) -> Result<DVec3, LensLimit> {
-        Ok(ray_of(self.plane_of(image)?))
+    pub fn unproject(&self, image: DVec2, slack: f64) -> Result<DVec3, LensLimit> {
+        Ok(ray_of(self.plane_of(image, slack)?.0))
     }
 
-    pub fn unproject_with_jacobian(&self, image: DVec2) -> Result<(DVec3, Matrix3x2<f64>), LensLimit> {
-        let point = self.plane_of(image)?;
+    /// [`Self::unproject`] for many at a time, and the same bits. What is not
+    /// `fine` is left to it.
+    #[inline]
+    pub fn unproject_lanes<const N: usize>(&self, images: &Lanes<N>) -> ([DVec3; N], [bool; N]) {
+        let (points, fine) = self.quick_planes(images);
+        (std::array::from_fn(|l| ray_of(points.at(l))), fine)
+    }
+
+    pub fn unproject_with_jacobian(
+        &self,
+        image: DVec2,
+        slack: f64,
+    ) -> Result<(DVec3, Matrix3x2<f64>), LensLimit> {
+        let (point, _) = self.plane_of(image, slack)?;
         let (_, slope) = self.image_with_slope(point);
         Ok((ray_of(point), ray_by_image(ray_of(point), slope)))
     }
 
-    /// The point of the domain that `f` sends to `image`.
+    /// The point of the domain that `f` sends to `image`, and the evaluations of
+    /// `f` that it took.
     #[inline]
-    fn plane_of(&self, image: DVec2) -> Result<DVec2, LensLimit> {
-        let limit = self.domain.limit;
-        let distance = image.length();
-        // Also refuses a length that overflowed.
-        if distance.is_nan() || distance > self.max_radius() * (1.0 + END_ROUNDING) {
-            return Err(limit);
+    pub fn plane_of(&self, image: DVec2, slack: f64) -> Result<(DVec2, u32), LensLimit> {
+        let (point, [fine]) = self.quick_planes(&Lanes { x: [image.x], y: [image.y] });
+        let quick = if self.q == DVec2::ZERO { 1 } else { self.first_steps + 2 };
+        if fine {
+            return Ok((point.at(0), quick));
         }
-        if self.q != DVec2::ZERO {
-            return self.plane_of_tangential(image, distance);
-        }
-        let r =
-            self.inverse.solve(distance, |r| radius(&self.numerator, &self.denominator, r)).ok_or(limit)?;
-        Ok(if distance > 0.0 { image * (r / distance) } else { image })
+        let (point, steps) = self.slow_plane_of(image, slack)?;
+        Ok((point, quick + steps))
     }
 
-    /// `f` continued past the domain so that Newton's method may step out and
-    /// come back: radially back to the rim, plus the distance to it.
-    fn continued(&self, x: DVec2) -> (DVec2, DMat2) {
-        let r = x.length();
-        if r <= self.end {
-            return self.image_with_slope(x);
+    /// With `u = r^2`, `f(x) = y` says `y - u q = (L + 2 q . x) x`: the point lies
+    /// along `w = y - u q`, and its radius is the root of one function,
+    ///
+    /// `R(r) = rho(r) + 2 u (q . w) / |w| - |w|`.
+    ///
+    /// `f` is the gradient of a convex potential on the domain, so `R` is
+    /// negative below the root and positive above it: a bracket finds it, and
+    /// its sign at the rim tells whether there is one.
+    #[cold]
+    fn slow_plane_of(&self, image: DVec2, slack: f64) -> Result<(DVec2, u32), LensLimit> {
+        let square = self.q.length_squared();
+        let mismatch = |r: f64| {
+            let (value, slope) = radius(&self.numerator, &self.denominator, r);
+            let w = image - self.q * (r * r);
+            let size = w.length();
+            if size == 0.0 {
+                return (value, slope);
+            }
+            let along = self.q.dot(w) / size;
+            let across = (square - along * along).max(0.0);
+            (value + 2.0 * r * r * along - size, slope + 6.0 * r * along - 4.0 * r * r * r * across / size)
+        };
+        let past_rim = -mismatch(self.end).0;
+        // Also refuses a distance that overflowed.
+        if past_rim.is_nan() || past_rim > self.rounding_at_rim() + slack {
+            return Err(self.domain.limit);
         }
-        let rim = x * (self.end / r);
-        let (image, slope) = self.image_with_slope(rim);
-        let e = x / r;
-        let across = DMat2::from_cols(
-            DVec2::new(1.0 - e.x * e.x, -e.x * e.y),
-            DVec2::new(-e.x * e.y, 1.0 - e.y * e.y),
-        ) * (self.end / r);
-        (image + (x - rim), slope * across + (DMat2::IDENTITY - across))
+        let (r, steps) = if past_rim >= 0.0 {
+            (self.end, 1)
+        } else {
+            let ([stretch], _) = self.inverse.starts(&[image.length_squared()]);
+            bracketed_newton(mismatch, 0.0, self.end, stretch * image.length())
+                .map(|root| (root.value, root.iterations + 1))
+                .map_err(|_| LensLimit::NotConverged)?
+        };
+        let w = image - self.q * (r * r);
+        let size = w.length();
+        Ok((if size > 0.0 { w * (r / size) } else { w }, steps))
     }
 
-    /// Newton's method without damping, from the radial inverse corrected for
-    /// the tangential terms to first order. It gives up (and leaves the work
-    /// to the damped solve) unless the steps shrink as they should.
-    #[inline]
-    fn quick_plane_of(&self, image: DVec2, distance: f64) -> Option<DVec2> {
-        let Start { x: r, slope, bend_value, bend } = self.inverse.start(distance);
-        // Second derivative of f: rho'' along the radius, 2 r L' across, both
-        // bounded by the bend; 6 |q| from the tangential terms.
-        let bend = 3.0 * bend + self.tangential_bend;
-        // At the radial inverse f is off by the tangential terms alone. In
-        // polar coordinates everything is known from the table: a first step,
-        // then the curvature's share of it.
-        let e = image * (1.0 / distance);
-        let per_r = 1.0 / r;
-        let (q_r, q_t) = (self.q.dot(e), self.q.dot(e.perp()));
-        let (rho_slope, level) = (1.0 / slope, distance * per_r);
-        let (a, b, c) = (rho_slope + 6.0 * q_r * r, 2.0 * q_t * r, level + 2.0 * q_r * r);
-        let scale = 1.0 / (a * c - b * b);
-        let solve =
-            |along: f64, across: f64| ((c * along - b * across) * scale, (a * across - b * along) * scale);
-        let (d_r, d_t) = solve(3.0 * q_r * r * r, q_t * r * r);
-        let level_slope = (rho_slope - level) * per_r;
-        let (c_r, c_t) =
-            solve(0.5 * (bend_value * d_r * d_r + level_slope * d_t * d_t), level_slope * d_r * d_t);
-        let mut x = e * (r - d_r - c_r) - e.perp() * (d_t + c_t);
-        for _ in 0..QUICK_PLANE_STEPS {
-            let (value, j) = self.image_with_slope(x);
-            let error = value - image;
-            let (a, b, c) = (j.x_axis.x, j.x_axis.y, j.y_axis.y);
-            let determinant = a * c - b * b;
-            let scale = 1.0 / determinant;
-            let step = DVec2::new(c * error.x - b * error.y, a * error.y - b * error.x) * scale;
-            x -= step;
-            // What Newton's method leaves is at most |f''| step^2 / (2 s), with
-            // the smaller eigenvalue s > determinant / trace.
-            let left = step.length_squared() * bend * (a + c);
-            let size = x.length_squared();
-            if left * left <= 4e-34 * determinant * determinant * size {
-                let inside = size <= self.end * self.end && determinant > 0.0;
-                return inside.then_some(x);
-            }
-        }
-        None
-    }
-
-    fn plane_of_tangential(&self, image: DVec2, distance: f64) -> Result<DVec2, LensLimit> {
-        if distance > 0.0
-            && distance <= self.inverse.end_image()
-            && let Some(x) = self.quick_plane_of(image, distance)
-        {
-            return Ok(x);
-        }
-        let start = self
-            .inverse
-            .solve(distance.min(self.inverse.end_image()), |r| radius(&self.numerator, &self.denominator, r))
-            .ok_or(self.domain.limit)?;
-        let mut x = if distance > 0.0 { image * (start / distance) } else { image };
-        let (mut value, mut slope) = self.continued(x);
-        let mut error = (value - image).length();
-        for _ in 0..MAX_PLANE_STEPS {
-            let step = slope.inverse() * (value - image);
-            if !step.is_finite() {
-                break;
-            }
-            let (mut next, mut t) = (x - step, 1.0);
-            let mut halvings = 0;
-            loop {
-                (value, slope) = self.continued(next);
-                let next_error = (value - image).length();
-                if next_error <= (1.0 - 0.25 * t) * error || halvings == MAX_HALVINGS {
-                    error = next_error.min(error);
-                    break;
-                }
-                if step.length_squared() <= 1e-28 * x.length_squared() {
-                    break;
-                }
-                halvings += 1;
-                t *= 0.5;
-                next = x - step * t;
-            }
-            let moved = (next - x).length();
-            x = next;
-            if moved <= 2.0 * f64::EPSILON * x.length() || error == 0.0 {
-                break;
-            }
-        }
-        self.accept(x, image)
-    }
-
-    /// Sum of the sizes of all terms of `f` at radius `r`: its rounding error
-    /// is a few ulp of this.
-    fn size_of_terms(&self, r: f64) -> f64 {
-        let u = r * r;
+    /// Rounding error of the formula at the domain's end: a few ulp of the sum
+    /// of the sizes of all terms.
+    fn rounding_at_rim(&self) -> f64 {
+        let (r, u) = (self.end, self.end * self.end);
         let sum = |k: &[f64; 3]| 1.0 + u * (k[0].abs() + u * (k[1].abs() + u * k[2].abs()));
         let d = &self.denominator;
         let bottom = (1.0 + u * (d[0] + u * (d[1] + u * d[2]))).abs();
-        let factor = sum(&self.numerator) / bottom;
-        r * factor * (sum(d) / bottom) + 3.0 * self.q.length() * u
+        let terms = r * (sum(&self.numerator) / bottom) * (sum(d) / bottom);
+        8.0 * f64::EPSILON * (terms + 3.0 * self.q.length() * u)
     }
 
-    /// A point is an answer only if it lies in the domain and maps back, to the
-    /// rounding of the formula.
-    fn accept(&self, x: DVec2, image: DVec2) -> Result<DVec2, LensLimit> {
-        let r = x.length();
-        let rounding = 8.0 * f64::EPSILON * (self.size_of_terms(r) + image.length());
-        let residual = (self.continued(x).0 - image).length();
-        if r <= self.end * (1.0 + END_ROUNDING) && residual <= rounding {
-            Ok(x)
-        } else {
-            Err(self.domain.limit)
+    /// The fast way: the table's stretch, then Newton's method with a fixed
+    /// number of steps and without damping.
+    #[inline(always)]
+    fn quick_planes<const N: usize>(&self, images: &Lanes<N>) -> (Lanes<N>, [bool; N]) {
+        match (self.q == DVec2::ZERO, self.denominator == [0.0; 3]) {
+            (true, true) => self.radial_planes::<N, false>(images),
+            (true, false) => self.radial_planes::<N, true>(images),
+            (false, true) => self.tangential_planes::<N, false>(images),
+            (false, false) => self.tangential_planes::<N, true>(images),
         }
     }
-}
 
-/// Radius on the plane `z = 1` at which the domain of the formula ends, searched
-/// up to `last`; the outer `None` says that the polynomials overflow.
-fn first_fold(n: &[f64; 3], d: &[f64; 3], q: f64, last: f64) -> Option<Option<f64>> {
-    let top = Polynomial::new(&[1.0, n[0], n[1], n[2]]);
-    let bottom = Polynomial::new(&[1.0, d[0], d[1], d[2]]);
-    // rho' = F / D^2 with F = (N + 2u N') D - 2u N D'.
-    let f = top
-        .plus(2.0, &top.derivative().shifted())
-        .times(&bottom)
-        .plus(-2.0, &top.times(&bottom.derivative()).shifted());
-    let mut end: Option<f64> = None;
-    let mut meet = |root: Option<f64>| {
-        if let Some(root) = root {
-            end = Some(end.map_or(root, |end| end.min(root)));
-        }
-        end.unwrap_or(last)
-    };
-    meet(f.first_root_after(0.0, last * last).map(f64::sqrt));
-    let pole = bottom.first_root_after(0.0, last * last);
-    let mut reach = meet(pole.map(|u| u.sqrt() * (1.0 - POLE_MARGIN)));
-    let mut finite = f.is_finite();
-    if q > 0.0 {
-        let (f, top, bottom) = (f.of_square(), top.of_square(), bottom.of_square());
-        let square = bottom.times(&bottom);
-        // Opposite to q: rho' = 6 q r, or L = 2 q r.
-        let radial = f.plus(-6.0 * q, &square.shifted());
-        let around = top.plus(-2.0 * q, &bottom.shifted());
-        for p in [&radial, &around] {
-            finite &= p.is_finite();
-            reach = meet(p.first_root_after(0.0, reach));
-        }
-        // At an azimuth between, cos = -(rho' + 3L) / (16 q r): the determinant
-        // is zero where (rho' - L)(9L - rho') = 64 q^2 r^2.
-        let l = top.times(&bottom);
-        let between = f
-            .plus(-1.0, &l)
-            .times(&l.plus(8.0, &l).plus(-1.0, &f))
-            .plus(-64.0 * q * q, &square.times(&square).shifted().shifted());
-        finite &= between.is_finite();
-        let inside = |&r: &f64| {
-            let (rho, slope) = radius(n, d, r);
-            r > 0.0 && slope + 3.0 * rho / r < 16.0 * q * r
-        };
-        let root = between.roots_in(0.0, reach).into_iter().find(inside);
-        meet(root);
+    #[inline(always)]
+    fn radial_planes<const N: usize, const RATIONAL: bool>(
+        &self,
+        images: &Lanes<N>,
+    ) -> (Lanes<N>, [bool; N]) {
+        let (n, d) = (self.numerator, self.denominator);
+        let (stretches, fine) = self.inverse.stretches(&images.squares(), |u| {
+            let (level, slope) = factor_of::<RATIONAL>(&n, &d, u);
+            (level, level + 2.0 * u * slope)
+        });
+        (images.times(&stretches), fine)
     }
-    finite.then_some(end)
+
+    /// From the radial inverse, which is off by the tangential terms: as many
+    /// Newton steps as this lens needs, one more, and one with the same slope.
+    #[inline(always)]
+    fn tangential_planes<const N: usize, const RATIONAL: bool>(
+        &self,
+        images: &Lanes<N>,
+    ) -> (Lanes<N>, [bool; N]) {
+        let (n, d, q) = (self.numerator, self.denominator, self.q);
+        let (rim, sides) = (self.end * self.end, self.tangential_bend);
+        let (stretches, bends) = self.inverse.starts(&images.squares());
+        let mut points = images.times(&stretches);
+        for _ in 0..self.first_steps {
+            for l in 0..N {
+                let (image, x) = (images.at(l), points.at(l));
+                let (value, slope) = image_with_slope::<RATIONAL>(&n, &d, q, x);
+                points.set(l, x - slope.inverse().times(value - image));
+            }
+        }
+        let mut fine = [false; N];
+        for l in 0..N {
+            let (image, mut x) = (images.at(l), points.at(l));
+            let (value, slope) = image_with_slope::<RATIONAL>(&n, &d, q, x);
+            let inverse = slope.inverse();
+            let step = inverse.times(value - image);
+            x -= step;
+            let last = inverse.times(image_of::<RATIONAL>(&n, &d, q, x) - image);
+            x -= last;
+            points.set(l, x);
+            // The last step's error is at most |f''| |step| |last| / s with the
+            // smaller eigenvalue s > determinant / trace. |f''| is rho'' along
+            // the radius, 2 r L' across, both within 3 times the bend, and
+            // 6 |q| from the tangential terms.
+            let bend = (3.0 * bends[l] + sides) * slope.trace();
+            let (left, size) = (step.length_squared() * last.length_squared(), x.length_squared());
+            let room = LEFT_OVER * slope.determinant();
+            fine[l] = (bend * bend * left <= room * room * size)
+                & (size <= rim)
+                & (slope.determinant() > 0.0)
+                & (slope.trace() > 0.0);
+        }
+        (points, fine)
+    }
+
+    /// The smallest number of first steps with which nearly all of the domain is
+    /// found the fast way: a ring of rays in each of many field angles is asked.
+    fn needed_first_steps(mut self) -> u32 {
+        const RINGS: u32 = 32;
+        const AROUND: u32 = 8;
+        for steps in 0..MOST_FIRST_STEPS {
+            self.first_steps = steps;
+            let mut missed = 0;
+            for i in 0..RINGS * AROUND {
+                let r = self.end * (f64::from(i / AROUND) + 0.5) / f64::from(RINGS);
+                let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / f64::from(AROUND)).sin_cos();
+                let image = self.image(DVec2::new(r * cos, r * sin));
+                let (_, [fine]) = self.quick_planes(&Lanes { x: [image.x], y: [image.y] });
+                missed += u32::from(!fine);
+            }
+            if missed <= RINGS * AROUND / 64 {
+                return steps;
+            }
+        }
+        MOST_FIRST_STEPS
+    }
 }

@@ -153,6 +153,11 @@ proptest! {
             let allowed = (8.0 * f64::EPSILON * slope.norm() * pixel.length()).max(1e-10);
             prop_assert!(back.cross(ray).length() <= allowed, "{:?} at {theta}", lens.spec());
             prop_assert!((back.length() - 1.0).abs() < 1e-15);
+            let solved = lens.unproject_solved(pixel).unwrap();
+            let (_, forward) = lens.project_with_jacobian(back).unwrap();
+            prop_assert_eq!(solved.value, back);
+            prop_assert!(solved.iterations <= Lens::MAX_UNPROJECT_ITERATIONS);
+            prop_assert!(solved.residual_px <= (8.0 * f64::EPSILON * forward.norm()).max(1e-9));
         }
     }
 

@@ -5,6 +5,7 @@ use nalgebra::{Matrix2x3, Matrix3x2};
 
 use super::LensLimit;
 use super::inverse::RadialInverse;
+use super::lanes::Lanes;
 use super::limit::{Domain, END_ROUNDING};
 use crate::numeric::Polynomial;
 
@@ -87,23 +88,59 @@ impl KannalaBrandt {
         Ok((DVec2::new(ray.x, ray.y) * around, jacobian))
     }
 
+    /// The field angle of an image point, and the evaluations of the radius
+    /// that it took; `slack` is how far rounding may have moved the point.
     #[inline]
-    fn angle(&self, image_radius: f64) -> Result<f64, LensLimit> {
-        self.inverse.solve(image_radius, |theta| radius(&self.k, theta)).ok_or(self.domain.limit)
+    pub fn angle_of(&self, image: DVec2, slack: f64) -> Result<(f64, u32), LensLimit> {
+        let square = image.length_squared();
+        let ([stretch], [fine]) = self.inverse.stretches(&[square], |u| level(&self.k, u));
+        if fine {
+            return Ok((square.sqrt() * stretch, 1));
+        }
+        self.slow_angle_of(image.length(), slack)
     }
 
+    #[cold]
+    fn slow_angle_of(&self, image_radius: f64, slack: f64) -> Result<(f64, u32), LensLimit> {
+        let found = self.inverse.solve(image_radius, slack, |theta| radius(&self.k, theta));
+        found.map(|(theta, steps)| (theta, steps + 1)).ok_or(self.domain.limit)
+    }
+
+    /// The unit ray of an image point.
     #[inline]
-    pub fn unproject(&self, image: DVec2) -> Result<DVec3, LensLimit> {
-        let image_radius = image.length();
-        let theta = self.angle(image_radius)?;
+    pub fn unproject(&self, image: DVec2, slack: f64) -> Result<DVec3, LensLimit> {
+        let (theta, _) = self.angle_of(image, slack)?;
+        Ok(self.ray(image, image.length_squared().sqrt(), theta))
+    }
+
+    /// [`Self::unproject`] for many at a time, and the same bits. What is not
+    /// `fine` is left to it.
+    #[inline]
+    pub fn unproject_lanes<const N: usize>(&self, images: &Lanes<N>) -> ([DVec3; N], [bool; N]) {
+        let squares = images.squares();
+        let (stretches, fine) = self.inverse.stretches(&squares, |u| level(&self.k, u));
+        let ray = |l: usize| {
+            let image_radius = squares[l].sqrt();
+            let theta = image_radius * stretches[l];
+            self.ray(images.at(l), image_radius, theta)
+        };
+        (std::array::from_fn(ray), fine)
+    }
+
+    #[inline(always)]
+    fn ray(&self, image: DVec2, image_radius: f64, theta: f64) -> DVec3 {
         let (sin, cos) = self.turns.sin_cos(theta);
         let scale = if image_radius == 0.0 { 1.0 } else { sin / image_radius };
-        Ok(DVec3::new(image.x * scale, image.y * scale, cos))
+        DVec3::new(image.x * scale, image.y * scale, cos)
     }
 
-    pub fn unproject_with_jacobian(&self, image: DVec2) -> Result<(DVec3, Matrix3x2<f64>), LensLimit> {
-        let image_radius = image.length();
-        let theta = self.angle(image_radius)?;
+    pub fn unproject_with_jacobian(
+        &self,
+        image: DVec2,
+        slack: f64,
+    ) -> Result<(DVec3, Matrix3x2<f64>), LensLimit> {
+        let image_radius = image.length_squared().sqrt();
+        let (theta, _) = self.angle_of(image, slack)?;
         let (sin, cos) = self.turns.sin_cos(theta);
         let (e, around) =
             if image_radius == 0.0 { (DVec2::X, 1.0) } else { (image / image_radius, sin / image_radius) };
@@ -122,13 +159,20 @@ impl KannalaBrandt {
     }
 }
 
+/// Image radius over the field angle, and the derivative of the image radius,
+/// for the square of the angle.
+#[inline(always)]
+fn level(k: &[f64; 4], u: f64) -> (f64, f64) {
+    let level = 1.0 + u * (k[0] + u * (k[1] + u * (k[2] + u * k[3])));
+    let slope = 1.0 + u * (3.0 * k[0] + u * (5.0 * k[1] + u * (7.0 * k[2] + u * (9.0 * k[3]))));
+    (level, slope)
+}
+
 /// Image radius and its derivative by the field angle.
 #[inline]
 fn radius(k: &[f64; 4], theta: f64) -> (f64, f64) {
-    let u = theta * theta;
-    let value = theta * (1.0 + u * (k[0] + u * (k[1] + u * (k[2] + u * k[3]))));
-    let slope = 1.0 + u * (3.0 * k[0] + u * (5.0 * k[1] + u * (7.0 * k[2] + u * (9.0 * k[3]))));
-    (value, slope)
+    let (level, slope) = level(k, theta * theta);
+    (theta * level, slope)
 }
 
 /// Angles in the table of sines.

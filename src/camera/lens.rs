@@ -3,14 +3,15 @@
 use glam::{DVec2, DVec3};
 use nalgebra::{Matrix2x3, Matrix3x2};
 
-use super::brown_conrady::BrownConrady;
+use super::brown_conrady::{self, BrownConrady};
 use super::kannala_brandt::KannalaBrandt;
+use super::lanes::Lanes;
 use super::limit::Domain;
 use super::pinhole::Pinhole;
 use super::pupil::PupilShift;
 use super::{LensError, LensLimit, LensSpec, Model};
 use crate::numeric::LengthMismatch;
-use crate::numeric::batch::fill;
+use crate::numeric::batch::{fill, fill_runs};
 
 /// A lens with its domain.
 ///
@@ -24,6 +25,20 @@ pub struct Lens {
     pupil: PupilShift,
     /// Reciprocals of the focal lengths: a product costs a quarter of a quotient.
     per_focal: DVec2,
+}
+
+/// Pixels that are worked on side by side.
+pub(crate) const LANES: usize = 16;
+
+/// What an inverse found, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solved<T> {
+    /// The answer.
+    pub value: T,
+    /// Evaluations of the formula that it took.
+    pub iterations: u32,
+    /// Distance, in pixels, from the input to where the answer maps.
+    pub residual_px: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -132,7 +147,34 @@ impl Lens {
         if !pixel.is_finite() {
             return Err(LensLimit::NotFinite);
         }
-        each!(&self.formula, model => model.unproject(self.image_of(pixel)))
+        each!(&self.formula, model => model.unproject(self.image_of(pixel), self.slack(pixel)))
+    }
+
+    /// How far rounding of the pixel, and of its distance from the principal
+    /// point, may have moved an image point.
+    #[inline]
+    fn slack(&self, pixel: DVec2) -> f64 {
+        let [[_, _, cx], [_, _, cy], _] = self.spec.matrix;
+        let size = pixel.abs().max(DVec2::new(cx.abs(), cy.abs())) * self.per_focal;
+        2.0 * f64::EPSILON * (size.x + size.y)
+    }
+
+    /// No [`Lens::unproject`] evaluates the formula of its model more often.
+    pub const MAX_UNPROJECT_ITERATIONS: u32 = brown_conrady::MAX_STEPS;
+
+    /// [`Lens::unproject`] and how it was found. A pinhole needs no iterations.
+    ///
+    /// # Errors
+    /// As [`Lens::unproject`].
+    pub fn unproject_solved(&self, pixel: DVec2) -> Result<Solved<DVec3>, LensLimit> {
+        let ray = self.unproject(pixel)?;
+        let (image, slack) = (self.image_of(pixel), self.slack(pixel));
+        let iterations = match &self.formula {
+            Formula::Pinhole(_) => 0,
+            Formula::BrownConrady(model) => model.plane_of(image, slack)?.1,
+            Formula::KannalaBrandt(model) => model.angle_of(image, slack)?.1,
+        };
+        Ok(Solved { value: ray, iterations, residual_px: (self.project(ray)? - pixel).length() })
     }
 
     /// [`Lens::project`] and the derivative of the pixel by the ray's three
@@ -160,7 +202,10 @@ impl Lens {
         }
         let [[fx, ..], [_, fy, _], _] = self.spec.matrix;
         let image = self.image_of(pixel);
-        let (ray, mut jacobian) = each!(&self.formula, model => model.unproject_with_jacobian(image))?;
+        let (ray, mut jacobian) = {
+            let slack = self.slack(pixel);
+            each!(&self.formula, model => model.unproject_with_jacobian(image, slack))?
+        };
         jacobian.column_mut(0).scale_mut(1.0 / fx);
         jacobian.column_mut(1).scale_mut(1.0 / fy);
         Ok((ray, jacobian))
@@ -176,7 +221,31 @@ impl Lens {
         pixels: &[DVec2],
         rays: &mut [Result<DVec3, LensLimit>],
     ) -> Result<(), LengthMismatch> {
-        fill(pixels, rays, |&pixel| self.unproject(pixel))
+        fill_runs(pixels, rays, |pixels, rays| self.unproject_run(pixels, rays))
+    }
+
+    /// [`Lens::unproject`] for each pixel on this thread; slices of one length.
+    /// The same bits as one by one.
+    pub(crate) fn unproject_run(&self, pixels: &[DVec2], rays: &mut [Result<DVec3, LensLimit>]) {
+        let (pixels, left) = pixels.as_chunks::<LANES>();
+        let (rays, left_rays) = rays.as_chunks_mut::<LANES>();
+        each!(&self.formula, model => {
+            for (pixels, rays) in pixels.iter().zip(rays) {
+                let mut images = Lanes { x: [0.0; LANES], y: [0.0; LANES] };
+                for (l, &pixel) in pixels.iter().enumerate() {
+                    let image = self.image_of(pixel);
+                    images.x[l] = image.x;
+                    images.y[l] = image.y;
+                }
+                let (found, fine) = model.unproject_lanes(&images);
+                for l in 0..LANES {
+                    rays[l] = if fine[l] { Ok(found[l]) } else { self.unproject(pixels[l]) };
+                }
+            }
+        });
+        for (ray, &pixel) in left_rays.iter_mut().zip(left) {
+            *ray = self.unproject(pixel);
+        }
     }
 
     /// [`Lens::project`] for each ray.
@@ -194,6 +263,12 @@ impl Lens {
     /// Angle of a direction to the camera's axis, in radians.
     pub fn field_angle_rad(ray: DVec3) -> f64 {
         ray.x.hypot(ray.y).atan2(ray.z)
+    }
+
+    /// [`Lens::field_angle_rad`] of a unit vector, which cannot overflow.
+    #[inline]
+    pub(crate) fn field_angle_of_unit_rad(ray: DVec3) -> f64 {
+        (ray.x * ray.x + ray.y * ray.y).sqrt().atan2(ray.z)
     }
 
     /// Where on the axis the rays of this field angle cross it, in millimetres

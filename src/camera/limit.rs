@@ -13,6 +13,8 @@ pub enum LensLimit {
     BehindCamera,
     /// The input is NaN, infinite, or a direction of no length.
     NotFinite,
+    /// The bound on iterations was reached; no result is trusted.
+    NotConverged,
 }
 
 impl LensLimit {
@@ -23,6 +25,7 @@ impl LensLimit {
             Self::BeyondFieldOfView => "beyond_field_of_view",
             Self::BehindCamera => "behind_camera",
             Self::NotFinite => "not_finite",
+            Self::NotConverged => "not_converged",
         }
     }
 }

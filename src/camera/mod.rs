@@ -26,8 +26,10 @@
 #![doc = include_str!("lenses.md")]
 
 mod brown_conrady;
+mod brown_formula;
 mod inverse;
 mod kannala_brandt;
+mod lanes;
 mod lens;
 mod limit;
 mod perspective;
@@ -35,7 +37,7 @@ mod pinhole;
 mod pupil;
 mod spec;
 
-pub use lens::Lens;
+pub use lens::{Lens, Solved};
 pub use limit::LensLimit;
 pub use spec::{LensError, LensSpec, Model};
 

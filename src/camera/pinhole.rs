@@ -4,6 +4,7 @@ use glam::{DMat2, DVec2, DVec3};
 use nalgebra::{Matrix2x3, Matrix3x2};
 
 use super::LensLimit;
+use super::lanes::Lanes;
 use super::limit::{Domain, END_ROUNDING};
 use super::perspective::{half_view_rad, plane_by_ray, plane_point, ray_by_image, ray_of};
 
@@ -37,17 +38,30 @@ impl Pinhole {
         Ok((point, plane_by_ray(ray, point, DMat2::IDENTITY)))
     }
 
-    pub fn unproject(&self, image: DVec2) -> Result<DVec3, LensLimit> {
-        // Overflow to infinity fails the test too.
-        if image.length_squared() <= self.end * self.end * (1.0 + 2.0 * END_ROUNDING) {
-            Ok(ray_of(image))
-        } else {
-            Err(self.domain.limit)
-        }
+    /// The unit ray of an image point; `slack` is how far rounding may have
+    /// moved the point.
+    pub fn unproject(&self, image: DVec2, slack: f64) -> Result<DVec3, LensLimit> {
+        let end = self.end * (1.0 + END_ROUNDING) + slack;
+        let square = image.length_squared();
+        // A square that overflowed is past any end.
+        if square <= end * end && square.is_finite() { Ok(ray_of(image)) } else { Err(self.domain.limit) }
     }
 
-    pub fn unproject_with_jacobian(&self, image: DVec2) -> Result<(DVec3, Matrix3x2<f64>), LensLimit> {
-        let ray = self.unproject(image)?;
+    /// [`Self::unproject`] for many at a time, and the same bits. What is not
+    /// `fine` is left to it.
+    #[inline]
+    pub fn unproject_lanes<const N: usize>(&self, images: &Lanes<N>) -> ([DVec3; N], [bool; N]) {
+        let squares = images.squares();
+        let fine = squares.map(|square| square <= self.end * self.end);
+        (std::array::from_fn(|l| ray_of(images.at(l))), fine)
+    }
+
+    pub fn unproject_with_jacobian(
+        &self,
+        image: DVec2,
+        slack: f64,
+    ) -> Result<(DVec3, Matrix3x2<f64>), LensLimit> {
+        let ray = self.unproject(image, slack)?;
         Ok((ray, ray_by_image(ray, DMat2::IDENTITY)))
     }
 }

@@ -1,28 +1,63 @@
 //! `domecast build DESIGN`
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant, SystemTime};
 
 use serde_json::json;
 
 use super::output::{Failure, Output};
-use crate::build::{self, BuildError};
+use crate::build::{self, Build, BuildError};
 use crate::design;
 
-/// Makes everything, then writes it whole.
-pub fn run(output: &Output, design_file: &Path, out: Option<&Path>) -> Result<(), Failure> {
+/// How often a watched design is looked at: fast enough to feel immediate, slow enough to cost nothing.
+const LOOK: Duration = Duration::from_millis(250);
+
+/// Makes everything, then writes it whole. With `watch`, again whenever the design file changes.
+pub fn run(output: &Output, design_file: &Path, out: Option<&Path>, watch: bool) -> Result<(), Failure> {
+    if !watch {
+        return once(output, design_file, out, false);
+    }
+    let mut seen = None;
+    loop {
+        let now = stamp(design_file);
+        if seen.as_ref() != Some(&now) {
+            seen = Some(now);
+            match once(output, design_file, out, true) {
+                // a fault in the design is what watching is for: say it, and wait for the next save
+                Err(failure @ (Failure::Input(_) | Failure::Write(_))) => output.failure(&failure),
+                other => other?,
+            }
+            output.say(&format!("watching {} (end with Ctrl-C)", design_file.display()))?;
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// What tells one state of a file from the next; `None` while an editor has it away.
+fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
+    let about = std::fs::metadata(path).ok()?;
+    Some((about.modified().ok()?, about.len()))
+}
+
+fn once(output: &Output, design_file: &Path, out: Option<&Path>, watched: bool) -> Result<(), Failure> {
     let began = Instant::now();
     output.step("reading the design");
     let design = design::load(design_file)?;
-    let result = build::build(&design, &mut |doing| output.step(doing)).map_err(|error| match error {
+    let mut result = build::build(&design, &mut |doing| output.step(doing)).map_err(|error| match error {
         BuildError::Design(error) => Failure::from(error.in_file(design_file)),
         BuildError::Ours(what) => Failure::Internal(what),
     })?;
+    if watched {
+        result.keep_fresh();
+    }
     let out = out.map_or_else(|| PathBuf::from("output").join(design.name()), Path::to_path_buf);
     output.step("writing");
     result.tree.write(&out).map_err(Failure::Write)?;
     output.steps_done();
+    tell(output, &result, &out, began.elapsed())
+}
 
+fn tell(output: &Output, result: &Build, out: &Path, took: Duration) -> Result<(), Failure> {
     for warning in &result.manifest.warnings {
         output.warn(&format!("{}: {}", warning.field, warning.message));
     }
@@ -34,11 +69,15 @@ pub fn run(output: &Output, design_file: &Path, out: Option<&Path>) -> Result<()
         result.manifest.parts.len(),
         result.manifest.files.len() + 1,
         bytes as f64 / 1e6,
-        began.elapsed().as_secs_f64(),
+        took.as_secs_f64(),
     ))?;
+    for headline in &result.headlines {
+        output.say(&format!("  {headline}"))?;
+    }
     for file in &result.manifest.files {
         output.say(&format!("  {}", file.path))?;
     }
+    output.say(&format!("look at {}", out.join("report/index.html").display()))?;
     output.result(&json!({
         "ok": true,
         "out": out.display().to_string(),

@@ -5,16 +5,20 @@ mod calibrate_force;
 mod calibrate_optics;
 mod calibrate_print;
 mod check;
+mod compare;
+mod explain;
+mod new;
 mod output;
 mod points;
 mod schema;
+mod shell;
 mod simulate;
 mod track;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use output::{Failure, Output};
 
@@ -41,6 +45,36 @@ enum Command {
         /// Where to write [default: output/<design name>].
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Build again whenever the design file is saved, and keep the open page fresh.
+        #[arg(long)]
+        watch: bool,
+    },
+    /// Write a starting design in which every field has its reason, and the schema for editors beside it.
+    New {
+        /// Name of the design.
+        name: String,
+        /// The design to start from [default: the paper's sensor, thumb24].
+        #[arg(long)]
+        from: Option<PathBuf>,
+        /// Where to write [default: designs/<name>.json, or <name>.json where there is no such folder].
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
+    /// Tell what a field of the design file means, what may stand there, and why thumb24 has what it has.
+    Explain {
+        /// The field, as in messages: `springs.wire_diameter_mm`; empty for the list of sections.
+        #[arg(default_value = "")]
+        field: String,
+        /// Show the value and reason of this design.
+        #[arg(long)]
+        design: Option<PathBuf>,
+    },
+    /// Two designs or two builds side by side: fields, dots, parts, loads, resolution.
+    Compare {
+        /// A design file or the folder of a build.
+        a: PathBuf,
+        /// Another.
+        b: PathBuf,
     },
     /// Read a build again and verify it: hashes, meshes, dots against constants.
     Check {
@@ -82,8 +116,9 @@ enum Command {
     },
     /// Fit pupil, sheet, indices, markers and dots to what the built sensor sees.
     CalibrateOptics {
-        /// CSV of `frame,kind,id,u,v`: centroids in the raw image, px; the lowest frames are at rest.
-        centroids: PathBuf,
+        /// A folder of raw PNG frames (or one), or a CSV of `frame,kind,id,u,v`: centroids in the raw image, px. The
+        /// first frames, by name or number, are at rest.
+        seen: PathBuf,
         /// The constants.json of the sensor.
         constants: PathBuf,
         /// Where to write [default: constants.measured.json beside the constants].
@@ -92,6 +127,9 @@ enum Command {
         /// How many frames, from the lowest, are without load: their noise is in all that is measured from rest.
         #[arg(long, default_value_t = 1)]
         rest_frames: usize,
+        /// Where to write the centroids found in frames, as the CSV that this command reads.
+        #[arg(long)]
+        centroids: Option<PathBuf>,
     },
     /// Draw what the sensor will see, with the exact truth, using only the effects that the scene calls for.
     Simulate {
@@ -108,6 +146,14 @@ enum Command {
     },
     /// From frames to markers, pose, wrench and local displacement.
     Track(Box<track::TrackArguments>),
+    /// Print the completions for a shell.
+    Completions {
+        /// Which shell.
+        #[arg(value_enum)]
+        shell: clap_complete::Shell,
+    },
+    /// Print the man page.
+    Man,
     /// Fit the pad's map to a measured test print, and write it into a new design file.
     CalibratePrint {
         /// CSV of `id,x_mm,y_mm` (seen from outside, pole at the origin) or `id,phi_deg,theta_deg`, optionally
@@ -153,15 +199,21 @@ pub fn run() -> ExitCode {
 
 fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
     match command {
-        Command::Build { design, out } => build::run(output, design, out.as_deref()),
+        Command::Build { design, out, watch } => build::run(output, design, out.as_deref(), *watch),
+        Command::New { name, from, out } => new::run(output, name, from.as_deref(), out.as_deref()),
+        Command::Explain { field, design } => explain::run(output, field, design.as_deref()),
+        Command::Compare { a, b } => compare::run(output, a, b),
+        Command::Completions { shell } => shell::completions(output, *shell, Arguments::command()),
+        Command::Man => shell::man(output, Arguments::command()),
         Command::Check { dir } => check::run(output, dir),
         Command::Trace { design, pixels, pose } => points::trace(output, design, pixels, pose.as_deref()),
         Command::Project { design, points, pose } => points::project(output, design, points, pose.as_deref()),
         Command::CalibrateForce { measured, constants, out } => {
             calibrate_force::run(output, measured, constants, out.as_deref())
         }
-        Command::CalibrateOptics { centroids, constants, out, rest_frames } => {
-            calibrate_optics::run(output, centroids, constants, out.as_deref(), *rest_frames)
+        Command::CalibrateOptics { seen, constants, out, rest_frames, centroids } => {
+            let files = calibrate_optics::Files { out: out.as_deref(), centroids: centroids.as_deref() };
+            calibrate_optics::run(output, seen, constants, &files, *rest_frames)
         }
         Command::Simulate { scene, options } => simulate::run(output, scene, options),
         Command::Schema { scene } => schema::run(output, *scene),

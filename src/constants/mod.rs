@@ -3,10 +3,13 @@
 //! Everything here comes from the resolved design and its layout, so that a runtime which sees nothing
 //! but the constants works with the same numbers that the artwork and the parts were made from.
 
+mod envelope_picture;
 mod force_report;
 pub mod formats;
+mod loads;
 mod model;
 mod plain;
+mod plain_pnp;
 mod resolution;
 mod sensor;
 mod sight;
@@ -15,16 +18,19 @@ mod springs;
 use serde_json::json;
 
 pub use force_report::{EnvelopeLine, ForceReport, force_report};
+pub use loads::{PosedLoad, loads_over};
 pub use model::{
     BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants, Matrix4,
     OpticsConstants, PlainRuntime, SpringConstants, StiffnessAt, VERSION, WhiteMarker,
 };
-pub use plain::{Bias, PlainError, PlainFit, PlainInput, PosedLoad, loads_over};
+pub use plain::{Bias, PlainError, PlainFit, PlainInput};
 pub use resolution::{
     DesignChoice, POSE_AXES, Resolution, WRENCH_AXES, design_choices, resolution_at, spec_of,
 };
 pub use sight::{MarkerSight, markers_of};
-pub use springs::{DesignSprings, claimed_loads, matrix_of, rows, springs_of, wrench_by_table};
+pub use springs::{
+    DesignSprings, claimed_loads, matrix_of, rows, springs_of, stiffness_between, wrench_by_table,
+};
 
 use crate::design::{Design, DesignError};
 use crate::layout::Layout;
@@ -35,7 +41,7 @@ use crate::optics::Channel;
 /// # Errors
 /// A white marker whose centre the lens cannot see at rest.
 pub fn of(design: &Design, layout: &Layout) -> Result<Constants, DesignError> {
-    with_springs(design, layout, &springs_of(design)?)
+    with_springs(design, layout, &springs_of(design, MarkerSight::of(design))?)
 }
 
 /// [`of`] with springs that are known already.

@@ -187,8 +187,12 @@ pub struct StiffnessAt {
 /// Constants for plain solvePnP.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlainRuntime {
-    /// From pose relative to `rest_pose` to wrench.
+    /// From pose relative to `rest_pose` to the wrench that the springs' `stiffness` means.
     pub stiffness: [[f64; 6]; 6],
+    /// The same as the springs are compressed, for a runtime that follows their own law: to be interpolated at the
+    /// compression that the pose says, as the springs' `stiffness_at`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stiffness_at: Vec<StiffnessAt>,
     /// The pose that plain solvePnP finds at rest.
     pub rest_pose: Matrix4,
 }

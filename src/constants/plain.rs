@@ -2,28 +2,23 @@
 //!
 //! A runtime that knows nothing of refraction sees each marker not where it is but where the rays that reach the
 //! camera seem to come from. [`PlainFit`] finds the point that those rays, over the loads that the design claims,
-//! pass nearest to (the apparent position), runs plain PnP on it, and fits the 6x6 that takes what plain PnP says
-//! to the wrench. What is left is reported beside what the true positions and the nominal 6x6 would give.
+//! pass nearest to (the apparent position), runs plain PnP on it, and fits the linear map A from what plain PnP says
+//! to the displacement that is; the effective 6x6 is K A. What is left is reported beside what the true positions and
+//! the nominal 6x6 would give, twice: against the linear law K, which is all that a 6x6 can follow, and against the
+//! springs' own law, which stiffens as they shorten; there a table of K(compression) A leaves less.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::DVec3;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{LensSpec, Model};
+use super::loads::PosedLoad;
+use super::model::StiffnessAt;
+use super::plain_pnp::{Frame, Plain, run, undistorted};
+use super::springs::{matrix_of, rows, stiffness_between};
 use crate::mechanics::Displacement;
 use crate::numeric::Rigid;
-use crate::optics::{Layer, Limit, OpticsError, OpticsSpec, SensorOptics};
-use crate::pose::{Marker, PoseError, PoseOptions, PoseSolver, Sighting};
-
-/// A pose of the platform (`rest_from_platform`) and the wrench that holds it there, about the reference point
-/// (N, N*mm).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PosedLoad {
-    /// The pose.
-    pub pose: Rigid,
-    /// (Fx, Fy, Fz, Mx, My, Mz).
-    pub wrench: [f64; 6],
-}
+use crate::optics::{Limit, OpticsError, SensorOptics};
+use crate::pose::{Marker, PoseError};
 
 /// Why there is no fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,6 +66,8 @@ pub struct PlainInput<'a> {
     pub at_mm: DVec3,
     /// The 6x6 at rest that a geometry or a calibration gives.
     pub stiffness: Matrix6<f64>,
+    /// The 6x6 under compression; empty where there is only the one at rest.
+    pub stiffness_at: &'a [StiffnessAt],
 }
 
 /// Errors that are left, by axis, over a set of loads.
@@ -95,76 +92,22 @@ pub struct PlainFit {
     pub rest_pose: Rigid,
     /// From displacement relative to the rest pose to wrench.
     pub stiffness: Matrix6<f64>,
-    /// What these constants leave over the loads.
+    /// The same under compression, where the input has a table.
+    pub stiffness_at: Vec<StiffnessAt>,
+    /// What the one 6x6 leaves over the loads, against the wrench that the given 6x6 means.
     pub left: Bias,
-    /// What the true positions and the given 6x6 would leave, relative to their own rest pose.
+    /// What the true positions and the given 6x6 would leave, relative to their own rest pose, against the same.
     pub naive: Bias,
+    /// What the one 6x6 leaves against the loads' own wrenches.
+    pub left_of_load: Bias,
+    /// What the table leaves against the loads' own wrenches.
+    pub left_of_load_by_table: Bias,
+    /// What the true positions and the given 6x6 would leave against the loads' own wrenches.
+    pub naive_of_load: Bias,
     /// Error at rest of the absolute pose (mm, degrees) and of the wrench that an absolute pose means.
     pub naive_at_rest_pose: [f64; 6],
     /// As a wrench, N and N*mm.
     pub naive_at_rest_wrench: [f64; 6],
-}
-
-/// A plain runtime: pinhole, no layers, markers at the positions it is given.
-struct Plain {
-    solver: PoseSolver,
-}
-
-impl Plain {
-    fn new(input: &PlainInput, positions_mm: &[DVec3]) -> Result<Self, PlainError> {
-        let lens = input.optics.lens().spec();
-        let spec = OpticsSpec {
-            lens: LensSpec {
-                model: Model::Pinhole,
-                matrix: input.undistorted_matrix,
-                distortion: vec![],
-                pupil_shift_mm: vec![],
-                // All that a plane frame can hold.
-                field_of_view_rad: 179_f64.to_radians(),
-                ..lens.clone()
-            },
-            sensor_from_camera: *input.optics.rest_from_camera(),
-            layers: vec![Layer { name: "nothing".into(), index: [1.0; 3], thickness_mm: None }],
-            // Nothing is above the sheet for it; apparent positions may lie there.
-            dome_radius_mm: 1e3 * input.optics.dome_radius_mm(),
-        };
-        let optics = SensorOptics::new(&spec).map_err(PlainError::Optics)?;
-        let markers: Vec<Marker> = input
-            .markers
-            .iter()
-            .zip(positions_mm)
-            .map(|(marker, position_mm)| Marker { position_mm: *position_mm, diameter_mm: 0.0, ..*marker })
-            .collect();
-        // The plain runtime has no gate: whatever the residual, it takes the pose.
-        let options = PoseOptions { noise_px: 1e3, most_shift_mm: 1e6, most_turn_rad: 10.0 };
-        Ok(Self { solver: PoseSolver::new(&optics, &markers, options).map_err(PlainError::Pose)? })
-    }
-
-    /// `camera_from_sensor` as solvePnP would say.
-    fn pose(&self, sightings: &[Sighting]) -> Result<Rigid, PlainError> {
-        let found = self.solver.solve(sightings).map_err(PlainError::Pose)?;
-        Ok(self.solver.optics().rest_from_camera().inverse().compose(&found.pose))
-    }
-}
-
-/// Centroids in the undistorted frame and the directions that they stand for, at one pose.
-fn undistorted(input: &PlainInput, pose: &Rigid) -> Result<(Vec<Sighting>, Vec<DVec3>), PlainError> {
-    let optics = input.optics.at_pose(pose).map_err(PlainError::Optics)?;
-    let [[fx, _, cx], [_, fy, cy], _] = input.undistorted_matrix;
-    let mut sightings = Vec::with_capacity(input.markers.len());
-    let mut rays = Vec::with_capacity(input.markers.len());
-    for marker in input.markers {
-        let hidden = |limit| PlainError::NotVisible { id: marker.id, limit };
-        let image = marker.image(&optics).map_err(hidden)?;
-        let ray = optics.lens().unproject(image.centroid_px).map_err(|limit| hidden(limit.into()))?;
-        if ray.z <= 0.0 {
-            return Err(hidden(Limit::BeyondFieldOfView));
-        }
-        let centroid_px = DVec2::new(fx * ray.x / ray.z + cx, fy * ray.y / ray.z + cy);
-        sightings.push(Sighting { id: marker.id, centroid_px });
-        rays.push(ray);
-    }
-    Ok((sightings, rays))
 }
 
 /// The point nearest to a bundle of lines (origin, unit direction), in the sense of least squares.
@@ -186,25 +129,39 @@ impl PlainFit {
     /// # Errors
     /// [`PlainError`] for loads under which a marker is not seen, or fewer loads than the fit needs.
     pub fn over(input: &PlainInput, loads: &[PosedLoad]) -> Result<Self, PlainError> {
-        let seen: Vec<(Vec<Sighting>, Vec<DVec3>)> =
+        let seen: Vec<Frame> =
             loads.iter().map(|load| undistorted(input, &load.pose)).collect::<Result<_, _>>()?;
         let rest = undistorted(input, &Rigid::identity())?;
         let apparent_mm = apparent(input, loads, &seen, &rest)?;
         let truth: Vec<DVec3> = input.markers.iter().map(|m| m.position_mm).collect();
+        let moved: Vec<Vector6<f64>> = loads
+            .iter()
+            .map(|load| Vector6::from(Displacement::of_pose(&load.pose, input.at_mm).to_array()))
+            .collect();
+        let linear: Vec<Vector6<f64>> = moved.iter().map(|d| input.stiffness * d).collect();
+        let own: Vec<Vector6<f64>> = loads.iter().map(|load| Vector6::from(load.wrench)).collect();
+
         let (naive_rest, naive_found) = run(input, &truth, &seen, &rest)?;
-        let naive = bias(input, loads, &naive_found, &input.stiffness);
         let (rest_pose, found) = run(input, &apparent_mm, &seen, &rest)?;
-        let stiffness = effective(input, loads, &found)?;
-        let left = bias(input, loads, &found, &stiffness);
+        let stiffness = effective(&input.stiffness, &linear, &found)?;
+        let stiffness_at = effective_table(input, &stiffness);
+        let nominal = |d: &Vector6<f64>| input.stiffness * d;
+        let one = |d: &Vector6<f64>| stiffness * d;
+        let table = |d: &Vector6<f64>| stiffness_between(&stiffness_at, &stiffness, -d[2]) * d;
+
         let off = input.optics.rest_from_camera().compose(&naive_rest);
         let off = Displacement::of_pose(&off, input.at_mm).to_array();
         let naive_at_rest_wrench = (input.stiffness * Vector6::from(off)).into();
         Ok(Self {
             apparent_mm,
             rest_pose,
+            left: bias(&moved, &linear, &found, one),
+            naive: bias(&moved, &linear, &naive_found, nominal),
+            left_of_load: bias(&moved, &own, &found, one),
+            left_of_load_by_table: bias(&moved, &own, &found, table),
+            naive_of_load: bias(&moved, &own, &naive_found, nominal),
             stiffness,
-            left,
-            naive,
+            stiffness_at,
             naive_at_rest_pose: in_degrees(off),
             naive_at_rest_wrench,
         })
@@ -215,8 +172,8 @@ impl PlainFit {
 fn apparent(
     input: &PlainInput,
     loads: &[PosedLoad],
-    seen: &[(Vec<Sighting>, Vec<DVec3>)],
-    rest: &(Vec<Sighting>, Vec<DVec3>),
+    seen: &[Frame],
+    rest: &Frame,
 ) -> Result<Vec<DVec3>, PlainError> {
     let rest_from_camera = input.optics.rest_from_camera();
     let line = |pose: &Rigid, ray: DVec3| {
@@ -225,8 +182,8 @@ fn apparent(
     };
     let mut points = Vec::with_capacity(input.markers.len());
     for index in 0..input.markers.len() {
-        let mut lines = vec![line(&Rigid::identity(), rest.1[index])];
-        lines.extend(loads.iter().zip(seen).map(|(load, (_, rays))| line(&load.pose, rays[index])));
+        let mut lines = vec![line(&Rigid::identity(), rest.rays[index])];
+        lines.extend(loads.iter().zip(seen).map(|(load, frame)| line(&load.pose, frame.rays[index])));
         points.push(nearest_point(&lines).ok_or(PlainError::Undetermined)?);
     }
     settle_at_rest(input, &mut points, rest)?;
@@ -234,13 +191,9 @@ fn apparent(
 }
 
 /// Moves all positions as one so that plain PnP is right at rest.
-fn settle_at_rest(
-    input: &PlainInput,
-    points: &mut [DVec3],
-    rest: &(Vec<Sighting>, Vec<DVec3>),
-) -> Result<(), PlainError> {
+fn settle_at_rest(input: &PlainInput, points: &mut [DVec3], rest: &Frame) -> Result<(), PlainError> {
     for _ in 0..4 {
-        let found = Plain::new(input, points)?.pose(&rest.0)?;
+        let found = Plain::new(input, points)?.pose(&rest.sightings)?;
         let off = input.optics.rest_from_camera().compose(&found);
         for point in points.iter_mut() {
             *point = off.point(*point);
@@ -249,40 +202,21 @@ fn settle_at_rest(
     Ok(())
 }
 
-/// Plain PnP at rest and at every load; the latter as displacements relative to the former.
-fn run(
-    input: &PlainInput,
-    positions_mm: &[DVec3],
-    seen: &[(Vec<Sighting>, Vec<DVec3>)],
-    rest: &(Vec<Sighting>, Vec<DVec3>),
-) -> Result<(Rigid, Vec<[f64; 6]>), PlainError> {
-    let plain = Plain::new(input, positions_mm)?;
-    let rest_pose = plain.pose(&rest.0)?;
-    let from_rest = rest_pose.inverse();
-    let displacement = |(sightings, _): &(Vec<Sighting>, Vec<DVec3>)| {
-        let relative = from_rest.compose(&plain.pose(sightings)?);
-        Ok(Displacement::of_pose(&relative, input.at_mm).to_array())
-    };
-    Ok((rest_pose, seen.iter().map(displacement).collect::<Result<_, _>>()?))
-}
-
 /// The 6x6 that takes the displacements to the wrenches, in the sense of least squares; where the loads leave a
-/// direction open, the given 6x6 stays.
+/// direction open, the given 6x6 stays, and so does a row of it that is as good as the fitted one.
 ///
-/// Each wrench axis is weighed by its own spread, and the departure from the given 6x6 is held back a little: a
-/// millionth of the weight of the data, enough to decide what they do not.
+/// The departure from the given 6x6 is held back a little: a millionth of the weight of the data, enough to decide
+/// what they do not.
 fn effective(
-    input: &PlainInput,
-    loads: &[PosedLoad],
-    found: &[[f64; 6]],
+    given: &Matrix6<f64>,
+    wrenches: &[Vector6<f64>],
+    found: &[Vector6<f64>],
 ) -> Result<Matrix6<f64>, PlainError> {
     let mut normal = Matrix6::zeros();
     let mut right = Matrix6::zeros();
-    for (load, d) in loads.iter().zip(found) {
-        let d = Vector6::from(*d);
-        let miss = Vector6::from(load.wrench) - input.stiffness * d;
+    for (wrench, d) in wrenches.iter().zip(found) {
         normal += d * d.transpose();
-        right += d * miss.transpose();
+        right += d * (wrench - given * d).transpose();
     }
     // The displacement axes in their own sizes, so that the hold means the same for mm and rad.
     let size = Vector6::from_fn(|i, _| normal[(i, i)].max(1e-12).sqrt());
@@ -293,21 +227,45 @@ fn effective(
     let right = Matrix6::from_fn(|i, j| right[(i, j)] / size[i]);
     let change = scaled.cholesky().ok_or(PlainError::Undetermined)?.solve(&right);
     let change = Matrix6::from_fn(|i, j| change[(i, j)] / size[i]);
-    Ok(input.stiffness + change.transpose())
+    let mut fitted = given + change.transpose();
+    for row in 0..6 {
+        let size_of = |matrix: &Matrix6<f64>| -> f64 {
+            wrenches.iter().zip(found).map(|(w, d)| (matrix.row(row) * d - w.row(row)).x.abs()).sum()
+        };
+        if size_of(&fitted) > 0.99 * size_of(given) {
+            fitted.set_row(row, &given.row(row));
+        }
+    }
+    Ok(fitted)
+}
+
+/// K(compression) A with A = K^-1 times the effective 6x6: what brings the table to plain displacements. Empty where
+/// K has no inverse.
+fn effective_table(input: &PlainInput, effective: &Matrix6<f64>) -> Vec<StiffnessAt> {
+    let Some(map) = input.stiffness.lu().solve(effective) else { return Vec::new() };
+    let at = |entry: &StiffnessAt| StiffnessAt {
+        compression_mm: entry.compression_mm,
+        stiffness: rows(&(matrix_of(&entry.stiffness) * map)),
+    };
+    input.stiffness_at.iter().map(at).collect()
 }
 
 fn in_degrees(d: [f64; 6]) -> [f64; 6] {
     std::array::from_fn(|i| if i < 3 { d[i] } else { d[i].to_degrees() })
 }
 
-/// Mean errors of poses and wrenches over the loads.
-fn bias(input: &PlainInput, loads: &[PosedLoad], found: &[[f64; 6]], stiffness: &Matrix6<f64>) -> Bias {
-    let count = loads.len().max(1) as f64;
+/// Mean errors of the displacements that were found, and of the wrenches that `law` makes of them.
+fn bias(
+    moved: &[Vector6<f64>],
+    wrenches: &[Vector6<f64>],
+    found: &[Vector6<f64>],
+    law: impl Fn(&Vector6<f64>) -> Vector6<f64>,
+) -> Bias {
+    let count = found.len().max(1) as f64;
     let mut sums = [[0.0; 6]; 4];
-    for (load, d) in loads.iter().zip(found) {
-        let truth = Displacement::of_pose(&load.pose, input.at_mm).to_array();
-        let pose = in_degrees(std::array::from_fn(|i| d[i] - truth[i]));
-        let wrench = stiffness * Vector6::from(*d) - Vector6::from(load.wrench);
+    for ((truth, wrench), d) in moved.iter().zip(wrenches).zip(found) {
+        let pose = in_degrees((d - truth).into());
+        let wrench = law(d) - wrench;
         for i in 0..6 {
             for (sum, value) in sums.iter_mut().zip([pose[i], pose[i].abs(), wrench[i], wrench[i].abs()]) {
                 sum[i] += value / count;
@@ -316,40 +274,4 @@ fn bias(input: &PlainInput, loads: &[PosedLoad], found: &[[f64; 6]], stiffness: 
     }
     let [mean_pose, mean_pose_size, mean_wrench, mean_wrench_size] = sums;
     Bias { mean_pose, mean_pose_size, mean_wrench, mean_wrench_size }
-}
-
-/// Loads that fill the claims: each claimed wrench at a third, two thirds and in whole, turned about the axis by
-/// quarter turns, and each half and half with every other; each with the pose that `pose_of` finds for it.
-/// Loads without a pose are left out.
-pub fn loads_over(claims: &[[f64; 6]], mut pose_of: impl FnMut([f64; 6]) -> Option<Rigid>) -> Vec<PosedLoad> {
-    let turned = |w: [f64; 6], quarter: u32| {
-        let turn = DMat3::from_rotation_z(f64::from(quarter) * std::f64::consts::FRAC_PI_2);
-        let f = turn * DVec3::new(w[0], w[1], w[2]);
-        let m = turn * DVec3::new(w[3], w[4], w[5]);
-        [f.x, f.y, f.z, m.x, m.y, m.z]
-    };
-    let mut wrenches: Vec<[f64; 6]> = Vec::new();
-    for (i, claim) in claims.iter().enumerate() {
-        for quarter in 0..4 {
-            let whole = turned(*claim, quarter);
-            for part in [1.0 / 3.0, 2.0 / 3.0, 1.0] {
-                wrenches.push(whole.map(|v| v * part));
-            }
-            // Twists have a sign that no turn about the axis changes.
-            wrenches.push(std::array::from_fn(|k| if k == 5 { -whole[k] } else { whole[k] }));
-            for other in &claims[..i] {
-                wrenches.push(std::array::from_fn(|k| 0.5 * (whole[k] + other[k])));
-            }
-        }
-    }
-    let mut loads: Vec<PosedLoad> = Vec::with_capacity(wrenches.len());
-    for wrench in wrenches {
-        if loads.iter().any(|load| load.wrench == wrench) {
-            continue;
-        }
-        if let Some(pose) = pose_of(wrench) {
-            loads.push(PosedLoad { pose, wrench });
-        }
-    }
-    loads
 }

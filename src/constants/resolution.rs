@@ -29,8 +29,12 @@ pub struct Resolution {
     pub condition: f64,
     /// The lever that made rad comparable with mm: the markers' distance from their middle, mm.
     pub lever_mm: f64,
-    /// The force axis and the moment axis with the largest standard deviation.
-    pub weak_axes: [&'static str; 2],
+    /// The force axes and then the moment axes with the largest standard deviation, ties within a hundredth included.
+    ///
+    /// They depend on the point that wrenches are stated about. About the springs' middle, below the markers, an
+    /// error of the tilt swings that point sideways, so Fx and Fy are weak with Mx and My; about the markers' own plane
+    /// the force along the camera's axis, Fz, is the weakest.
+    pub weak_axes: Vec<&'static str>,
 }
 
 /// The bound at a pose; `None` where a marker is not seen or the pixels leave a direction open.
@@ -64,8 +68,10 @@ pub fn resolution_at(
     let condition = (values.max() / values.min()).sqrt();
     let sd = |m: &Matrix6<f64>| -> [f64; 6] { std::array::from_fn(|i| m[(i, i)].max(0.0).sqrt()) };
     let wrench_sd = sd(&of_wrench);
-    let weakest =
-        |from: usize| (from..from + 3).max_by(|a, b| wrench_sd[*a].total_cmp(&wrench_sd[*b])).unwrap_or(from);
+    let weakest = |from: usize| {
+        let most = wrench_sd[from..from + 3].iter().copied().fold(0.0, f64::max);
+        (from..from + 3).filter(move |axis| wrench_sd[*axis] >= 0.99 * most).map(|axis| WRENCH_AXES[axis])
+    };
     let pose_sd = sd(&covariance);
     let finite = condition.is_finite() && wrench_sd.iter().all(|v| v.is_finite());
     finite.then(|| Resolution {
@@ -75,7 +81,7 @@ pub fn resolution_at(
         wrench_correlation: correlation(&of_wrench),
         condition,
         lever_mm,
-        weak_axes: [WRENCH_AXES[weakest(0)], WRENCH_AXES[weakest(3)]],
+        weak_axes: weakest(0).chain(weakest(3)).collect(),
     })
 }
 

@@ -3,8 +3,9 @@
 use glam::DVec3;
 use nalgebra::Matrix6;
 
+use super::loads::{PosedLoad, loads_over};
 use super::model::{Constants, PlainRuntime, SpringConstants, StiffnessAt};
-use super::plain::{PlainFit, PlainInput, PosedLoad, loads_over};
+use super::plain::{PlainFit, PlainInput};
 use super::sight::{MarkerSight, markers_of};
 use crate::design::{Design, DesignError};
 use crate::mechanics::{Displacement, Suspension, Wrench, limits_of, suspension_of, try_load};
@@ -13,12 +14,14 @@ use crate::mechanics::{Displacement, Suspension, Wrench, limits_of, suspension_o
 const COMPRESSION_STEP_MM: f64 = 0.5;
 
 /// The springs of a design for its constants, and the fit for the plain runtime where the claimed loads allow one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct DesignSprings {
     /// What goes into the constants.
     pub constants: SpringConstants,
     /// The fit behind `plain_runtime`.
     pub plain: Option<PlainFit>,
+    /// What the camera sees of the markers; it costs to compute, so it is passed on.
+    pub sight: MarkerSight,
 }
 
 /// Rows of a matrix, as the constants carry it.
@@ -32,9 +35,8 @@ pub fn matrix_of(rows: &[[f64; 6]; 6]) -> Matrix6<f64> {
 }
 
 /// Every load that [`loads_over`] makes of the design's claims, with its pose, where springs and sight allow it.
-pub fn claimed_loads(design: &Design, suspension: &Suspension) -> Vec<PosedLoad> {
+pub fn claimed_loads(design: &Design, suspension: &Suspension, sight: &MarkerSight) -> Vec<PosedLoad> {
     let limits = limits_of(design);
-    let sight = MarkerSight::of(design);
     let at_mm = suspension.at_mm();
     let claims: Vec<[f64; 6]> = design
         .sections()
@@ -55,11 +57,11 @@ pub fn claimed_loads(design: &Design, suspension: &Suspension) -> Vec<PosedLoad>
     })
 }
 
-/// The springs of a design.
+/// The springs of a design; `sight` watches its white markers.
 ///
 /// # Errors
 /// [`DesignError`] where the springs have no stiffness at rest.
-pub fn springs_of(design: &Design) -> Result<DesignSprings, DesignError> {
+pub fn springs_of(design: &Design, sight: MarkerSight) -> Result<DesignSprings, DesignError> {
     let suspension = suspension_of(design)?;
     let fault = |error: crate::mechanics::MechanicsError| {
         DesignError::at("springs", "", error.to_string(), "springs that stand at rest")
@@ -80,17 +82,11 @@ pub fn springs_of(design: &Design) -> Result<DesignSprings, DesignError> {
         undistorted_matrix: design.undistorted_matrix(),
         at_mm,
         stiffness,
+        stiffness_at: &stiffness_at,
     };
     // Without enough loads the plain runtime gets no constants of its own: their absence says so.
-    let plain = PlainFit::over(&input, &claimed_loads(design, &suspension));
-    #[cfg(test)]
-    if let Err(error) = &plain {
-        println!("no plain runtime: {error}");
-    }
-    let plain = plain.ok();
-    let plain_runtime = plain
-        .as_ref()
-        .map(|fit| PlainRuntime { stiffness: rows(&fit.stiffness), rest_pose: fit.rest_pose.to_rows_4x4() });
+    let plain = PlainFit::over(&input, &claimed_loads(design, &suspension, &sight)).ok();
+    let plain_runtime = plain.as_ref().map(PlainFit::constants);
     let constants = SpringConstants {
         stiffness: rows(&stiffness),
         at_mm: at_mm.to_array(),
@@ -99,25 +95,40 @@ pub fn springs_of(design: &Design) -> Result<DesignSprings, DesignError> {
         offset: None,
         plain_runtime,
     };
-    Ok(DesignSprings { constants, plain })
+    Ok(DesignSprings { constants, plain, sight })
 }
 
 /// The wrench of a displacement by the constants: the 6x6 interpolated at the compression (linearly between the
 /// tabulated ones, the nearest beyond them), or the one at rest where there is no table.
 pub fn wrench_by_table(springs: &SpringConstants, displacement: &Displacement) -> [f64; 6] {
     let d = nalgebra::Vector6::from(displacement.to_array());
-    let compression = -displacement.translation_mm.z;
-    let table = &springs.stiffness_at;
-    let above = table.partition_point(|entry| entry.compression_mm <= compression);
-    let matrix = match (above.checked_sub(1).and_then(|i| table.get(i)), table.get(above)) {
+    let at_rest = matrix_of(&springs.stiffness);
+    (stiffness_between(&springs.stiffness_at, &at_rest, -displacement.translation_mm.z) * d).into()
+}
+
+/// The 6x6 of a table at a compression (mm): linear between two entries, the nearest beyond them, `at_rest` where
+/// there is no table.
+pub fn stiffness_between(table: &[StiffnessAt], at_rest: &Matrix6<f64>, compression_mm: f64) -> Matrix6<f64> {
+    let above = table.partition_point(|entry| entry.compression_mm <= compression_mm);
+    match (above.checked_sub(1).and_then(|i| table.get(i)), table.get(above)) {
         (Some(low), Some(high)) => {
-            let part = (compression - low.compression_mm) / (high.compression_mm - low.compression_mm);
+            let part = (compression_mm - low.compression_mm) / (high.compression_mm - low.compression_mm);
             matrix_of(&low.stiffness) * (1.0 - part) + matrix_of(&high.stiffness) * part
         }
         (Some(end), None) | (None, Some(end)) => matrix_of(&end.stiffness),
-        (None, None) => matrix_of(&springs.stiffness),
-    };
-    (matrix * d).into()
+        (None, None) => *at_rest,
+    }
+}
+
+impl PlainFit {
+    /// What goes into the constants.
+    fn constants(&self) -> PlainRuntime {
+        PlainRuntime {
+            stiffness: rows(&self.stiffness),
+            stiffness_at: self.stiffness_at.clone(),
+            rest_pose: self.rest_pose.to_rows_4x4(),
+        }
+    }
 }
 
 impl Constants {
@@ -130,10 +141,7 @@ impl Constants {
                 fit.as_ref().and_then(|f| f.apparent_mm.get(index)).map(|p| p.to_array());
         }
         if let Some(springs) = self.springs.as_mut() {
-            springs.plain_runtime = fit.map(|f| PlainRuntime {
-                stiffness: rows(&f.stiffness),
-                rest_pose: f.rest_pose.to_rows_4x4(),
-            });
+            springs.plain_runtime = fit.as_ref().map(PlainFit::constants);
         }
     }
 
@@ -149,9 +157,15 @@ impl Constants {
             for turn in 0..8 {
                 let angle = f64::from(turn) * std::f64::consts::FRAC_PI_4;
                 let (cos, sin) = (angle.cos(), angle.sin());
-                for (shift, tilt, twist) in
-                    [(0.0, 0.0, 0.0), (0.1, 0.0, 0.01), (0.0, 0.03, -0.01), (0.1, 0.03, 0.02)]
-                {
+                for (shift, tilt, twist) in [
+                    (0.0, 0.0, 0.0),
+                    (0.1, 0.0, 0.01),
+                    (0.1, 0.0, -0.01),
+                    (0.0, 0.03, 0.01),
+                    (0.0, 0.03, -0.01),
+                    (0.1, 0.03, 0.02),
+                    (0.1, 0.03, -0.02),
+                ] {
                     let displacement = Displacement {
                         translation_mm: DVec3::new(shift * cos, shift * sin, -down),
                         rotation_rad: DVec3::new(-tilt * sin, tilt * cos, twist),
@@ -170,6 +184,7 @@ impl Constants {
             undistorted_matrix: self.camera.undistorted_matrix,
             at_mm,
             stiffness: matrix_of(&springs.stiffness),
+            stiffness_at: &springs.stiffness_at,
         };
         PlainFit::over(&input, &loads).ok()
     }

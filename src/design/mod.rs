@@ -6,11 +6,13 @@
 //! they never check again, and they never see a default that the file does not state.
 
 mod error;
+mod explain;
 mod resolve;
 mod rules;
 mod schema;
 pub mod sections;
 mod source;
+mod suspicions;
 #[cfg(test)]
 mod tests;
 
@@ -22,6 +24,7 @@ use serde_json::Value;
 use crate::optics::SensorOptics;
 
 pub use error::DesignError;
+pub use explain::{Explained, explain};
 pub use resolve::{Design, DesignWarning};
 pub use schema::{design_schema, schema_of};
 pub use sections::DesignFile;

@@ -6,6 +6,7 @@ use serde_json::json;
 use super::error::DesignError;
 use super::rules;
 use super::sections::{CameraSection, DesignFile, DomeSection, ModelName, OpticsSection, SpringPlaces};
+use super::suspicions::suspicions;
 use crate::camera::{LensSpec, Model};
 use crate::numeric::Rigid;
 use crate::optics::{Layer, OpticsSpec, SensorOptics};
@@ -29,6 +30,7 @@ pub struct Design {
     text: String,
     optics: SensorOptics,
     warnings: Vec<DesignWarning>,
+    suspicions: Vec<DesignWarning>,
 }
 
 impl Design {
@@ -50,6 +52,11 @@ impl Design {
     /// What the maker should know.
     pub fn warnings(&self) -> &[DesignWarning] {
         &self.warnings
+    }
+
+    /// A fault found later, with what looked wrong from the start.
+    pub fn beside_suspicions(&self, fault: DesignError) -> DesignError {
+        beside(fault, &self.suspicions)
     }
 
     /// Name of the design.
@@ -181,11 +188,25 @@ pub(super) fn optics(
 /// Checks the rules between fields and computes what follows from them.
 pub(super) fn resolve(sections: DesignFile, text: &str) -> Result<Design, DesignError> {
     check_name(&sections.name)?;
-    let optics = optics(&sections.camera, &sections.optics, &sections.dome)?;
-    let warnings = field_of_view_warning(&sections.camera, &optics).into_iter().collect();
-    let design = Design { sections, text: text.to_owned(), optics, warnings };
-    rules::check(&design)?;
+    let optics = optics(&sections.camera, &sections.optics, &sections.dome)
+        .map_err(|fault| beside(fault, &suspicions(&sections, None)))?;
+    let suspicions = suspicions(&sections, Some(&optics));
+    let warnings =
+        field_of_view_warning(&sections.camera, &optics).into_iter().chain(suspicions.clone()).collect();
+    let design = Design { sections, text: text.to_owned(), optics, warnings, suspicions };
+    rules::check(&design).map_err(|fault| design.beside_suspicions(fault))?;
     Ok(design)
+}
+
+/// A fault with what else looks wrong: where it shows is often not where the mistake is. One mistake throws many
+/// numbers out of proportion, so only the first suspicions are told.
+fn beside(mut fault: DesignError, suspicions: &[DesignWarning]) -> DesignError {
+    const MOST: usize = 2;
+    for suspicion in suspicions.iter().take(MOST) {
+        let told = format!("perhaps `{}`: {}", suspicion.field, suspicion.message);
+        fault.help = Some(fault.help.map_or_else(|| told.clone(), |help| format!("{help}; {told}")));
+    }
+    fault
 }
 
 /// A field of view that the lens model cannot reach is said, with the fold that ends it.

@@ -256,7 +256,16 @@ fn check_type(schema: &Value, value: &Value, at: &str) -> Result<(), DesignError
     if type_fits(schema, value) {
         return Ok(());
     }
-    Err(DesignError::at(at, value, format!("{} does not belong here", kind_of(value)), type_words(schema)))
+    let fault =
+        DesignError::at(at, value, format!("{} does not belong here", kind_of(value)), type_words(schema));
+    let reads_as_number = |text: &str| text.trim().replacen(',', ".", 1).parse::<f64>().is_ok();
+    match value.as_str() {
+        Some(text) if text.contains(',') && reads_as_number(text) => {
+            Err(fault.with_help("a decimal comma? JSON wants a bare number with a point, as in 10.5"))
+        }
+        Some(text) if reads_as_number(text) => Err(fault.with_help("write the number without quotes")),
+        _ => Err(fault),
+    }
 }
 
 fn type_fits(schema: &Value, value: &Value) -> bool {
@@ -301,7 +310,15 @@ fn check_range(schema: &Value, number: f64, value: &Value, at: &str) -> Result<(
     }
     let allowed: Vec<String> =
         rules.iter().filter_map(|(bound, word, _)| bound.map(|bound| format!("{word} {bound}"))).collect();
-    Err(DesignError::at(at, value, "the value is out of range", allowed.join(" and ")))
+    let fault = DesignError::at(at, value, "the value is out of range", allowed.join(" and "));
+    let in_degrees = number.to_degrees();
+    let could_be = bound("minimum").is_none_or(|low| in_degrees >= low) && in_degrees <= 360.0;
+    if at.ends_with("_deg") && number > 0.0 && could_be {
+        return Err(
+            fault.with_help(format!("radians for degrees? {number} rad would be {in_degrees:.1} degrees"))
+        );
+    }
+    Err(fault)
 }
 
 fn unknown_key(key: &str, value: &Value, known: &Map<String, Value>, at: &str) -> DesignError {

@@ -99,7 +99,7 @@ impl DotCurve<'_> {
     }
 
     /// The point on the dome and its derivative, mm.
-    fn on_dome(&self, angle: f64) -> Result<(DVec3, DVec3), Reason> {
+    pub(super) fn on_dome(&self, angle: f64) -> Result<(DVec3, DVec3), Reason> {
         match self {
             Self::Apparent { carrier, .. } => {
                 let pixel = self.in_image(angle)?;

@@ -4,10 +4,16 @@
 //! the boundary holds them in (P.-O. Persson and G. Strang, "A Simple Mesh Generator in MATLAB", SIAM Review
 //! 46(2), 2004, with a uniform size). The start is a hexagonal lattice inside and an evenly divided row on
 //! the boundary, so that only the zone between the two has to find its places.
+//!
+//! A lattice does not fit into a round edge: between the two some strain is left, which the pressure spreads. How much
+//! depends on where the rest is found, so that small patterns are started in several ways and the most even one is
+//! kept. Dots pressed until they touch like coins would have equal nearest distances, but holes as wide as 1.4
+//! spacings between them; the pressure here keeps them below 1.2, and the nearest distances within 4 to 5 %.
 
 use std::f64::consts::TAU;
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::boundary::Boundary;
 use super::neighbors::delaunay_edges;
@@ -24,34 +30,87 @@ const MOST_STEPS: u32 = 400;
 const AT_REST: f64 = 2e-4;
 /// The triangulation is made anew when a dot has moved by this share of the pitch since the last one.
 const RETRIANGULATE: f64 = 0.1;
-/// Lattice places nearer to the boundary than this share of the pitch give way to the boundary's own row.
-/// Half a row's distance (0.433) on both sides would be even; the pressure evens out the rest.
-const GIVE_WAY: f64 = 0.5;
+/// Ways to start: lattice places nearer to the boundary than this share of the pitch give way to the boundary's own
+/// row, which has so many dots fewer than fit. Half a row's distance (0.433) on both sides would be even; the pressure
+/// evens out the rest.
+const STARTS: [Start; 5] = [
+    Start { give_way: 0.5, fewer: 0 },
+    Start { give_way: 0.5, fewer: 1 },
+    Start { give_way: 0.35, fewer: 0 },
+    Start { give_way: 0.35, fewer: 1 },
+    Start { give_way: 0.65, fewer: 1 },
+];
+/// Larger patterns are started in the first way only: their rim is a small part of them.
+const MOST_TRIED: usize = 2000;
+
+/// A way to start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Start {
+    give_way: f64,
+    fewer: usize,
+}
 
 /// The places of a relaxed filling of the edge, px from the centre.
 pub(super) fn relaxed(pattern: &Pattern, edge: &Boundary) -> Vec<DVec2> {
     let pitch = pattern.pitch_px;
-    let mut places = seeds(pattern, edge);
-    // The dot at the centre stays there.
-    let held = match pattern.centred_on {
-        CentredOn::Dot => places.iter().position(|place| place.length() < 1e-9 * pitch),
-        CentredOn::Gap => None,
+    let first = seeds(pattern, edge);
+    let mut starts = vec![first];
+    if starts[0].len() <= MOST_TRIED {
+        for start in &STARTS[1..] {
+            let places = seeds_of(pattern, edge, *start);
+            // A number that is wanted is kept.
+            let fits = pattern.wanted.is_none() || places.len() == starts[0].len();
+            if fits && !places.is_empty() && !starts.contains(&places) {
+                starts.push(places);
+            }
+        }
+    }
+    let rest = |mut places: Vec<DVec2>| {
+        // The dot at the centre stays there.
+        let held = match pattern.centred_on {
+            CentredOn::Dot => places.iter().position(|place| place.length() < 1e-9 * pitch),
+            CentredOn::Gap => None,
+        };
+        relax(&mut places, held, edge, pitch);
+        let uneven = if places.len() <= MOST_TRIED { unevenness(&places) } else { 0.0 };
+        (uneven, places)
     };
-    relax(&mut places, held, edge, pitch);
-    places
+    let relaxed: Vec<(f64, Vec<DVec2>)> = starts.into_par_iter().map(rest).collect();
+    // The first of equals, whichever was ready first.
+    let best = relaxed.into_iter().reduce(|best, next| if next.0 < best.0 { next } else { best });
+    best.map_or(Vec::new(), |(_, places)| places)
 }
 
-/// Where the relaxation starts.
+/// Standard deviation over mean of the distances to the nearest place.
+fn unevenness(places: &[DVec2]) -> f64 {
+    let mut nearest = vec![f64::INFINITY; places.len()];
+    for [a, b] in delaunay_edges(places) {
+        let (a, b) = (a as usize, b as usize);
+        let length = places[a].distance(places[b]);
+        nearest[a] = nearest[a].min(length);
+        nearest[b] = nearest[b].min(length);
+    }
+    let mean = nearest.iter().sum::<f64>() / nearest.len() as f64;
+    let variance = nearest.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>() / nearest.len() as f64;
+    // Two places or fewer are as even as can be.
+    if variance.is_finite() { variance.sqrt() / mean } else { 0.0 }
+}
+
+/// Where the relaxation starts, in the first way.
 pub(super) fn seeds(pattern: &Pattern, edge: &Boundary) -> Vec<DVec2> {
+    seeds_of(pattern, edge, STARTS[0])
+}
+
+fn seeds_of(pattern: &Pattern, edge: &Boundary, start: Start) -> Vec<DVec2> {
     let pitch = pattern.pitch_px;
-    let inner = edge.inset(GIVE_WAY * pitch);
+    let inner = edge.inset(start.give_way * pitch);
     let mut places: Vec<DVec2> = pattern
         .unit_lattice(edge.largest_px() / pitch)
         .into_iter()
         .map(|place| place * pitch)
         .filter(|place| inner.contains(*place) && inner.largest_px() > 0.0)
         .collect();
-    let row = row_on(edge, pitch, pattern.rotation_rad);
+    let row = row_on(edge, pitch, pattern.rotation_rad, start.fewer);
     if let Some(wanted) = pattern.wanted {
         give_up(&mut places, (wanted.saturating_sub(row.len())).max(1), edge);
     }
@@ -73,8 +132,8 @@ fn give_up(places: &mut Vec<DVec2>, wanted: usize, edge: &Boundary) {
     });
 }
 
-/// Places on the boundary, evenly divided along it, as many as the pitch asks for.
-fn row_on(edge: &Boundary, pitch: f64, start_rad: f64) -> Vec<DVec2> {
+/// Places on the boundary, evenly divided along it, as many as the pitch asks for or a few less.
+fn row_on(edge: &Boundary, pitch: f64, start_rad: f64, fewer: usize) -> Vec<DVec2> {
     let polygon: Vec<DVec2> = (0..=1440)
         .map(|k| DVec2::from_angle(start_rad + TAU * f64::from(k) / 1440.0))
         .map(|direction| direction * edge.radius_px(direction))
@@ -86,7 +145,7 @@ fn row_on(edge: &Boundary, pitch: f64, start_rad: f64) -> Vec<DVec2> {
         reached.push(length);
     }
     // Two dots face each other on an edge too short for three.
-    let count = (length / pitch).round();
+    let count = (length / pitch).round() - fewer as f64;
     if count < 2.0 {
         return Vec::new();
     }

@@ -34,6 +34,8 @@ pub enum Reason {
         /// Number of the white marker.
         marker: u32,
     },
+    /// The edge of the upper platform's window stands in its line of sight.
+    HiddenByPlatform,
     /// A keep-out zone of the design.
     KeepOut(Zone),
     /// Smaller on the plate than can be etched.
@@ -98,6 +100,7 @@ impl Reason {
             Self::OutsideImage => "outside_image",
             Self::OutsideMask => "outside_mask",
             Self::HiddenByMarker { .. } => "hidden_by_white_marker",
+            Self::HiddenByPlatform => "hidden_by_platform",
             Self::KeepOut(Zone::Pole) => "keep_out_pole",
             Self::KeepOut(Zone::Rim) => "keep_out_rim",
             Self::KeepOut(Zone::WhiteMarker(_)) => "keep_out_white_marker",
@@ -113,9 +116,11 @@ impl Reason {
     /// The rule that decides what happens.
     pub fn rule(&self) -> Rule {
         match self {
-            Self::Unseen(_) | Self::OutsideImage | Self::OutsideMask | Self::HiddenByMarker { .. } => {
-                Rule::Unseen
-            }
+            Self::Unseen(_)
+            | Self::OutsideImage
+            | Self::OutsideMask
+            | Self::HiddenByMarker { .. }
+            | Self::HiddenByPlatform => Rule::Unseen,
             Self::KeepOut(_) => Rule::KeepOut,
             Self::TooSmall { .. }
             | Self::TooClose { .. }
@@ -133,6 +138,7 @@ impl fmt::Display for Reason {
             Self::OutsideImage => write!(f, "part of it lies outside the camera's raster"),
             Self::OutsideMask => write!(f, "part of it lies outside the runtime's mask"),
             Self::HiddenByMarker { marker } => write!(f, "white marker {marker} hides it"),
+            Self::HiddenByPlatform => write!(f, "the edge of the upper platform's window hides it"),
             Self::KeepOut(zone) => match zone {
                 Zone::Pole => write!(f, "it reaches into the keep-out zone at the pole"),
                 Zone::Rim => write!(f, "it reaches into the keep-out zone at the rim"),

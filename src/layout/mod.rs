@@ -9,8 +9,10 @@ pub mod boundary;
 pub mod calibrate;
 mod carry;
 mod chance;
+mod check;
 pub mod coverage;
 pub mod dot;
+mod edge;
 pub mod evenness;
 mod fill;
 pub mod frame;
@@ -26,6 +28,8 @@ mod spec;
 pub mod target;
 #[cfg(test)]
 mod tests;
+pub mod tolerances;
+pub mod window;
 mod zones;
 
 use std::fmt;

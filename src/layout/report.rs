@@ -3,10 +3,13 @@
 use serde::Serialize;
 
 use super::coverage::{Coverage, coverage};
-use super::evenness::{self, EvennessReport, PinholeComparison, ToleranceReport};
+use super::evenness::{self, EvennessReport, PinholeComparison};
+use super::tolerances::{self, ToleranceReport};
+use super::window::Window;
 use super::{DotSize, Layout, LayoutSpec};
 use crate::design::Design;
 use crate::mechanics::{claims_of, suspension_of};
+use crate::optics::SensorOptics;
 
 /// A layout's report.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -77,6 +80,9 @@ impl LayoutReport {
     pub fn new(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Self {
         let diameters = layout.dots.iter().map(|dot| dot.diameter_mm);
         let (low, high) = diameters.fold((f64::INFINITY, 0.0f64), |(l, h), d| (l.min(d), h.max(d)));
+        let coverage = coverages(design, spec, layout);
+        let mut warnings = layout.warnings.clone();
+        warnings.extend(lost_under_load(&coverage));
         Self {
             dots: layout.dots.len(),
             pitch_px: layout.pitch_px,
@@ -98,10 +104,45 @@ impl LayoutReport {
             hits: hits(layout),
             evenness: evenness::by_design(layout),
             pinhole_alone: evenness::by_pinhole(spec, layout),
-            tolerances: evenness::under_tolerances(spec, layout, &design.sections().tolerances),
-            coverage: coverages(design, spec, layout),
-            warnings: layout.warnings.clone(),
+            tolerances: tolerances::under_tolerances(spec, layout, &design.sections().tolerances),
+            coverage,
+            warnings,
         }
+    }
+}
+
+impl LayoutReport {
+    /// What a person wants to know first: how even the pattern is, what the pinhole alone would have made of it, and
+    /// which tolerance hurts most.
+    pub fn headlines(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        let percent = |variation: f64| 100.0 * variation;
+        if let Some(own) = &self.evenness {
+            said.push(format!(
+                "distances to the nearest dot vary by {:.2} % in the image, {:.1} % on the dome",
+                percent(own.image_px.nearest.variation),
+                percent(own.dome_mm.nearest.variation)
+            ));
+        }
+        if let Some(pinhole) = &self.pinhole_alone {
+            said.push(format!(
+                "laid out by the pinhole alone they would vary by {:.1} %, dots {:.2} mm off on average, {:.2} mm at most",
+                percent(pinhole.image_px.nearest.variation),
+                pinhole.mean_shift_mm,
+                pinhole.max_shift_mm
+            ));
+        }
+        if let Some(tolerances) = &self.tolerances
+            && let Some(worst) = tolerances.ranking.first()
+        {
+            said.push(format!(
+                "within the tolerances 19 of 20 sensors vary by less than {:.1} %; {} hurts most ({:.1} % alone)",
+                percent(tolerances.nearest_variation_p95),
+                worst.tolerance,
+                percent(worst.added_variation)
+            ));
+        }
+        said
     }
 }
 
@@ -120,16 +161,28 @@ fn hits(layout: &Layout) -> Vec<HitRecord> {
 }
 
 fn coverages(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<CoverageRecord> {
-    let mut records =
-        vec![CoverageRecord { load: "at rest".into(), coverage: Some(coverage(spec, layout, &spec.optics)) }];
-    let Ok(suspension) = suspension_of(design) else { return records };
-    for (claim, case) in design.sections().loads.claims.iter().zip(claims_of(design, &suspension)) {
-        let pose = case.equilibrium.ok().map(|found| found.pose);
-        let optics = pose.and_then(|pose| spec.optics.at_pose(&pose).ok());
-        records.push(CoverageRecord {
-            load: claim.name.clone(),
-            coverage: optics.map(|optics| coverage(spec, layout, &optics)),
-        });
+    let mut positions = vec![("at rest".to_owned(), Some(spec.optics.clone()))];
+    if let Ok(suspension) = suspension_of(design) {
+        for (claim, case) in design.sections().loads.claims.iter().zip(claims_of(design, &suspension)) {
+            let pose = case.equilibrium.ok().map(|found| found.displacement.to_pose(suspension.at_mm()));
+            positions.push((claim.name.clone(), pose.and_then(|pose| spec.optics.at_pose(&pose).ok())));
+        }
     }
-    records
+    let window = Window::of_design(design, positions.iter().filter_map(|(_, optics)| optics.as_ref()));
+    let look = |optics: SensorOptics| coverage(spec, layout, &optics, window.as_ref());
+    positions.into_iter().map(|(load, optics)| CoverageRecord { load, coverage: optics.map(look) }).collect()
+}
+
+/// What a person should know of the dots that a load takes out of sight.
+fn lost_under_load(coverage: &[CoverageRecord]) -> Vec<String> {
+    let lost = coverage.iter().filter_map(|record| {
+        let unseen = &record.coverage.as_ref()?.unseen_dots;
+        let first = unseen.first()?;
+        let (count, load) = (unseen.len(), &record.load);
+        Some(format!(
+            "{count} dots are not seen whole ({load}); the first, dot {}: {}",
+            first.id, first.because
+        ))
+    });
+    lost.collect()
 }

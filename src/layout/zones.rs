@@ -1,4 +1,6 @@
 //! Zones of the raw image without dots: discs of the design, and the images of the white markers.
+//!
+//! Boxes are compared first: of a hundred thousand dots only those beside a zone are measured corner by corner.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +8,8 @@ use glam::{DVec2, DVec3};
 
 use super::lost::{Reason, Zone};
 use super::outline::Outline;
-use super::spec::LayoutSpec;
+use super::spec::{LayoutSpec, WhiteMarker};
+use crate::optics::SensorOptics;
 
 /// Points on the rim of a white marker.
 const RIM_POINTS: u32 = 48;
@@ -18,36 +21,57 @@ pub(super) struct ImageZone {
     /// Corners in order; a single one is a disc's centre.
     corners: Vec<DVec2>,
     margin_px: f64,
+    /// Lowest and highest coordinates that the zone reaches, margin included.
+    bounds: (DVec2, DVec2),
 }
 
-/// The zones of a design. A white marker that the lens does not see makes none.
+impl ImageZone {
+    fn new(reason: Reason, corners: Vec<DVec2>, margin_px: f64) -> Self {
+        let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        let (low, high) = corners.iter().fold(start, |(low, high), p| (low.min(*p), high.max(*p)));
+        let bounds = (low - DVec2::splat(margin_px), high + DVec2::splat(margin_px));
+        Self { reason, corners, margin_px, bounds }
+    }
+
+    /// Why a dot with these corners may not stand here, if it may not.
+    fn refuses(&self, dot: &[DVec2], (low, high): (DVec2, DVec2)) -> Option<Reason> {
+        let apart = low.cmpgt(self.bounds.1).any() || high.cmplt(self.bounds.0).any();
+        let near = !apart && gap(dot, &self.corners) < self.margin_px.max(f64::MIN_POSITIVE);
+        near.then_some(self.reason)
+    }
+}
+
+/// The images of the white markers at the pose that `optics` carries. A marker that the lens does not see makes
+/// none.
+pub(super) fn marker_zones(optics: &SensorOptics, markers: &[WhiteMarker]) -> Vec<ImageZone> {
+    let zone = |marker: &WhiteMarker| {
+        let reason = Reason::HiddenByMarker { marker: marker.id };
+        Some(ImageZone::new(reason, rim_px(optics, marker)?, 0.0))
+    };
+    markers.iter().filter_map(zone).collect()
+}
+
+/// The rim of a white marker in the raw image, px; `None` if the lens does not see all of it.
+fn rim_px(optics: &SensorOptics, marker: &WhiteMarker) -> Option<Vec<DVec2>> {
+    (0..RIM_POINTS)
+        .map(|k| DVec2::from_angle(TAU * f64::from(k) / f64::from(RIM_POINTS)) * (0.5 * marker.diameter_mm))
+        .map(|out| optics.project(marker.position_mm + DVec3::new(out.x, out.y, 0.0)).ok())
+        .collect()
+}
+
+/// The zones of a design at rest. A white marker that the lens does not see makes none.
 pub(super) fn image_zones(spec: &LayoutSpec) -> Vec<ImageZone> {
     let keep_out = &spec.pattern.keep_out;
-    let mut zones = Vec::new();
-    for marker in &spec.white_markers {
-        let rim: Result<Vec<DVec2>, _> = (0..RIM_POINTS)
-            .map(|k| {
-                DVec2::from_angle(TAU * f64::from(k) / f64::from(RIM_POINTS)) * (0.5 * marker.diameter_mm)
-            })
-            .map(|out| spec.optics.project(marker.position_mm + DVec3::new(out.x, out.y, 0.0)))
-            .collect();
-        let Ok(corners) = rim else { continue };
-        zones.push(ImageZone {
-            reason: Reason::HiddenByMarker { marker: marker.id },
-            corners: corners.clone(),
-            margin_px: 0.0,
-        });
-        if let Some(margin_px) = keep_out.white_marker_margin_px {
+    let mut zones = marker_zones(&spec.optics, &spec.white_markers);
+    if let Some(margin_px) = keep_out.white_marker_margin_px {
+        zones.extend(spec.white_markers.iter().filter_map(|marker| {
             let reason = Reason::KeepOut(Zone::WhiteMarker(marker.id));
-            zones.push(ImageZone { reason, corners, margin_px });
-        }
+            Some(ImageZone::new(reason, rim_px(&spec.optics, marker)?, margin_px))
+        }));
     }
     for (index, disc) in (0u32..).zip(&keep_out.image_discs) {
-        zones.push(ImageZone {
-            reason: Reason::KeepOut(Zone::ImageDisc(index)),
-            corners: vec![DVec2::from_array(disc.center_px)],
-            margin_px: disc.radius_px,
-        });
+        let reason = Reason::KeepOut(Zone::ImageDisc(index));
+        zones.push(ImageZone::new(reason, vec![DVec2::from_array(disc.center_px)], disc.radius_px));
     }
     zones
 }
@@ -57,17 +81,20 @@ pub(super) fn check(zones: &[ImageZone], outline: &Outline) -> Result<(), Reason
     if zones.is_empty() {
         return Ok(());
     }
-    let dot = outline.polygon(4);
-    match zones.iter().find(|zone| gap(&dot, &zone.corners) < zone.margin_px.max(f64::MIN_POSITIVE)) {
-        None => Ok(()),
-        Some(zone) => Err(zone.reason),
-    }
+    check_corners(zones, &outline.polygon(4))
+}
+
+/// Whether a dot, given by the corners of its outline in the raw image, keeps clear of all zones.
+pub(super) fn check_corners(zones: &[ImageZone], dot: &[DVec2]) -> Result<(), Reason> {
+    let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let bounds = dot.iter().fold(start, |(low, high), p| (low.min(*p), high.max(*p)));
+    zones.iter().find_map(|zone| zone.refuses(dot, bounds)).map_or(Ok(()), Err)
 }
 
 /// Distance between two polygons; zero where they overlap. A polygon of one corner is a point.
 pub(super) fn gap(a: &[DVec2], b: &[DVec2]) -> f64 {
-    let overlap = a.first().is_some_and(|p| inside(*p, b)) || b.first().is_some_and(|p| inside(*p, a));
-    if overlap {
+    // Every corner is asked: polygons that cross may have one corner in each other, and it need not be the first.
+    if a.iter().any(|p| inside(*p, b)) || b.iter().any(|p| inside(*p, a)) {
         return 0.0;
     }
     let from_to = |points: &[DVec2], polygon: &[DVec2]| {

@@ -14,7 +14,7 @@
 //! The length that bends is taken as the spring's whole length, as in Haringx' charts. Closed ends make a
 //! real spring some per cent stiffer sideways; a force calibration measures what this leaves out.
 
-use super::dual::Jet;
+use super::dual::{Jet, Stumpff};
 use super::spring::SpringSpec;
 
 /// Where the column's shear force or moment grows without bound the model ends: (qL)^2 = pi^2 is the buckling
@@ -106,10 +106,11 @@ impl Column {
         let shear = length * self.shear_per_length;
         let bend = length * self.bending_per_length;
         let s = one + c * self.axial_n_per_mm * shear.recip();
-        let f0 = z.stumpff(0);
-        let f1 = z.stumpff(1) * length;
-        let f2 = z.stumpff(2) * length * length;
-        let f3 = z.stumpff(3) * length * length * length;
+        let c = Stumpff::at(z.v);
+        let f0 = z.stumpff(0, &c);
+        let f1 = z.stumpff(1, &c) * length;
+        let f2 = z.stumpff(2, &c) * length * length;
+        let f3 = z.stumpff(3, &c) * length * length * length;
         let per_bend = bend.recip();
         // Y = alpha H + beta M0, Psi = -beta H + gamma M0 with M0 the moment at the lower end.
         let alpha = Jet::constant(1.0 / self.shear_per_length) - s * s * f3 * per_bend;

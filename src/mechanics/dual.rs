@@ -34,11 +34,9 @@ impl Jet {
         self.chain(r, -r * r, 2.0 * r * r * r)
     }
 
-    /// `stumpff(k)` of this value.
-    pub fn stumpff(self, k: u32) -> Self {
-        let (f, df) = (stumpff(k, self.v), stumpff_slope(k, self.v));
-        let ddf = 0.5 * (f64::from(k) * stumpff_slope(k + 2, self.v) - stumpff_slope(k + 1, self.v));
-        self.chain(f, df, ddf)
+    /// The k-th of Stumpff's functions of this value, k up to 3; `c` are those of its value.
+    pub fn stumpff(self, k: usize, c: &Stumpff) -> Self {
+        self.chain(c.value(k), c.slope(k), c.bend(k))
     }
 }
 
@@ -74,32 +72,54 @@ impl Mul<f64> for Jet {
     }
 }
 
-/// Stumpff's entire functions: `c_k(z) = sum_j (-z)^j / (2 j + k)!`.
+/// Stumpff's entire functions at one place: `c_k(z) = sum_j (-z)^j / (2 j + k)!`, k from 0 to 7.
 ///
 /// With `z = x^2`: c_0 = cos x, c_1 = sin x / x, c_2 = (1 - cos x) / x^2, c_3 = (x - sin x) / x^3;
-/// for negative z the hyperbolic ones. The series has no removable singularity at zero and loses
-/// about `e^sqrt|z|` of relative precision: callers keep |z| below some tens.
-pub(super) fn stumpff(k: u32, z: f64) -> f64 {
-    let mut term = 1.0;
-    for i in 2..=k {
-        term /= f64::from(i);
-    }
-    let mut sum = term;
-    // 40 terms reach 80!, far below rounding for every |z| that is let in (see `Column`).
-    for j in 1..=40_u32 {
-        let n = f64::from(2 * j + k);
-        term *= -z / (n * (n - 1.0));
-        sum += term;
-        if term.abs() <= 1e-18 * sum.abs() {
-            break;
-        }
-    }
-    sum
-}
+/// for negative z the hyperbolic ones. They have no removable singularity at zero. The last two are summed, the
+/// others follow by `c_k = 1/k! - z c_(k+2)`; both lose about `e^sqrt|z|` of relative precision, so callers keep
+/// |z| below some tens.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stumpff([f64; 8]);
 
-/// Derivative of [`stumpff`] by z: `(k c_(k+2) - c_(k+1)) / 2`.
-pub(super) fn stumpff_slope(k: u32, z: f64) -> f64 {
-    0.5 * (f64::from(k) * stumpff(k + 2, z) - stumpff(k + 1, z))
+impl Stumpff {
+    pub fn at(z: f64) -> Self {
+        const ONE_BY_FACTORIAL: [f64; 8] =
+            [1.0, 1.0, 0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0, 1.0 / 5040.0];
+        let mut c = ONE_BY_FACTORIAL;
+        for k in [6_u32, 7] {
+            let mut term = ONE_BY_FACTORIAL[k as usize];
+            let mut sum = term;
+            // 40 terms reach 80!, far below rounding for every |z| that is let in (see `Column`).
+            for j in 1..=40_u32 {
+                let n = f64::from(2 * j + k);
+                term *= -z / (n * (n - 1.0));
+                sum += term;
+                if term.abs() <= 1e-18 * sum.abs() {
+                    break;
+                }
+            }
+            c[k as usize] = sum;
+        }
+        for k in (0..6).rev() {
+            c[k] = ONE_BY_FACTORIAL[k] - z * c[k + 2];
+        }
+        Self(c)
+    }
+
+    /// c_k.
+    pub fn value(&self, k: usize) -> f64 {
+        self.0[k]
+    }
+
+    /// Derivative of c_k by z, k up to 5: `(k c_(k+2) - c_(k+1)) / 2`.
+    pub fn slope(&self, k: usize) -> f64 {
+        0.5 * (k as f64 * self.0[k + 2] - self.0[k + 1])
+    }
+
+    /// Second derivative of c_k by z, k up to 3.
+    pub fn bend(&self, k: usize) -> f64 {
+        0.5 * (k as f64 * self.slope(k + 2) - self.slope(k + 1))
+    }
 }
 
 /// A value with its gradient by the six coordinates of a displacement.
@@ -130,8 +150,9 @@ impl Dual {
         self.chain(r, -r * r)
     }
 
-    pub fn stumpff(self, k: u32) -> Self {
-        self.chain(stumpff(k, self.v), stumpff_slope(k, self.v))
+    /// The k-th of Stumpff's functions of this value, k up to 5; `c` are those of its value.
+    pub fn stumpff(self, k: usize, c: &Stumpff) -> Self {
+        self.chain(c.value(k), c.slope(k))
     }
 }
 
@@ -192,24 +213,41 @@ impl DualVec {
     pub fn value(self) -> glam::DVec3 {
         glam::DVec3::new(self.0[0].v, self.0[1].v, self.0[2].v)
     }
+}
 
-    /// The rotation `exp [self]x` applied to a vector.
-    pub fn rotate(self, v: Self) -> Self {
-        let square = self.0[0] * self.0[0] + self.0[1] * self.0[1] + self.0[2] * self.0[2];
-        let once = self.cross(v);
-        let twice = self.cross(once);
-        v + once.scaled(square.stumpff(1)) + twice.scaled(square.stumpff(2))
+/// A rotation vector with what its rotation and its gradients need, computed once for all springs.
+pub(super) struct Turn {
+    vector: DualVec,
+    /// sin a / a and (1 - cos a) / a^2.
+    once: Dual,
+    twice: Dual,
+    /// (1 - (a/2) cot(a/2)) / a^2, written without a singularity at zero.
+    back: Dual,
+}
+
+impl Turn {
+    pub fn new(vector: DualVec) -> Self {
+        let [x, y, z] = vector.0;
+        let square = x * x + y * y + z * z;
+        let c = Stumpff::at(square.v);
+        let twice = square.stumpff(2, &c);
+        let back = (square.stumpff(3, &c) - square.stumpff(4, &c) * 2.0) * (twice * 2.0).recip();
+        Self { vector, once: square.stumpff(1, &c), twice, back }
     }
 
-    /// Turns a gradient by the rotation vector `self` into the moment that does the same work:
-    /// `J_l^-T g`, with `J_l` the left Jacobian of the rotation group.
-    pub fn moment_of_gradient(self, gradient: Self) -> Self {
-        let square = self.0[0] * self.0[0] + self.0[1] * self.0[1] + self.0[2] * self.0[2];
-        // (1 - (a/2) cot(a/2)) / a^2, written without a singularity at zero.
-        let factor = (square.stumpff(3) - square.stumpff(4) * 2.0) * (square.stumpff(2) * 2.0).recip();
-        let once = self.cross(gradient);
-        let twice = self.cross(once);
-        gradient + once.scaled(Dual::constant(0.5)) + twice.scaled(factor)
+    /// The rotation applied to a vector.
+    pub fn rotate(&self, v: DualVec) -> DualVec {
+        let once = self.vector.cross(v);
+        let twice = self.vector.cross(once);
+        v + once.scaled(self.once) + twice.scaled(self.twice)
+    }
+
+    /// Turns a gradient by the rotation vector into the moment that does the same work: `J_l^-T g`, with `J_l`
+    /// the left Jacobian of the rotation group.
+    pub fn moment_of_gradient(&self, gradient: DualVec) -> DualVec {
+        let once = self.vector.cross(gradient);
+        let twice = self.vector.cross(once);
+        gradient + once.scaled(Dual::constant(0.5)) + twice.scaled(self.back)
     }
 }
 

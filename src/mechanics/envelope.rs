@@ -32,6 +32,8 @@ pub struct Reach {
 
 /// Factor at which a search stops if nothing has ended the load.
 pub const LARGEST_FACTOR: f64 = 64.0;
+/// How sharply the end of a load is found, as a part of it.
+const TOLERANCE: f64 = 1e-5;
 
 /// Limits that are not of the springs: what the camera sees at a pose, most used first or in any order.
 pub type MoreChecks<'a> = &'a dyn Fn(&Rigid) -> Vec<Check>;
@@ -46,17 +48,24 @@ pub fn try_all(suspension: &Suspension, limits: &Limits, more: MoreChecks, wrenc
     case
 }
 
-/// Drives one load up until the first limit is met: growing from an eighth by sixty per cent at a time, then bisection (at most 40 steps).
+/// Drives one load up until the first limit is met: growing from an eighth by sixty per cent at a time, then closing
+/// in by the secant of the most used limit, held inside the bracket and helped by bisection (at most 40 steps).
 ///
 /// The part of each limit that is used need not grow with the load; what is found is the first limit met at the
 /// resolution of that growth.
 pub fn reach(suspension: &Suspension, limits: &Limits, more: MoreChecks, direction: &Direction) -> Reach {
     let at = |factor: f64| try_all(suspension, limits, more, &direction.wrench.scaled(factor));
+    // How far past the limits a case is; without a balance there is no measure of it.
+    let past = |case: &LoadCase| match &case.equilibrium {
+        Ok(_) => case.checks.iter().map(Check::used).fold(0.0, f64::max) - 1.0,
+        Err(_) => f64::INFINITY,
+    };
     let passed = |case: &LoadCase| case.equilibrium.is_err() || case.passed().next().is_some();
-    let (mut low, mut high) = (0.0, 0.125);
+    let (mut low, mut low_past, mut high) = (0.0, -1.0, 0.125);
+    let mut under = None;
     let mut over = at(high);
     while !passed(&over) && high < LARGEST_FACTOR {
-        low = high;
+        (low, low_past, under) = (high, past(&over), Some(over));
         // Steps of sixty per cent: limits that are met and left again within one are not seen.
         high *= 1.6;
         over = at(high);
@@ -64,16 +73,36 @@ pub fn reach(suspension: &Suspension, limits: &Limits, more: MoreChecks, directi
     if !passed(&over) {
         return Reach { direction: direction.clone(), factor: high, ended_by: None, case: over };
     }
-    for _ in 0..40 {
-        if high - low <= 1e-5 * high {
+    let mut high_past = past(&over);
+    let mut before = high - low;
+    for step in 0..40 {
+        let width = high - low;
+        if width <= TOLERANCE * high {
             break;
         }
-        let middle = 0.5 * (low + high);
-        let case = at(middle);
-        if passed(&case) { (high, over) = (middle, case) } else { low = middle }
+        // The secant's guess, a little inside the bracket: where it hits, the next one closes the bracket.
+        let inside = 0.4 * TOLERANCE * high;
+        let secant = low - low_past * width / (high_past - low_past);
+        let slow = step % 3 == 2 && width > 0.5 * before;
+        // Far past a limit (a gap of zero counts as without end) the secant tells nothing.
+        let factor = if slow || !(secant.is_finite() && high_past < 1.0) {
+            0.5 * (low + high)
+        } else {
+            secant.clamp(low + inside, high - inside)
+        };
+        if step % 3 == 2 {
+            before = width;
+        }
+        let case = at(factor);
+        if passed(&case) {
+            (high, high_past, over) = (factor, past(&case), case);
+        } else {
+            (low, low_past, under) = (factor, past(&case), Some(case));
+        }
     }
     let ended_by = over.passed().next().cloned().or_else(|| over.checks.first().cloned());
-    Reach { direction: direction.clone(), factor: low, ended_by, case: at(low) }
+    let case = under.unwrap_or_else(|| at(low));
+    Reach { direction: direction.clone(), factor: low, ended_by, case }
 }
 
 /// The directions of a load table: presses and pulls on the pole, a push at `azimuths` around it, presses off

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::load::Wrench;
-use super::suspension::{Displacement, Equilibrium, MechanicsError, SpringState, Suspension};
+use super::state::{Displacement, Equilibrium, MechanicsError, SpringState};
+use super::suspension::Suspension;
 use crate::numeric::Rigid;
 
 /// The limits that end a load.

@@ -3,14 +3,17 @@
 //! A [`Spring`] gives the figures of one spring; a [`Suspension`] sums them over any layout into a conservative
 //! law between pose and [`Wrench`]. Lengths mm, forces N, moments N*mm, angles rad, stress MPa.
 
+mod balance;
 mod column;
 mod dual;
 mod envelope;
+mod law;
 mod limits;
 mod load;
 mod magnet;
 mod of_design;
 mod spring;
+mod state;
 mod suspension;
 
 pub use column::{Column, EndStiffness};
@@ -23,9 +26,10 @@ pub use load::Wrench;
 pub use magnet::MagnetPair;
 pub use of_design::{claims_of, limits_of, suspension_of};
 pub use spring::{EndType, SpecError, Spring, SpringSpec};
-pub use suspension::{
-    Displacement, Equilibrium, MOST_SPRINGS, MechanicsError, SpringState, Suspension, SuspensionSpec,
-};
+pub use state::{Displacement, Equilibrium, MechanicsError, SpringState};
+pub use suspension::{MOST_SPRINGS, Suspension, SuspensionSpec};
 
+#[cfg(test)]
+mod envelope_tests;
 #[cfg(test)]
 mod tests;

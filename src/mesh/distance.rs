@@ -28,6 +28,29 @@ impl Piece {
     pub fn signed_distance_mm(&self, point_mm: DVec3) -> f64 {
         self.shape.signed_distance_mm(self.part_from_shape.inverse().transform_point3(point_mm))
     }
+
+    /// The point of the piece's exact surface that is nearest to a point, mm:
+    /// down the gradient of the distance, which is 1 off the edges.
+    pub fn nearest_mm(&self, point_mm: DVec3) -> DVec3 {
+        let mut at = point_mm;
+        for _ in 0..4 {
+            let distance = self.signed_distance_mm(at);
+            let h = 1e-4 * distance.abs().max(1e-6);
+            let slope =
+                |axis: DVec3| self.signed_distance_mm(at + axis * h) - self.signed_distance_mm(at - axis * h);
+            let gradient = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)) / (2.0 * h);
+            // A sheared piece measures along its own axes: its slope is not 1.
+            let steepness = gradient.length_squared();
+            if !steepness.is_normal() {
+                break;
+            }
+            at -= gradient * (distance / steepness);
+            if distance.abs() < 1e-9 {
+                break;
+            }
+        }
+        at
+    }
 }
 
 /// Distance in the half plane of (distance from the axis, height).

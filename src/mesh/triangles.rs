@@ -141,6 +141,26 @@ impl TriMesh {
         out
     }
 
+    /// Joins rings of `around` vertices each, `bands` + 1 of them in a row, to
+    /// a tube with flat ends. Counter-clockwise about the way it runs, its
+    /// surface points outwards.
+    pub(crate) fn close_tube(&mut self, bands: u32, around: u32) {
+        for k in 0..bands {
+            let (p, q) = (k * around, (k + 1) * around);
+            for a in 0..around {
+                let b = (a + 1) % around;
+                self.triangles.push([p + a, p + b, q + b]);
+                self.triangles.push([p + a, q + b, q + a]);
+            }
+        }
+        for (first, is_start) in [(0, true), (bands * around, false)] {
+            for a in 1..around.saturating_sub(1) {
+                let [x, y] = if is_start { [a + 1, a] } else { [a, a + 1] };
+                self.triangles.push([first, first + x, first + y]);
+            }
+        }
+    }
+
     /// Puts another mesh's triangles beside this one's (no boolean).
     pub fn append(&mut self, other: &Self) {
         let offset = self.vertices_mm.len() as u32;

@@ -39,14 +39,26 @@ pub fn fill<I: Sync, O: Send>(
     outputs: &mut [O],
     f: impl Fn(&I) -> O + Sync,
 ) -> Result<(), LengthMismatch> {
-    if inputs.len() != outputs.len() {
-        return Err(LengthMismatch { inputs: inputs.len(), outputs: outputs.len() });
-    }
-    let run = |inputs: &[I], outputs: &mut [O]| {
+    fill_runs(inputs, outputs, |inputs, outputs| {
         for (output, input) in outputs.iter_mut().zip(inputs) {
             *output = f(input);
         }
-    };
+    })
+}
+
+/// [`fill`] for a function that works on runs of inputs: it must write to each
+/// output what belongs to the input at the same place, whatever the run.
+///
+/// # Errors
+/// [`LengthMismatch`]; then no output is written.
+pub fn fill_runs<I: Sync, O: Send>(
+    inputs: &[I],
+    outputs: &mut [O],
+    run: impl Fn(&[I], &mut [O]) + Sync,
+) -> Result<(), LengthMismatch> {
+    if inputs.len() != outputs.len() {
+        return Err(LengthMismatch { inputs: inputs.len(), outputs: outputs.len() });
+    }
     if inputs.len() < PARALLEL_FROM || rayon::current_num_threads() < 2 {
         run(inputs, outputs);
     } else {

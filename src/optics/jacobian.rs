@@ -71,7 +71,7 @@ impl SensorOptics {
     /// dome and no derivative exists.
     pub fn trace_with_jacobian(&self, pixel: DVec2) -> Result<(SurfacePoint, Matrix3x2<f64>), Limit> {
         let (ray, ray_by_pixel) = self.lens.unproject_with_jacobian(pixel)?;
-        let field_angle_rad = Lens::field_angle_rad(ray);
+        let field_angle_rad = Lens::field_angle_of_unit_rad(ray);
         let hit = self.meet(ray, field_angle_rad)?;
         let rotation = self.sensor_from_camera.rotation;
         let cos = hit.direction.z;
@@ -122,7 +122,7 @@ impl SensorOptics {
     /// As `project`.
     pub fn project_with_motion(&self, point_mm: DVec3) -> Result<PixelMotion, Limit> {
         let point = self.usable_point(point_mm)?;
-        let pupil = self.chief_pupil(point)?;
+        let (pupil, _) = self.chief_pupil(point)?;
         let sideways = DVec2::new(point.x - pupil.x, point.y - pupil.y);
         let reach = sideways.length();
         let air = self.path(point, pupil)?.air_ray(reach)?;

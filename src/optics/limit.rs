@@ -42,7 +42,7 @@ impl Limit {
             Self::OutsideDome => "outside_dome",
             Self::Unreachable => "unreachable",
             Self::PupilInsideSheet => "pupil_inside_sheet",
-            Self::NotConverged => "not_converged",
+            Self::NotConverged => LensLimit::NotConverged.as_str(),
         }
     }
 }
@@ -54,6 +54,7 @@ impl From<LensLimit> for Limit {
             LensLimit::BeyondFieldOfView => Self::BeyondFieldOfView,
             LensLimit::BehindCamera => Self::BehindCamera,
             LensLimit::NotFinite => Self::NotFinite,
+            LensLimit::NotConverged => Self::NotConverged,
         }
     }
 }

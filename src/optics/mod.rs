@@ -25,7 +25,7 @@ mod stack;
 
 pub use jacobian::PixelMotion;
 pub use limit::Limit;
-pub use sensor::{SensorOptics, SurfacePoint};
+pub use sensor::{SensorOptics, SolvedPixel, SurfacePoint};
 pub use spec::{Channel, Layer, OpticsError, OpticsSpec};
 
 #[cfg(test)]

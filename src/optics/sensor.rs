@@ -4,15 +4,18 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::stack::{Path, Plate, travel};
+use super::stack::{MAX_CLIMB_STEPS, Path, Plate, travel};
 use super::{Channel, Layer, Limit, OpticsError, OpticsSpec};
 use crate::camera::Lens;
-use crate::numeric::batch::fill;
-use crate::numeric::{LengthMismatch, Rigid, RootError, bracketed_newton};
+use crate::numeric::batch::{fill, fill_runs};
+use crate::numeric::{LengthMismatch, MAX_ITERATIONS, Rigid, RootError, bracketed_newton};
 
 /// Rounding slack at the dome's rim, relative to its radius: a ray that meets
 /// the sheet's top this little outside the base circle still meets the rim.
 const RIM_ROUNDING: f64 = 1e-11;
+
+/// Rays that are kept between the lens and the layers.
+const TRACE_RUN: usize = 64;
 
 /// How far outside the dome, relative to its radius, a point may be and still
 /// be on it: what a file with seven digits says of a surface point.
@@ -29,6 +32,22 @@ pub struct SurfacePoint {
     pub normal: DVec3,
     /// Angle of the ray in air to the camera's axis, radians.
     pub field_angle_rad: f64,
+}
+
+/// Where a point is seen, and how that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SolvedPixel {
+    /// The pixel.
+    pub pixel: DVec2,
+    /// Newton steps of the climb through the layers, at most
+    /// [`SensorOptics::MAX_CLIMB_ITERATIONS`].
+    pub climb_iterations: u32,
+    /// Steps to the place of the entrance pupil, at most
+    /// [`SensorOptics::MAX_PUPIL_ITERATIONS`]; each is a climb of its own. Zero
+    /// for a central lens.
+    pub pupil_iterations: u32,
+    /// By how much the ray misses the point, in millimetres along the sheet.
+    pub residual_mm: f64,
 }
 
 /// A ray's way to the dome, sensor frame.
@@ -194,8 +213,12 @@ impl SensorOptics {
     /// # Errors
     /// The limit that the pixel is past.
     pub fn trace(&self, pixel: DVec2) -> Result<SurfacePoint, Limit> {
-        let ray = self.lens.unproject(pixel)?;
-        let field_angle_rad = Lens::field_angle_rad(ray);
+        self.trace_ray(pixel, self.lens.unproject(pixel)?)
+    }
+
+    #[inline]
+    fn trace_ray(&self, pixel: DVec2, ray: DVec3) -> Result<SurfacePoint, Limit> {
+        let field_angle_rad = Lens::field_angle_of_unit_rad(ray);
         let hit = self.meet(ray, field_angle_rad)?;
         Ok(self.surface_point(pixel, field_angle_rad, &hit))
     }
@@ -265,6 +288,25 @@ impl SensorOptics {
         Ok(self.lens.project(self.chief_ray(point_mm)?)?)
     }
 
+    /// No climb through the layers takes more steps.
+    pub const MAX_CLIMB_ITERATIONS: u32 = MAX_CLIMB_STEPS;
+
+    /// No search for the place of the entrance pupil takes more steps.
+    pub const MAX_PUPIL_ITERATIONS: u32 = MAX_ITERATIONS;
+
+    /// [`SensorOptics::project`] and how it was found.
+    ///
+    /// # Errors
+    /// As `project`.
+    pub fn project_solved(&self, point_mm: DVec3) -> Result<SolvedPixel, Limit> {
+        let point = self.usable_point(point_mm)?;
+        let (pupil, pupil_iterations) = self.chief_pupil(point)?;
+        let pixel = self.lens.project(self.central_ray(point, pupil)?)?;
+        let reach_mm = DVec2::new(point.x - pupil.x, point.y - pupil.y).length();
+        let (climb_iterations, residual_mm) = self.path(point, pupil)?.climb_record(reach_mm)?;
+        Ok(SolvedPixel { pixel, climb_iterations, pupil_iterations, residual_mm })
+    }
+
     /// [`SensorOptics::trace`] for each pixel, written to the place of the same
     /// number; see [`crate::numeric::batch::fill`].
     ///
@@ -275,7 +317,16 @@ impl SensorOptics {
         pixels: &[DVec2],
         hits: &mut [Result<SurfacePoint, Limit>],
     ) -> Result<(), LengthMismatch> {
-        fill(pixels, hits, |&pixel| self.trace(pixel))
+        fill_runs(pixels, hits, |pixels, hits| {
+            let mut rays = [Ok(DVec3::Z); TRACE_RUN];
+            for (pixels, hits) in pixels.chunks(TRACE_RUN).zip(hits.chunks_mut(TRACE_RUN)) {
+                let rays = &mut rays[..pixels.len()];
+                self.lens.unproject_run(pixels, rays);
+                for ((hit, &pixel), &ray) in hits.iter_mut().zip(pixels).zip(&*rays) {
+                    *hit = ray.map_err(Limit::from).and_then(|ray| self.trace_ray(pixel, ray));
+                }
+            }
+        })
     }
 
     /// [`SensorOptics::project`] for each point.
@@ -293,14 +344,15 @@ impl SensorOptics {
     /// Direction in air, camera frame, of the ray through a point.
     fn chief_ray(&self, point_mm: DVec3) -> Result<DVec3, Limit> {
         let point = self.usable_point(point_mm)?;
-        let pupil = self.chief_pupil(point)?;
+        let (pupil, _) = self.chief_pupil(point)?;
         self.central_ray(point, pupil)
     }
 
-    /// The entrance pupil of the ray through a usable point, sensor frame.
-    pub(super) fn chief_pupil(&self, point: DVec3) -> Result<DVec3, Limit> {
+    /// The entrance pupil of the ray through a usable point, sensor frame, and
+    /// the steps that it took.
+    pub(super) fn chief_pupil(&self, point: DVec3) -> Result<(DVec3, u32), Limit> {
         if self.lens.is_central() {
-            return Ok(self.sensor_from_camera.translation_mm);
+            return Ok((self.sensor_from_camera.translation_mm, 0));
         }
         // The pupil's shift S(theta) must be the one that belongs to the field
         // angle of the ray from there: seen(S(theta)) = theta. The left side
@@ -309,18 +361,18 @@ impl SensorOptics {
         let end = self.lens.max_field_angle_rad();
         let shift_at = |theta: f64| self.lens.pupil_shift_mm(theta).0;
         let seen = |theta: f64| self.seen_angle_rad(point, shift_at(theta));
-        let mut theta = end;
+        let (mut theta, mut steps) = (end, 0);
         if seen(end) < end {
             let mismatch = |theta: f64| (seen(theta) - theta, -1.0);
-            theta = bracketed_newton(mismatch, 0.0, end, seen(0.0).min(end))
-                .map_err(|error| match error {
+            let root =
+                bracketed_newton(mismatch, 0.0, end, seen(0.0).min(end)).map_err(|error| match error {
                     RootError::NotFinite { .. } => Limit::NotFinite,
                     _ => Limit::NotConverged,
-                })?
-                .value;
+                })?;
+            (theta, steps) = (root.value, root.iterations);
         }
         let pupil = self.pupil_mm(shift_at(theta));
-        if pupil.z > self.bottom_mm { Err(Limit::PupilInsideSheet) } else { Ok(pupil) }
+        if pupil.z > self.bottom_mm { Err(Limit::PupilInsideSheet) } else { Ok((pupil, steps)) }
     }
 
     /// Field angle at which a point is seen from a shifted pupil. A pupil that

@@ -2,9 +2,9 @@
 
 use super::Limit;
 
-/// Newton steps of the climb to a point. Observed: at most 14; each step past
-/// the first few doubles the digits, so the bound is never near.
-pub(super) const MAX_CLIMB_STEPS: u32 = 64;
+/// Newton steps of the climb to a point. Observed in millions of random stacks:
+/// at most 14; each step past the first few doubles the digits.
+pub(super) const MAX_CLIMB_STEPS: u32 = 24;
 
 /// A flat layer for one channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,13 +108,18 @@ impl Path<'_> {
     ///
     /// `X` rises and is concave, so each Newton step from below ends below.
     fn climb(&self, n0: f64, reach_mm: f64) -> Result<f64, Limit> {
+        Ok(self.climb_counted(n0, reach_mm)?.0)
+    }
+
+    /// [`Path::climb`] and the steps that it took.
+    fn climb_counted(&self, n0: f64, reach_mm: f64) -> Result<(f64, u32), Limit> {
         let (at_axis, _) = self.reach(n0, 0.0);
         // X(t) <= t X'(0): a lower bound of the solution.
         let mut t = reach_mm / at_axis;
         if t == 0.0 {
-            return Ok(0.0);
+            return Ok((0.0, 0));
         }
-        for _ in 0..MAX_CLIMB_STEPS {
+        for steps in 1..=MAX_CLIMB_STEPS {
             let (by_t, slope) = self.reach(n0, t);
             let step = (reach_mm - by_t * t) / slope;
             t += step;
@@ -122,7 +127,7 @@ impl Path<'_> {
             // what Newton's method leaves; a step down is rounding.
             let left = step * step * (0.75_f64).min(1.5 / t);
             if step <= 0.0 || left <= 1e-17 * t {
-                return Ok(t);
+                return Ok((t, steps));
             }
         }
         Err(Limit::NotConverged)
@@ -133,6 +138,14 @@ impl Path<'_> {
         let n0 = self.lowest_index()?;
         let t = self.climb(n0, reach_mm)?;
         finite(in_air(n0, t)?.0 / self.reach_by(n0, t, reach_mm))
+    }
+
+    /// Steps of the climb to this reach, and by how much the reach is missed, in
+    /// millimetres.
+    pub fn climb_record(&self, reach_mm: f64) -> Result<(u32, f64), Limit> {
+        let n0 = self.lowest_index()?;
+        let (t, steps) = self.climb_counted(n0, reach_mm)?;
+        Ok((steps, (self.reach(n0, t).0 * t - reach_mm).abs()))
     }
 
     /// `reach / t`, also on the axis.

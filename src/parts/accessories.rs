@@ -63,12 +63,12 @@ pub(super) fn stencil(m: &Measures) -> Result<Blueprint, PartError> {
 }
 
 /// A bar with the magnets' pockets and the camera's bore in steps of diameter
-/// round nominal, smallest at the end with the notch.
+/// round nominal, smallest at the corner that is cut off.
 pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
     let c = &m.coupon;
     let mut b = Blueprint::new(
         "fit_coupon",
-        "test piece: magnet pockets and camera bores in steps of diameter, smallest at the notch; printed",
+        "test piece: magnet pockets and camera bores in steps of diameter, smallest at the cut corner; printed",
         m.chord,
     );
     let (pocket, depth) = m.pocket_mm();
@@ -86,11 +86,17 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
     let height = depth + wall;
     let over = m.overcut_mm;
     let low_y = -0.5 * (rows.x + rows.y);
-    b.added.push(Feature::new(
-        "bar",
-        "coupon",
-        Shape::cuboid(DVec3::new(-half_length, low_y, 0.0), DVec3::new(half_length, -low_y, height)),
-    ));
+    // The corner at the smallest bore is cut off, half a wall deep: it tells the ends apart.
+    let cut = 0.5 * wall;
+    let (x, y) = (half_length, -low_y);
+    let outline = [(-x, -y), (x, -y), (x, y), (cut - x, y), (-x, y - cut)];
+    let bar = Shape::Prism {
+        outline_mm: outline.map(|(x, y)| DVec2::new(x, y)).to_vec(),
+        corner_radius_mm: 0.0,
+        bottom_z_mm: 0.0,
+        top_z_mm: height,
+    };
+    b.added.push(Feature::new("bar", "coupon", bar));
     let push_out = 0.5 * m.pockets.push_out_diameter_mm;
     for k in -steps..=steps {
         let i = usize::try_from(k + steps).unwrap_or(0);
@@ -109,16 +115,6 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
         b.cut.push(Feature::new("camera bore", "coupon.step_mm", shape).numbered(i).at(x, y));
         b.genus += 1;
     }
-    // The notch in the edge at the smallest end, half a wall deep.
-    let notch = 0.25 * wall;
-    b.cut.push(Feature::new(
-        "notch",
-        "coupon",
-        Shape::cuboid(
-            DVec3::new(-half_length - over, -notch, -over),
-            DVec3::new(-half_length + notch, notch, height + over),
-        ),
-    ));
     Ok(b)
 }
 

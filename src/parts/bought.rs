@@ -1,8 +1,8 @@
 //! Stand-ins for what is bought or cast, for pictures and interference checks.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 use super::measures::Measures;
 use crate::mesh::{Chord, Fit, MeshError, Piece, Profile, ProfileEdge, Shape, TriMesh};
@@ -73,15 +73,53 @@ pub(super) fn spring_ends_mm(m: &Measures, i: usize, rest_from_platform: &Rigid)
     [axis.extend(m.lower_top_z_mm), upper]
 }
 
-/// The straight tube that a spring fills between its ends, shortened by a
-/// little at both: springs bear on the magnets and would touch them.
-pub(super) fn spring_envelope(m: &Measures, i: usize, rest_from_platform: &Rigid) -> Piece {
+/// Outer radius of a spring that is pressed to `length_mm`: the wire keeps its
+/// length, so coils grow as their pitch sinks (one end free to turn).
+fn outer_radius_mm(m: &Measures, length_mm: f64) -> f64 {
+    let mean = m.spring_outer_mm - m.spring_wire_mm;
+    // The dead coils at both ends rise by the wire's thickness each.
+    let dead = 3.0 * m.spring_wire_mm;
+    let pitch = |length: f64| ((length - dead) / m.spring_coils.max(1.0)).max(m.spring_wire_mm) / PI;
+    let grown = mean * mean + pitch(m.spring_length_mm).powi(2) - pitch(length_mm).powi(2);
+    0.5 * (grown.max(mean * mean).sqrt() + m.spring_wire_mm)
+}
+
+/// What spring `i` sweeps at a pose: a tube round the line that a column
+/// clamped to both seats bends to (the cubic with the seats' normals as its
+/// ends' directions), as wide as the pressed coils. It is shortened by a little
+/// at both ends: springs bear on the magnets and would touch them.
+pub(super) fn spring_tube(
+    m: &Measures,
+    i: usize,
+    rest_from_platform: &Rigid,
+    chord: Chord,
+) -> Result<TriMesh, MeshError> {
+    const RINGS: u32 = 12;
+    const SKIN: f64 = 0.02;
     let [low, high] = spring_ends_mm(m, i, rest_from_platform);
-    let along = high - low;
-    let skin = 0.02 * along.length();
-    let tube = Shape::cylinder(0.5 * m.spring_outer_mm, skin, along.length() - skin, Fit::Inside);
-    let turn = glam::DQuat::from_rotation_arc(DVec3::Z, along.normalize_or(DVec3::Z));
-    Piece::new(format!("spring {i}"), tube).placed(DAffine3::from_rotation_translation(turn, low))
+    let length = (high - low).length();
+    let ends = [DVec3::Z * length, rest_from_platform.vector(DVec3::Z) * length];
+    let radius = outer_radius_mm(m, length);
+    let around = chord.circle_segments(radius, Fit::Outside)?;
+    let corner = Fit::Outside.corner_radius_mm(radius, PI / f64::from(around));
+    let mut mesh = TriMesh::default();
+    for k in 0..=RINGS {
+        let t = SKIN + (1.0 - 2.0 * SKIN) * f64::from(k) / f64::from(RINGS);
+        let (t2, t3) = (t * t, t * t * t);
+        let at = low * (2.0 * t3 - 3.0 * t2 + 1.0)
+            + ends[0] * (t3 - 2.0 * t2 + t)
+            + high * (3.0 * t2 - 2.0 * t3)
+            + ends[1] * (t3 - t2);
+        let along = (high - low) * (6.0 * t - 6.0 * t2)
+            + ends[0] * (3.0 * t2 - 4.0 * t + 1.0)
+            + ends[1] * (3.0 * t2 - 2.0 * t);
+        let turn = DQuat::from_rotation_arc(DVec3::Z, along.normalize_or(DVec3::Z));
+        let step = TAU / f64::from(around);
+        let ring = (0..around).map(|a| DVec2::from_angle(step * f64::from(a)) * corner);
+        mesh.vertices_mm.extend(ring.map(|p| at + turn * p.extend(0.0)));
+    }
+    mesh.close_tube(RINGS, around);
+    Ok(mesh)
 }
 
 /// A spring as its wire, between its ends at any length: a helix with one coil
@@ -97,7 +135,7 @@ pub(super) fn spring_wire(
     let radius = 0.5 * m.spring_outer_mm - wire;
     let along = high - low;
     let length = along.length();
-    let turn = glam::DQuat::from_rotation_arc(DVec3::Z, along.normalize_or(DVec3::Z));
+    let turn = DQuat::from_rotation_arc(DVec3::Z, along.normalize_or(DVec3::Z));
     // One dead coil at each end lies flat on the magnet.
     let coils = m.spring_coils + 2.0;
     let around = chord.circle_segments(wire, Fit::Inside)?;
@@ -120,20 +158,7 @@ pub(super) fn spring_wire(
             mesh.vertices_mm.push(low + turn * p);
         }
     }
-    for k in 0..steps {
-        for a in 0..around {
-            let b = (a + 1) % around;
-            let (p, q) = (k * around, (k + 1) * around);
-            mesh.triangles.push([p + a, p + b, q + b]);
-            mesh.triangles.push([p + a, q + b, q + a]);
-        }
-    }
-    for (first, forward) in [(0, true), (steps * around, false)] {
-        for a in 1..around - 1 {
-            let [x, y] = if forward { [a + 1, a] } else { [a, a + 1] };
-            mesh.triangles.push([first, first + x, first + y]);
-        }
-    }
+    mesh.close_tube(steps, around);
     // The tube runs with its sections turned from outward to up: wound
     // outwards if its volume is positive.
     if mesh.volume_mm3() < 0.0 {

@@ -1,6 +1,7 @@
 //! Does the assembled sensor work? Interference at every position of the
-//! springs, the camera's clearance and view, stray light, the envelope, the
-//! printer. What concerns one part alone is in [`super::walls`].
+//! springs, the camera's clearance and view, stray light, the envelope. What
+//! concerns one part alone is in [`super::process`], [`super::walls`] and
+//! [`super::undercut`].
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -8,7 +9,7 @@ use rayon::prelude::*;
 use super::assembly::{Body, affine};
 use super::measures::Measures;
 use super::view::sight_lines;
-use super::{Assembly, Part, PartError, bought};
+use super::{Assembly, Part, PartError, Pose, bought, process, undercut};
 use crate::mesh::{BoundingBox, Chord, MeshError, Piece, RayTarget, Solid, TriMesh};
 use crate::numeric::Rigid;
 
@@ -24,14 +25,15 @@ const CHORD_MM: f64 = 0.03;
 /// # Errors
 /// The first failure: which parts, where, value, limit, which design field.
 pub fn check_assembly(m: &Measures, parts: &[Part], assembly: &Assembly) -> Result<(), PartError> {
-    process(m, parts)?;
+    process::check(m, parts)?;
+    undercut::check(m, parts)?;
     envelope(m, assembly)?;
     let chord = Chord::new(CHORD_MM.max(m.chord.tolerance_mm())).map_err(|e| mesh_error("assembly", e))?;
     let scene = Scene::of(m, assembly, chord)?;
     scene.within_bodies()?;
     m.poses
         .par_iter()
-        .map(|(name, pose)| {
+        .map(|Pose { name, rest_from_platform: pose }| {
             scene.between_bodies(m, name, pose, chord)?;
             camera_gap(m, name, pose)?;
             scene.view(m, name, pose)?;
@@ -46,7 +48,7 @@ fn mesh_error(part: &str, error: MeshError) -> PartError {
     PartError::Mesh { part: part.to_owned(), error }
 }
 
-fn infeasible(part: &str, place: String, value_mm: f64, limit_mm: f64, field: &str) -> PartError {
+pub(super) fn infeasible(part: &str, place: String, value_mm: f64, limit_mm: f64, field: &str) -> PartError {
     PartError::Infeasible { part: part.to_owned(), place, value_mm, limit_mm, field: field.to_owned() }
 }
 
@@ -62,95 +64,6 @@ fn field_of(name: &str) -> &'static str {
         "LED" => "leds.center_radius_mm",
         _ => "magnets",
     }
-}
-
-/// Lengths that the process limits, and the printer's room.
-fn process(m: &Measures, parts: &[Part]) -> Result<(), PartError> {
-    let p = &m.process;
-    let holes = [
-        (
-            "upper_platform",
-            "push-out hole",
-            m.pockets.push_out_diameter_mm,
-            "magnet_pockets.push_out_diameter_mm",
-        ),
-        ("upper_platform", "LED wire hole", m.leds.wire_hole_diameter_mm, "leds.wire_hole_diameter_mm"),
-        (
-            "lower_platform",
-            "wire hole",
-            m.platforms.lower.wire_hole_diameter_mm,
-            "platforms.lower.wire_hole_diameter_mm",
-        ),
-        (
-            "lower_platform",
-            "clamp hole",
-            m.platforms.lower.clamp.hole_diameter_mm,
-            "platforms.lower.clamp.hole_diameter_mm",
-        ),
-        (
-            "lower_platform",
-            "mounting hole",
-            m.platforms.lower.mounting.hole_diameter_mm,
-            "platforms.lower.mounting.hole_diameter_mm",
-        ),
-        ("mould_base", "fill hole", m.mould.fill.diameter_mm, "mould.fill.diameter_mm"),
-        ("mould_base", "vent", m.mould.vents.diameter_mm, "mould.vents.diameter_mm"),
-        ("marker_stencil", "marker hole", 2.0 * m.marker_radius_mm, "white_markers.diameter_mm"),
-    ];
-    for (part, what, diameter, field) in holes {
-        // Zero stands for no such hole.
-        if diameter > 0.0 && diameter < p.min_hole_diameter_mm {
-            return Err(infeasible(
-                part,
-                format!("diameter of the {what}"),
-                diameter,
-                p.min_hole_diameter_mm,
-                field,
-            ));
-        }
-    }
-    let pins = &m.mould.pins;
-    if pins.diameter_mm < p.min_pin_diameter_mm {
-        let place = "diameter of the register pins".to_owned();
-        return Err(infeasible(
-            "mould_base",
-            place,
-            pins.diameter_mm,
-            p.min_pin_diameter_mm,
-            "mould.pins.diameter_mm",
-        ));
-    }
-    let gaps = [
-        ("mould_base", "gap round the register pins", pins.clearance_mm, "mould.pins.clearance_mm"),
-        (
-            "lower_platform",
-            "gap round the camera",
-            m.camera_body.bore_clearance_mm,
-            "camera_body.bore_clearance_mm",
-        ),
-        ("upper_platform", "gap round the sheet", m.sheet.clearance_mm, "sheet.clearance_mm"),
-        ("upper_platform", "gap round the LED boards", m.leds.clearance_mm, "leds.clearance_mm"),
-        ("print_jig", "gap round the sheet", m.jig.clearance_mm, "jig.clearance_mm"),
-    ];
-    for (part, place, gap, field) in gaps {
-        if gap < p.min_gap_mm * (1.0 - 1e-9) {
-            return Err(infeasible(part, place.to_owned(), gap, p.min_gap_mm, field));
-        }
-    }
-    for part in parts {
-        // A part may lie on any of its sides in the printer.
-        let mut size = part.bounds.size_mm().to_array();
-        let mut room = p.build_volume_mm;
-        size.sort_by(f64::total_cmp);
-        room.sort_by(f64::total_cmp);
-        for (length, limit) in size.into_iter().zip(room) {
-            if length > limit {
-                let place = "side length, at most the printer's".to_owned();
-                return Err(infeasible(&part.name, place, length, limit, "process.build_volume_mm"));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// The whole stack at rest, the membrane included, fits its envelope.
@@ -175,11 +88,6 @@ fn envelope(m: &Measures, assembly: &Assembly) -> Result<(), PartError> {
 
 /// The camera's front keeps its gap to the sheet.
 fn camera_gap(m: &Measures, when: &str, pose: &Rigid) -> Result<(), PartError> {
-    // In full travel the sheet may come down to the camera, which is then the
-    // stop; the gap is promised for rest and the claimed loads.
-    if when.starts_with("at ") && when != "at rest" {
-        return Ok(());
-    }
     let platform_from_rest = pose.inverse();
     let radius = 0.5 * m.camera_body.diameter_mm;
     let gap = (0..32)
@@ -190,7 +98,8 @@ fn camera_gap(m: &Measures, when: &str, pose: &Rigid) -> Result<(), PartError> {
         })
         .fold(f64::INFINITY, f64::min);
     let limit = m.camera_body.min_sheet_gap_mm;
-    if gap < limit {
+    // Where the gap itself ends a load or the travel it is met to the search's resolution.
+    if gap < limit * (1.0 - 1e-3) {
         let place = format!("gap between the camera's front and the sheet {when}");
         return Err(infeasible("camera", place, gap, limit, "camera_body.min_sheet_gap_mm"));
     }
@@ -285,21 +194,21 @@ impl Scene {
                 near.into_iter().try_for_each(|other| one.apart_from(other, when))?;
             }
         }
-        for i in 0..m.spring_axes_mm.len() {
-            let tube = bought::spring_envelope(m, i, pose);
-            let solid = tube.solid(chord).map_err(|e| mesh_error(&tube.name, e))?;
-            let Some(spring) = Thing::new(&tube.name, solid) else { continue };
-            // A tilted tube digs into the magnets and platforms that it bears
-            // on; what counts is what it may not touch.
-            let bears_on = |t: &&Thing| t.name.contains("magnet") || t.name.ends_with("_platform");
-            for other in self.fixed.iter().filter(|t| !bears_on(t)) {
-                spring.apart_from(other, when)?;
-            }
-            for thing in self.moving.iter().filter(|t| !bears_on(t)) {
-                if thing.bounds.transformed(&rest_from_platform).is_apart_from(&spring.bounds) {
-                    continue;
-                }
-                if let Some(other) = moved(thing)? {
+        let springs: Vec<Thing> = (0..m.spring_axes_mm.len())
+            .filter_map(|i| {
+                let name = format!("spring {i}");
+                let tube = bought::spring_tube(m, i, pose, chord).and_then(|mesh| Solid::from_mesh(&mesh));
+                tube.map(|solid| Thing::new(&name, solid)).map_err(|e| mesh_error(&name, e)).transpose()
+            })
+            .collect::<Result<_, _>>()?;
+        for (i, spring) in springs.iter().enumerate() {
+            self.fixed
+                .iter()
+                .chain(&springs[i + 1..])
+                .try_for_each(|other| spring.apart_from(other, when))?;
+            for thing in &self.moving {
+                let bounds = thing.bounds.transformed(&rest_from_platform);
+                if let (false, Some(other)) = (bounds.is_apart_from(&spring.bounds), moved(thing)?) {
                     spring.apart_from(&other, when)?;
                 }
             }

@@ -2,16 +2,15 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
+use super::poses::{Pose, poses};
 use super::view::ViewCone;
 use super::{Blueprint, Feature, PartError, upper};
 use crate::design::Design;
 use crate::design::sections::{
     CameraBodySection, CouponSection, JigSection, LedsSection, MagnetPocketsSection, MagnetsSection,
-    MouldSection, PlatformsSection, ProcessSection, SheetSection, SpringEnds, StencilSection,
+    MouldSection, PlatformsSection, ProcessSection, SheetSection, StencilSection,
 };
-use crate::mechanics::{claims_of, suspension_of};
 use crate::mesh::{Chord, Fit, Shape};
-use crate::numeric::Rigid;
 use crate::optics::SensorOptics;
 
 /// Dimensions of a design as the parts need them. Heights are in the sensor
@@ -52,9 +51,9 @@ pub struct Measures {
     pub sensor_from_camera: DAffine3,
     /// What the camera must see through the upper platform.
     pub view: ViewCone,
-    /// Named positions of the platform, `rest_from_platform`: rest first, then
-    /// the travel, then the claimed loads.
-    pub poses: Vec<(String, Rigid)>,
+    /// Positions of the platform: rest first, then the travel, the claimed
+    /// loads, and the corners of the load envelope.
+    pub poses: Vec<Pose>,
     /// Lens, layers and dome at rest.
     pub optics: SensorOptics,
     /// Centres of the white markers on the sheet's top face, mm.
@@ -71,6 +70,8 @@ pub struct Measures {
     pub spring_outer_mm: f64,
     /// Active coils of the springs.
     pub spring_coils: f64,
+    /// Length of the springs without load, mm.
+    pub spring_length_mm: f64,
     /// The pad-print jig.
     pub jig: JigSection,
     /// The marker stencil.
@@ -88,52 +89,6 @@ pub struct Measures {
 /// A point in the plane from radius and azimuth.
 pub(super) fn polar(radius_mm: f64, azimuth_deg: f64) -> DVec2 {
     radius_mm * DVec2::from_angle(azimuth_deg.to_radians())
-}
-
-/// How far the upper platform can go straight down: until the springs are
-/// solid, the stop is met, or the sheet is on the camera.
-fn axial_travel_mm(design: &Design) -> f64 {
-    let springs = &design.sections().springs;
-    // Coils in the solid height beside the active ones (Shigley, Mechanical
-    // Engineering Design, table of compression-spring ends).
-    let dead_coils = match springs.ends {
-        SpringEnds::Open | SpringEnds::OpenGround => 1.0,
-        SpringEnds::Closed => 3.0,
-        SpringEnds::ClosedGround => 2.0,
-    };
-    let solid_mm = (springs.active_coils + dead_coils) * springs.wire_diameter_mm;
-    let clear_mm = springs.stop_clearance_mm.unwrap_or(springs.free_length_mm);
-    let camera_front_mm =
-        design.sensor_from_camera().translation_mm.z + design.sections().camera_body.front_from_pupil_mm;
-    let above_camera_mm = design.sheet_underside_z_mm() - camera_front_mm;
-    (springs.free_length_mm - solid_mm).min(clear_mm).min(above_camera_mm).max(0.0)
-}
-
-/// The positions of the platform that parts are made and checked for: rest,
-/// straight down to the end of the travel, and the balance under every load
-/// that the design claims. Each has a name for messages.
-fn poses(design: &Design) -> Result<Vec<(String, Rigid)>, PartError> {
-    const STEPS: u32 = 4;
-    let travel_mm = axial_travel_mm(design);
-    let mut out: Vec<(String, Rigid)> = (0..=STEPS)
-        .map(|i| {
-            let name = match i {
-                0 => "at rest".to_owned(),
-                STEPS => "at full travel".to_owned(),
-                _ => format!("at {i}/{STEPS} of the travel"),
-            };
-            let down_mm = travel_mm * f64::from(i) / f64::from(STEPS);
-            (name, Rigid::from_translation(DVec3::NEG_Z * down_mm))
-        })
-        .collect();
-    let fault = |problem: String| PartError::View { problem, field: "loads.claims".into() };
-    let suspension = suspension_of(design).map_err(|error| fault(error.to_string()))?;
-    for (claim, case) in design.sections().loads.claims.iter().zip(claims_of(design, &suspension)) {
-        let balance = case.equilibrium.map_err(|error| fault(format!("load \"{}\": {error}", claim.name)))?;
-        let pose = balance.displacement.to_pose(suspension.at_mm());
-        out.push((format!("under the load \"{}\"", claim.name), pose));
-    }
-    Ok(out)
 }
 
 impl Measures {
@@ -154,7 +109,7 @@ impl Measures {
             design.optics(),
             sections.dome.radius_mm,
             (&markers_mm, 0.5 * sections.white_markers.diameter_mm),
-            &poses.iter().map(|(_, pose)| *pose).collect::<Vec<_>>(),
+            &poses.iter().map(|pose| pose.rest_from_platform).collect::<Vec<_>>(),
             (sections.platforms.upper.underside_z_mm, design.sheet_underside_z_mm()),
             sections.platforms.window_margin_mm,
         )?;
@@ -185,6 +140,7 @@ impl Measures {
             spring_wire_mm: sections.springs.wire_diameter_mm,
             spring_outer_mm: sections.springs.outer_diameter_mm,
             spring_coils: sections.springs.active_coils,
+            spring_length_mm: sections.springs.free_length_mm,
             jig: sections.jig.clone(),
             stencil: sections.stencil.clone(),
             coupon: sections.coupon.clone(),

@@ -1,24 +1,32 @@
 //! Walls: what is left between two cuts, and between a cut and the outside.
+//!
+//! Two searches, each first on coarse meshes, whose error is known; what comes
+//! within that error of the limit is measured again, so that the verdict is
+//! exact to [`FINE_SHARE`] of the limit.
+//!
+//! * Between two cuts: the distance of the tools inside the part.
+//! * Between a cut and the outside, or two sides of the material: rays from
+//!   every corner of every facet along the facet's normal. Over two faces of
+//!   which one is flat, the distance is least at a corner of one of them, so
+//!   none can be missed but by what the facets' own angles add.
 
 use glam::DVec3;
 
 use super::{Blueprint, Feature, Measures, PartError};
-use crate::mesh::{Chord, Construction, MeshError, RayTarget, Solid};
+use crate::mesh::{Chord, Construction, MeshError, Piece, RayTarget, Shape, Solid};
 
 /// Walls are looked for on meshes this coarse, in parts of the limit.
-const CHORD_SHARE: f64 = 0.05;
+const CHORD_SHARE: f64 = 0.02;
+/// And measured, where it matters, on meshes this fine.
+const FINE_SHARE: f64 = 0.002;
 /// Two faces bound a wall if their normals are opposite to within about 18
 /// degrees; where faces meet at a blunter angle the material ends in an edge.
 const OPPOSITE: f64 = -0.95;
-/// A wall is refused if it is thinner than the limit by more than this share:
-/// the chords of two circles may eat so much of it.
-const SLACK: f64 = 2.5 * CHORD_SHARE;
+/// How much longer the way along a normal can be than the wall is thick: two
+/// faces within [`OPPOSITE`], each with its chords.
+const SEARCH: f64 = 1.0 / 0.95 + 2.0 * CHORD_SHARE;
 
 /// Checks every wall of a printed part against the process.
-///
-/// Pairs of cuts that are not meant to meet keep their distance (measured
-/// between the tools, inside the part), and from points all over the surface
-/// the thickness of the material behind is measured.
 ///
 /// # Errors
 /// The thinnest wall below the limit: where, between what, which field.
@@ -28,28 +36,22 @@ pub(super) fn check(b: &Blueprint, m: &Measures) -> Result<(), PartError> {
         return Ok(());
     }
     let failed = |error: MeshError| PartError::Mesh { part: b.name.clone(), error };
-    let chord = Chord::new((CHORD_SHARE * limit).max(b.chord.tolerance_mm())).map_err(failed)?;
-    distances(b, chord, limit, &failed)?;
-    thicknesses(b, chord, limit, &failed)
+    distances(b, limit, &failed)?;
+    thicknesses(b, limit, &failed)
 }
 
-fn distances(
-    b: &Blueprint,
-    chord: Chord,
-    limit: f64,
-    failed: &dyn Fn(MeshError) -> PartError,
-) -> Result<(), PartError> {
-    // A coarse tolerance of its own would make fine cavities slow here.
-    let coarse = |f: &Feature| {
-        let mut piece = f.piece.clone();
-        piece.chord = None;
-        piece.solid(chord)
-    };
-    let body = Solid::union(b.added.iter().map(coarse).collect::<Result<_, _>>().map_err(failed)?)
-        .map_err(failed)?;
+/// The piece as a solid at a tolerance, whatever tolerance it has of its own.
+fn solid_of(piece: &Piece, chord: Chord) -> Result<Solid, MeshError> {
+    Piece { chord: None, ..piece.clone() }.solid(chord)
+}
+
+fn distances(b: &Blueprint, limit: f64, failed: &dyn Fn(MeshError) -> PartError) -> Result<(), PartError> {
+    let coarse = Chord::new(CHORD_SHARE * limit).map_err(failed)?;
+    let material = b.added.iter().map(|f| solid_of(&f.piece, coarse)).collect::<Result<_, _>>();
+    let body = material.and_then(Solid::union).map_err(failed)?;
     let mut tools = Vec::with_capacity(b.cut.len());
     for feature in &b.cut {
-        let tool = coarse(feature).map_err(failed)?;
+        let tool = solid_of(&feature.piece, coarse).map_err(failed)?;
         // Only what is inside the part counts; a cut that misses it is a
         // mistake in the design.
         let Some(inside) = tool.intersection(&body).map_err(failed)? else {
@@ -68,19 +70,56 @@ fn distances(
             if meant_to_meet(b, one, two) {
                 continue;
             }
+            let search = limit * (1.0 + 2.0 * CHORD_SHARE);
             if let (Some(p), Some(q)) = (bounds, other_bounds)
-                && ((p.min_mm - q.max_mm).max(q.min_mm - p.max_mm)).max_element() > limit
+                && ((p.min_mm - q.max_mm).max(q.min_mm - p.max_mm)).max_element() > search
             {
                 continue;
             }
-            let gap = solid.gap_mm(other, limit);
-            if gap < limit * (1.0 - SLACK) {
+            let gap = solid.gap_mm(other, search);
+            if gap >= search {
+                continue;
+            }
+            let Some(gap) = measured(b, one, two, limit).map_err(failed)? else { continue };
+            if gap < limit * (1.0 - 2.0 * FINE_SHARE) {
                 let place = format!("wall between {} and {}", one.piece.name, two.piece.name);
                 return Err(b.infeasible(place, gap, limit, fields(one, two)));
             }
         }
     }
     Ok(())
+}
+
+/// Distance between two cuts on fine meshes, of what is cut from material that no cut which they open into has
+/// taken away: a hole that starts inside a bore bounds no wall there. `None` if nothing is left of one.
+fn measured(b: &Blueprint, one: &Feature, two: &Feature, limit: f64) -> Result<Option<f64>, MeshError> {
+    let fine = Chord::new(FINE_SHARE * limit)?;
+    let solids = |features: &[&Feature]| {
+        features
+            .iter()
+            .map(|f| solid_of(&f.piece, fine))
+            .collect::<Result<Vec<_>, _>>()
+            .and_then(Solid::union)
+    };
+    let body = solids(&b.added.iter().collect::<Vec<_>>())?;
+    let opened: Vec<&Feature> = b
+        .cut
+        .iter()
+        .filter(|f| ![one, two].iter().any(|x| x.piece.name == f.piece.name))
+        .filter(|f| meant_to_meet(b, one, f) || meant_to_meet(b, two, f))
+        .collect();
+    let left = |f: &Feature| {
+        let inside = solid_of(&f.piece, fine)?.intersection(&body)?;
+        match inside {
+            Some(inside) if !opened.is_empty() => match inside.difference(&solids(&opened)?) {
+                Err(MeshError::Empty { .. }) => Ok(None),
+                other => other.map(Some),
+            },
+            other => Ok(other),
+        }
+    };
+    let search = limit * (1.0 + 2.0 * CHORD_SHARE);
+    Ok(left(one)?.zip(left(two)?).map(|(p, q)| p.gap_mm(&q, search)))
 }
 
 fn meant_to_meet(b: &Blueprint, one: &Feature, two: &Feature) -> bool {
@@ -94,72 +133,109 @@ fn fields(one: &Feature, two: &Feature) -> String {
     if one.field == two.field { one.field.to_owned() } else { format!("{} or {}", one.field, two.field) }
 }
 
-fn thicknesses(
-    b: &Blueprint,
-    chord: Chord,
-    limit: f64,
-    failed: &dyn Fn(MeshError) -> PartError,
-) -> Result<(), PartError> {
+/// A wall that may be too thin: a point on each side with the facet's normal there, its thickness, and the middle
+/// of the facet that it was seen from, which tells best whose facet that is.
+#[derive(Debug, Clone, Copy)]
+struct Wall {
+    from: (DVec3, DVec3),
+    to: (DVec3, DVec3),
+    thickness: f64,
+    facet: DVec3,
+}
+
+fn thicknesses(b: &Blueprint, limit: f64, failed: &dyn Fn(MeshError) -> PartError) -> Result<(), PartError> {
+    let coarse = Chord::new(CHORD_SHARE * limit).map_err(failed)?;
     let mut construction: Construction = b.construction();
     for piece in construction.added.iter_mut().chain(&mut construction.cut) {
         piece.chord = None;
     }
-    let solid = construction.solid(chord).map_err(failed)?;
-    let mesh = solid.to_mesh();
+    let mesh = construction.solid(coarse).map_err(failed)?.to_mesh();
     let target = RayTarget::new(&mesh);
-    let skin = 1e-3 * limit;
-    let mut thinnest: Option<(f64, DVec3, DVec3)> = None;
-    for corners in mesh.iter_mm() {
-        let [p, q, r] = corners;
-        let cross = (q - p).cross(r - p);
-        let Some(normal) = cross.try_normalize() else { continue };
-        for point in samples(corners, cross.length(), limit) {
+    let (skin, search) = (1e-3 * limit, SEARCH * limit);
+    let mut thinnest: Option<Wall> = None;
+    for [p, q, r] in mesh.iter_mm() {
+        let Some(normal) = (q - p).cross(r - p).try_normalize() else { continue };
+        let middle = (p + q + r) / 3.0;
+        for corner in [p, q, r, middle] {
+            // A little inside the facet: no ray runs along its neighbours.
+            let inwards = middle - corner;
+            let point = corner + inwards * (skin / inwards.length().max(skin)).min(0.25);
             let from = point - normal * skin;
-            let Some((fraction, other)) = target.first_hit(from, point - normal * limit) else { continue };
+            let Some((fraction, other)) = target.first_hit(from, point - normal * search) else { continue };
             if normal.dot(other) > OPPOSITE {
                 continue;
             }
-            let thickness = skin + fraction * (limit - skin);
-            if thinnest.is_none_or(|(least, ..)| thickness < least) {
-                thinnest = Some((thickness, point, point - normal * thickness));
+            let seen = skin + fraction * (search - skin);
+            let to = (point - normal * seen, other);
+            let wall = exact(b, Wall { from: (point, normal), to, thickness: seen, facet: middle }, limit);
+            if thinnest.is_none_or(|w| wall.thickness < w.thickness) {
+                thinnest = Some(wall);
             }
         }
     }
-    let Some((thickness, from, to)) = thinnest else { return Ok(()) };
-    if thickness >= limit * (1.0 - SLACK) {
+    let Some(Wall { from, to, thickness, facet }) = thinnest else { return Ok(()) };
+    if thickness >= limit * (1.0 - 2.0 * FINE_SHARE) {
         return Ok(());
     }
-    let (one, two) = (face_at(b, from), face_at(b, to));
+    let (one, two) = (face_at(b, (facet, from.1)), face_at(b, to));
+    let at = from.0;
     let place = format!(
         "wall between {} and {} at ({:.2}, {:.2}, {:.2})",
-        one.piece.name, two.piece.name, from.x, from.y, from.z
+        one.piece.name, two.piece.name, at.x, at.y, at.z
     );
     Err(b.infeasible(place, thickness, limit, fields(one, two)))
 }
 
-/// Points inside a triangle about as far apart as the limit, at most some hundred;
-/// a sliver gets a single row of them.
-fn samples(corners: [DVec3; 3], twice_area: f64, limit: f64) -> Vec<DVec3> {
-    let [p, q, r] = corners;
-    let edges = [(p, q, r), (q, r, p), (r, p, q)];
-    let length = |&(a, b, _): &(DVec3, DVec3, DVec3)| (b - a).length();
-    let longest = edges.iter().map(length).fold(0.0, f64::max);
-    let short = twice_area / longest.max(f64::MIN_POSITIVE);
-    let n = ((longest / limit).ceil() as u32).clamp(1, 10);
-    let at = |i: u32, n: u32| (f64::from(i) + 1.0 / 3.0) / f64::from(n);
-    if short < 0.5 * limit {
-        let shortest = edges.iter().min_by(|x, y| length(x).total_cmp(&length(y)));
-        let (a, b, tip) = *shortest.unwrap_or(&edges[0]);
-        let foot = 0.5 * (a + b);
-        return (0..n).map(|i| foot + (tip - foot) * at(i, n)).collect();
+/// The same wall between the exact surfaces: each end is brought to the nearest point of its own surface, in turn
+/// with the other, until they rest. Flat facets are exact as they are. Where it leads elsewhere (off the part of
+/// the surface that is left), the measured wall stands.
+fn exact(b: &Blueprint, seen: Wall, limit: f64) -> Wall {
+    const ROUNDS: u32 = 24;
+    let curved = |side: (DVec3, DVec3)| {
+        let piece = &face_at(b, side).piece;
+        match &piece.shape {
+            Shape::Prism { corner_radius_mm, .. } if *corner_radius_mm == 0.0 => None,
+            _ => Some(piece),
+        }
+    };
+    let sides = [(seen.from, curved((seen.facet, seen.from.1))), (seen.to, curved(seen.to))];
+    if sides.iter().all(|(_, piece)| piece.is_none()) {
+        // From a corner straight to the other plane.
+        let thickness = (seen.from.0 - seen.to.0).dot(seen.to.1).abs();
+        return Wall { thickness, ..seen };
     }
-    (0..n).flat_map(|i| (0..n - i).map(move |j| p + (q - p) * at(i, n) + (r - p) * at(j, n))).collect()
+    let nearest = |((at, normal), piece): ((DVec3, DVec3), Option<&Piece>), other: DVec3| match piece {
+        Some(piece) => piece.nearest_mm(other),
+        None => other - normal * (other - at).dot(normal),
+    };
+    let (mut from, mut to) = (seen.from.0, seen.to.0);
+    for _ in 0..ROUNDS {
+        let before = (from, to);
+        from = nearest(sides[0], to);
+        to = nearest(sides[1], from);
+        if from.distance(before.0) + to.distance(before.1) < 1e-6 * limit {
+            break;
+        }
+    }
+    let strayed = from.distance(seen.from.0).max(to.distance(seen.to.0)) > 0.25 * limit;
+    if strayed || !from.is_finite() || !to.is_finite() {
+        return seen;
+    }
+    Wall { thickness: from.distance(to), ..seen }
 }
 
-/// The feature whose exact surface is nearest to a point.
-fn face_at(b: &Blueprint, point: DVec3) -> &Feature {
-    let distance = |f: &Feature| f.piece.signed_distance_mm(point).abs();
+/// The feature whose exact surface is nearest to a point, among those that face the same way there or the
+/// opposite one.
+fn face_at(b: &Blueprint, (point, normal): (DVec3, DVec3)) -> &Feature {
+    const ALIKE: f64 = 0.85;
+    let off = |f: &Feature| {
+        let distance = |p: DVec3| f.piece.signed_distance_mm(p);
+        let h = 1e-6 * point.abs().max_element().max(1.0);
+        let along = (distance(point + normal * h) - distance(point - normal * h)).abs() / (2.0 * h);
+        let penalty = if along < ALIKE { f64::MAX } else { 0.0 };
+        distance(point).abs() + penalty
+    };
     let all = b.cut.iter().chain(&b.added);
     // A part has at least one piece of material.
-    all.min_by(|x, y| distance(x).total_cmp(&distance(y))).unwrap_or(&b.added[0])
+    all.min_by(|x, y| off(x).total_cmp(&off(y))).unwrap_or(&b.added[0])
 }

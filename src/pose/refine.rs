@@ -1,7 +1,7 @@
 //! Levenberg-Marquardt over poses, and the two ways to get residuals.
 
 use glam::{DVec2, DVec3};
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::Matrix6;
 
 use super::disc::{DIRECTIONS, Marker, OUTLINE, centroid_offset};
 use super::view::{Placed, Sheet, Sight};
@@ -9,22 +9,23 @@ use crate::numeric::{Rigid, rotation_from_vector, vector_from_rotation};
 use crate::optics::{Limit, SensorOptics};
 
 const MOST_STEPS: u32 = 40;
+/// The step after which a pose counts as found, mm: it is then right to 1e-8 mm.
+const SETTLED_MM: f64 = 2e-6;
 
 /// Why residuals do not exist at a pose: which marker, which limit.
 pub(super) type Hidden = (u32, Limit);
 
-/// Sum of squared residuals (px^2), normal matrix and right side.
+/// Sum of squared residuals (px^2), normal matrix (its lower half) and right side.
 pub(super) struct Normal {
     pub chi2: f64,
-    pub matrix: Matrix6<f64>,
-    pub right: Vector6<f64>,
+    matrix: [[f64; 6]; 6],
+    right: [f64; 6],
 }
 
 /// Residuals of sightings as a function of the pose.
 pub(super) trait Model {
-    /// At a pose. `moved` says how far, in mm, the last step went (infinite at first), so that slow parts can be
-    /// kept while they are sharp enough. The second value says whether everything is exact at this pose.
-    fn at(&mut self, pose: &Rigid, moved: f64) -> Result<(Normal, bool), Hidden>;
+    /// At a pose; at the first look slow parts may be guessed. The second value says whether everything is exact.
+    fn at(&mut self, pose: &Rigid, first_look: bool) -> Result<(Normal, bool), Hidden>;
 }
 
 /// A refined pose.
@@ -38,26 +39,50 @@ pub(super) struct Fit {
 
 impl Normal {
     fn empty() -> Self {
-        Self { chi2: 0.0, matrix: Matrix6::zeros(), right: Vector6::zeros() }
+        Self { chi2: 0.0, matrix: [[0.0; 6]; 6], right: [0.0; 6] }
     }
 
+    #[inline]
     fn add(&mut self, row: [f64; 6], left: f64) {
         self.chi2 += left * left;
         for i in 0..6 {
             self.right[i] += row[i] * left;
             for j in 0..=i {
-                self.matrix[(i, j)] += row[i] * row[j];
+                self.matrix[i][j] += row[i] * row[j];
             }
         }
     }
 
-    fn filled(mut self) -> Self {
+    fn whole(&self) -> Matrix6<f64> {
+        Matrix6::from_fn(|i, j| self.matrix[i.max(j)][i.min(j)])
+    }
+
+    /// The step of Levenberg and Marquardt: `(N + damping diag N) step = right`, by Cholesky's factors; `None` where
+    /// the matrix is not positive definite.
+    fn step(&self, damping: f64) -> Option<[f64; 6]> {
+        let mut l = self.matrix;
+        let mut x = self.right;
+        let mut per_diagonal = [0.0; 6];
         for i in 0..6 {
             for j in 0..i {
-                self.matrix[(j, i)] = self.matrix[(i, j)];
+                let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+                l[i][j] = (l[i][j] - sum) * per_diagonal[j];
             }
+            let sum: f64 = (0..i).map(|k| l[i][k] * l[i][k]).sum();
+            let square = l[i][i] * (1.0 + damping) - sum;
+            // Rounding of the sum: below it the direction is open.
+            if square.is_nan() || square <= 1e-15 * l[i][i] {
+                return None;
+            }
+            per_diagonal[i] = 1.0 / square.sqrt();
+            let sum: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
+            x[i] = (x[i] - sum) * per_diagonal[i];
         }
-        self
+        for i in (0..6).rev() {
+            let sum: f64 = (i + 1..6).map(|k| l[k][i] * x[k]).sum();
+            x[i] = (x[i] - sum) * per_diagonal[i];
+        }
+        Some(x)
     }
 }
 
@@ -68,7 +93,7 @@ pub(super) struct Residuals<'a> {
 }
 
 impl Model for Residuals<'_> {
-    fn at(&mut self, pose: &Rigid, _moved: f64) -> Result<(Normal, bool), Hidden> {
+    fn at(&mut self, pose: &Rigid, _first_look: bool) -> Result<(Normal, bool), Hidden> {
         let first = self.seen.first().map_or(0, |(m, _)| m.id);
         let optics = self.optics.at_pose(pose).map_err(|_| (first, Limit::PupilInsideSheet))?;
         let mut normal = Normal::empty();
@@ -79,30 +104,22 @@ impl Model for Residuals<'_> {
                 normal.add(std::array::from_fn(|j| motion[(axis, j)]), (*px - centroid)[axis]);
             }
         }
-        Ok((normal.filled(), true))
+        Ok((normal, true))
     }
 }
 
 /// Residuals in the plane that touches the observed pixel's ray, scaled to pixels by the lens's Jacobian there,
-/// plus an offset: what the exact centroid of the disc's image differs by. The offset changes slowly with the
-/// pose and is renewed when the pose has moved; at the end the residuals are those of raw pixels.
+/// plus an offset: what the exact centroid of the disc's image differs by. The offset changes slowly with the pose
+/// (hundredths of a pixel per mm): a guess does for the first look, every later one makes it anew, so that at the end
+/// the residuals are those of raw pixels.
 pub(super) struct Sharp<'a> {
     sheet: &'a Sheet,
     seen: &'a [(Marker, DVec2)],
     sights: Vec<Sight>,
     offsets: Vec<DVec2>,
-    /// Tangent over reach of each marker's last ray, 1/mm.
+    /// Tangent over reach of each marker's last ray, 1/mm; zero before.
     nears: Vec<f64>,
-    /// How far the pose has moved since the offsets were made, mm; infinite before.
-    age_mm: f64,
 }
-
-/// Offsets change by some hundredths of a pixel per mm. They are made once the steps are shorter than this (mm),
-const FIRST_MM: f64 = 0.05;
-/// again once they are shorter than this,
-const LAST_MM: f64 = 1e-5;
-/// and count as exact where the pose has moved less than this since: below 1e-9 px.
-const FRESH_MM: f64 = 1e-8;
 
 impl<'a> Sharp<'a> {
     /// `offsets` are a first guess, px.
@@ -112,13 +129,7 @@ impl<'a> Sharp<'a> {
         sights: Vec<Sight>,
         offsets: Vec<DVec2>,
     ) -> Self {
-        Self { sheet, seen, sights, offsets, nears: vec![0.0; seen.len()], age_mm: f64::INFINITY }
-    }
-
-    /// Makes ready for another start.
-    pub fn restart(&mut self) {
-        self.age_mm = f64::INFINITY;
-        self.nears.fill(0.0);
+        Self { sheet, seen, sights, offsets, nears: vec![0.0; seen.len()] }
     }
 
     fn renew(&mut self, placed: &Placed) -> Result<(), Hidden> {
@@ -139,18 +150,13 @@ impl<'a> Sharp<'a> {
 }
 
 impl Model for Sharp<'_> {
-    fn at(&mut self, pose: &Rigid, moved: f64) -> Result<(Normal, bool), Hidden> {
+    fn at(&mut self, pose: &Rigid, first_look: bool) -> Result<(Normal, bool), Hidden> {
         let first = self.seen.first().map_or(0, |(m, _)| m.id);
         let placed = self.sheet.placed(pose).ok_or((first, Limit::PupilInsideSheet))?;
-        if self.age_mm.is_infinite() {
-            let near = self.sheet.near_axis(&placed);
-            self.nears.iter_mut().for_each(|n| *n = if *n > 0.0 { *n } else { near });
-        }
-        self.age_mm += moved;
-        let (first_time, last_time) = (self.age_mm.is_infinite() && moved < FIRST_MM, moved < LAST_MM);
-        if first_time || (last_time && self.age_mm > FRESH_MM) {
+        if first_look {
+            self.nears.fill(self.sheet.near_axis(&placed));
+        } else {
             self.renew(&placed)?;
-            self.age_mm = 0.0;
         }
         let mut normal = Normal::empty();
         let parts = self.seen.iter().zip(&self.sights).zip(&self.offsets).zip(&mut self.nears);
@@ -164,7 +170,7 @@ impl Model for Sharp<'_> {
                 normal.add([v.x, v.y, v.z, w.x, w.y, w.z], left[axis]);
             }
         }
-        Ok((normal.filled(), self.age_mm <= FRESH_MM))
+        Ok((normal, !first_look))
     }
 }
 
@@ -177,7 +183,7 @@ pub(super) fn refine(
     known: Option<&Rigid>,
 ) -> Result<Fit, Hidden> {
     let mut pose = start;
-    let (mut now, mut exact) = model.at(&pose, f64::INFINITY)?;
+    let (mut now, mut exact) = model.at(&pose, true)?;
     let (mut damping, mut steps, mut settled) = (0.0, 0, false);
     while steps < MOST_STEPS && !settled {
         // A second start is the mirror of a pose that fits: where both fit it starts near its end.
@@ -185,11 +191,7 @@ pub(super) fn refine(
             break;
         }
         steps += 1;
-        let mut damped = now.matrix;
-        for i in 0..6 {
-            damped[(i, i)] *= 1.0 + damping;
-        }
-        let Some(step) = damped.cholesky().map(|c| c.solve(&now.right)) else {
+        let Some(step) = now.step(damping) else {
             damping = f64::max(10.0 * damping, 1e-6);
             continue;
         };
@@ -200,12 +202,13 @@ pub(super) fn refine(
         }
         // A turn counts by what it moves at a lever of ten millimetres.
         let moved = v.length().max(10.0 * w.length());
-        if exact && moved <= 1e-7 {
-            // What is left after this step is a hundredth of it (an offset's own motion): no need to look again.
+        if exact && moved <= SETTLED_MM && damping == 0.0 {
+            // What is left after this step is some thousandths of it (an offset's own motion, and the curvature
+            // where noise leaves residuals): no need to look again.
             (pose, settled) = (next, true);
             break;
         }
-        match model.at(&next, moved) {
+        match model.at(&next, false) {
             Ok((n, e)) if n.chi2 < now.chi2 || !exact => {
                 (pose, now, exact) = (next, n, e);
                 damping = if damping > 1e-9 { 0.1 * damping } else { 0.0 };
@@ -215,7 +218,7 @@ pub(super) fn refine(
             _ => damping = f64::max(10.0 * damping, 1e-4),
         }
     }
-    Ok(Fit { pose, chi2: now.chi2, normal: now.matrix, steps, settled })
+    Ok(Fit { pose, chi2: now.chi2, normal: now.whole(), steps, settled })
 }
 
 /// A pose within a hundredth of a millimetre and a thousandth of a radian of a minimum leads to it.

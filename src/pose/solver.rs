@@ -165,10 +165,7 @@ impl PoseSolver {
         let mut run = |start: &Rigid, known: Option<&Rigid>| {
             let start = self.start_pose(start);
             let fit = match &mut sharp {
-                Some(residuals) => {
-                    residuals.restart();
-                    refine(residuals, start, far, known)
-                }
+                Some(residuals) => refine(residuals, start, far, known),
                 None => refine(&mut Residuals { optics: &self.optics, seen }, start, far, known),
             };
             fit.map_err(|error| limit = limit.or(Some(error))).ok()

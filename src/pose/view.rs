@@ -9,6 +9,8 @@ use crate::optics::{Limit, SensorOptics};
 
 /// Newton steps of the climb; each squares the error.
 const MOST_CLIMB_STEPS: u32 = 40;
+/// Newton steps for neighbours of a disc that is wide for its distance.
+const WIDE_CLIMB_STEPS: u32 = 8;
 
 /// The sensor as the pose solver sees it.
 #[derive(Debug, Clone)]
@@ -142,6 +144,9 @@ impl Sheet {
     /// Exact pixels of a point on the sheet's top and of its neighbours there, at the given steps from it, and
     /// how far the point's pixel lies from the sighted one to first order, px. `near` is a guess of the tangent
     /// over the reach, 1/mm.
+    ///
+    /// The neighbours' rays start from the point's own by Taylor's series and take the same number of Newton steps
+    /// each, side by side: the series is right to the fourth power of step over distance, and each step squares that.
     pub fn pixels<const N: usize>(
         &self,
         placed: &Placed,
@@ -162,14 +167,37 @@ impl Sheet {
         let first_order = DVec2::from_array(sight.rows.map(|row| row.dot(ray) / depth));
         let tangent = reach * air.tangent_per_mm;
         let [second, third] = self.bends(tangent, air.by_reach);
-        let mut around = [DVec2::ZERO; N];
-        for (pixel, step) in around.iter_mut().zip(steps) {
-            let there = sideways + step;
-            let far = there.length();
+        let there = steps.map(|step| sideways + step);
+        let far = there.map(DVec2::length);
+        let mut tangents = far.map(|far| {
             let dr = far - reach;
-            let start = tangent + dr * (air.by_reach + dr * (0.5 * second + dr * third / 6.0));
-            let ray = self.air_ray(placed.air_mm, far, start.max(0.0))?;
-            *pixel = self.lens.project(in_camera(there, ray.tangent_per_mm)).ok()?;
+            (tangent + dr * (air.by_reach + dr * (0.5 * second + dr * third / 6.0))).max(0.0)
+        });
+        let widest = steps.iter().map(|step| step.length_squared()).fold(0.0, f64::max);
+        // Up to a tenth of the distance one step reaches rounding.
+        let rounds = if widest < 0.01 * placed.air_mm * placed.air_mm { 1 } else { WIDE_CLIMB_STEPS };
+        let mut slopes = [0.0; N];
+        for _ in 0..rounds {
+            let mut by_t = [placed.air_mm; N];
+            slopes = [placed.air_mm; N];
+            for [n2, excess, d] in &self.plates {
+                for ((t, by_t), slope) in tangents.iter().zip(&mut by_t).zip(&mut slopes) {
+                    let inverse = 1.0 / (n2 + excess * t * t);
+                    let part = d * inverse.sqrt();
+                    *by_t += part;
+                    *slope += part * n2 * inverse;
+                }
+            }
+            for (((t, far), by_t), slope) in tangents.iter_mut().zip(&far).zip(&by_t).zip(&slopes) {
+                *t = (*t + (far - by_t * *t) / slope).max(0.0);
+            }
+        }
+        let mut around = [DVec2::ZERO; N];
+        let rays = there.iter().zip(&far).zip(&tangents).zip(&slopes);
+        for (pixel, (((there, far), tangent), slope)) in around.iter_mut().zip(rays) {
+            // On the axis the two meet: t / reach -> dt / dreach.
+            let per_mm = if *far > 0.0 { tangent / far } else { 1.0 / slope };
+            *pixel = self.lens.project(in_camera(*there, per_mm)).ok()?;
         }
         Some((center, first_order, around))
     }

@@ -11,18 +11,21 @@
 
 mod correction;
 pub mod fit;
+mod limit;
 pub mod measured_csv;
 mod nominal;
+mod polar;
 #[cfg(test)]
 mod tests;
 
 use std::f64::consts::FRAC_PI_2;
-use std::fmt;
 
 use glam::{DVec2, DVec3};
 
 pub use correction::Correction;
+pub use limit::{TransferError, TransferLimit};
 pub use nominal::Nominal;
+pub(crate) use polar::{Polar, UnitPlate};
 
 /// How far off the sphere, relative to its radius, a point may lie and still count as being on the dome.
 /// It covers the rounding of a traced ray many times over, and refuses a point of another dome.
@@ -170,176 +173,3 @@ impl TransferMap {
         }
     }
 }
-
-/// A direction in polar form. At the pole, where no azimuth exists, `out` is +x.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Polar {
-    polar_rad: f64,
-    sin_polar: f64,
-    cos_polar: f64,
-    /// Unit vector in the base plane: (cos azimuth, sin azimuth).
-    out: DVec2,
-}
-
-impl Polar {
-    fn of_direction(direction: DVec3) -> Self {
-        let out = direction.truncate();
-        let sin_polar = out.length();
-        Self {
-            polar_rad: sin_polar.atan2(direction.z),
-            sin_polar,
-            cos_polar: direction.z,
-            out: if sin_polar > 0.0 { out / sin_polar } else { DVec2::X },
-        }
-    }
-
-    fn new(polar_rad: f64, azimuth_rad: f64) -> Self {
-        let (sin_polar, cos_polar) = polar_rad.sin_cos();
-        Self { polar_rad, sin_polar, cos_polar, out: DVec2::from_angle(azimuth_rad) }
-    }
-
-    fn direction(&self) -> DVec3 {
-        (self.out * self.sin_polar).extend(self.cos_polar)
-    }
-}
-
-/// A place on the plate of a unit dome as it follows from a direction: radially and sideways, each divided by
-/// sin(polar angle) so that the pole is an ordinary point, with the slopes. `turn` is the plate's rotation.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct UnitPlate {
-    radial_over_sin: f64,
-    sideways_over_sin: f64,
-    d_radial_d_polar: f64,
-    d_sideways_d_polar: f64,
-    /// d radial / d azimuth, over sin.
-    d_radial_around: f64,
-    /// d sideways / d azimuth, over sin.
-    d_sideways_around: f64,
-    turn: DVec2,
-}
-
-impl UnitPlate {
-    /// A map that is the same for every azimuth.
-    fn round(radial_over_sin: f64, slope: f64) -> Self {
-        Self {
-            radial_over_sin,
-            sideways_over_sin: 0.0,
-            d_radial_d_polar: slope,
-            d_sideways_d_polar: 0.0,
-            d_radial_around: 0.0,
-            d_sideways_around: 0.0,
-            turn: DVec2::X,
-        }
-    }
-
-    fn place(&self, at: &Polar) -> DVec2 {
-        self.on_plate(at, self.radial_over_sin, self.sideways_over_sin) * at.sin_polar
-    }
-
-    /// Slope along a step towards the rim, per rad.
-    fn d_polar(&self, at: &Polar) -> DVec2 {
-        self.on_plate(at, self.d_radial_d_polar, self.d_sideways_d_polar)
-    }
-
-    /// Slope along a step around the axis, per rad of arc (already divided by sin(polar angle)).
-    fn d_around(&self, at: &Polar) -> DVec2 {
-        self.on_plate(
-            at,
-            self.d_radial_around - self.sideways_over_sin,
-            self.radial_over_sin + self.d_sideways_around,
-        )
-    }
-
-    fn on_plate(&self, at: &Polar, radial: f64, sideways: f64) -> DVec2 {
-        self.turn.rotate(at.out * radial + at.out.perp() * sideways)
-    }
-
-    /// Area of the plate over area of the dome, with its sign: not positive means that the map folds.
-    fn area_ratio(&self) -> f64 {
-        self.d_radial_d_polar * (self.radial_over_sin + self.d_sideways_around)
-            - self.d_sideways_d_polar * (self.d_radial_around - self.sideways_over_sin)
-    }
-}
-
-/// A map that cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TransferError {
-    /// The field at fault, as it is called in a design's `print` section.
-    pub field: String,
-    /// Its value.
-    pub value: String,
-    /// What is wrong.
-    pub problem: String,
-    /// What is allowed.
-    pub allowed: String,
-}
-
-impl fmt::Display for TransferError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "`{}` is {}: {}; allowed: {}", self.field, self.value, self.problem, self.allowed)
-    }
-}
-
-impl std::error::Error for TransferError {}
-
-/// Why a point has no partner on the other side of the map.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum TransferLimit {
-    /// A coordinate is not a finite number.
-    NotFinite,
-    /// The point lies this far outside (or inside, negative) the dome's surface.
-    NotOnDome {
-        /// Distance from the surface, mm.
-        off_mm: f64,
-    },
-    /// Below the rim, or off the picture of the whole dome.
-    BeyondDome,
-    /// Further from the pole than the measurement reaches.
-    BeyondMeasured {
-        /// Where the point lies, rad.
-        polar_rad: f64,
-        /// How far the measurement reaches, rad.
-        limit_rad: f64,
-    },
-    /// The inverse of a measured map was not found within the allowed number of steps.
-    NotConverged {
-        /// Steps taken.
-        steps: u32,
-        /// Distance on the plate that is left, as a share of the dome's radius.
-        residual: f64,
-    },
-}
-
-impl TransferLimit {
-    /// The limit's name in files.
-    pub fn as_str(&self) -> &'static str {
-        match self {
-            Self::NotFinite => "not_finite",
-            Self::NotOnDome { .. } => "not_on_dome",
-            Self::BeyondDome => "beyond_dome",
-            Self::BeyondMeasured { .. } => "beyond_measured_map",
-            Self::NotConverged { .. } => "not_converged",
-        }
-    }
-}
-
-impl fmt::Display for TransferLimit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotFinite => write!(f, "a coordinate is not a finite number"),
-            Self::NotOnDome { off_mm } => write!(f, "the point is {off_mm} mm off the dome's surface"),
-            Self::BeyondDome => write!(f, "the point lies beyond the dome's rim"),
-            Self::BeyondMeasured { polar_rad, limit_rad } => write!(
-                f,
-                "polar angle {:.3} deg is beyond {:.3} deg, where the measured map ends",
-                polar_rad.to_degrees(),
-                limit_rad.to_degrees()
-            ),
-            Self::NotConverged { steps, residual } => {
-                write!(f, "no inverse after {steps} steps (residual {residual:.3e} of the radius)")
-            }
-        }
-    }
-}
-
-impl std::error::Error for TransferLimit {}

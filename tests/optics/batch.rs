@@ -1,5 +1,6 @@
 //! Batches: the same bytes as one by one, for any number of threads.
 
+use domecast::camera::LensLimit;
 use domecast::optics::{Limit, SensorOptics, SurfacePoint};
 use glam::{DVec2, DVec3};
 
@@ -30,6 +31,9 @@ fn batches_have_the_same_bytes_on_any_number_of_threads() {
                 )
             })
             .collect();
+        // What has no answer stands among the rest.
+        let lost = [DVec2::NAN, DVec2::new(f64::INFINITY, 0.0), DVec2::splat(1e200)];
+        let pixels: Vec<DVec2> = lost.into_iter().chain(pixels).collect();
         let one_by_one: Vec<_> = pixels.iter().map(|&p| optics.trace(p)).collect();
         let points: Vec<DVec3> = one_by_one.iter().flatten().map(|h| h.surface_mm).collect();
         assert!(points.len() > 5000, "{}: {}", case.name, points.len());
@@ -42,6 +46,19 @@ fn batches_have_the_same_bytes_on_any_number_of_threads() {
             pool.install(|| optics.project_all(&points, &mut back)).unwrap();
             for (pixel, &point) in back.iter().zip(&points) {
                 assert_eq!(*pixel, optics.project(point));
+            }
+            let lens = optics.lens();
+            let mut rays = vec![Err(LensLimit::NotFinite); pixels.len()];
+            pool.install(|| lens.unproject_all(&pixels, &mut rays)).unwrap();
+            let bits = |ray: DVec3| ray.to_array().map(f64::to_bits);
+            for (ray, &pixel) in rays.iter().zip(&pixels) {
+                assert_eq!(ray.map(bits), lens.unproject(pixel).map(bits), "{} at {pixel}", case.name);
+            }
+            let seen: Vec<DVec3> = rays.into_iter().flatten().collect();
+            let mut back = vec![Err(LensLimit::NotFinite); seen.len()];
+            pool.install(|| lens.project_all(&seen, &mut back)).unwrap();
+            for (pixel, &ray) in back.iter().zip(&seen) {
+                assert_eq!(*pixel, lens.project(ray));
             }
         }
     }

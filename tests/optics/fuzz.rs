@@ -1,7 +1,7 @@
 //! Random lenses, stacks, pixels, rays and points against the reference.
 //!
 //! A fixed seed per lens makes every failure a one-line rerun: the message names
-//! the seed.
+//! the seed, and `DOMECAST_FUZZ_SEED=seed` starts the test at it.
 
 use std::f64::consts::PI;
 
@@ -9,9 +9,10 @@ use domecast::camera::{Lens, LensLimit, LensSpec, Model};
 use domecast::numeric::Rigid;
 use domecast::optics::{Channel, Layer, Limit, OpticsSpec, SensorOptics};
 use glam::{DMat3, DVec2, DVec3};
+use nalgebra::Matrix2x3;
 use rayon::prelude::*;
 
-use super::dd::dd;
+use super::dd::{Dd, dd};
 use super::reference::{self, distance, field_angle, unit, v3};
 
 /// Splitmix64 (S. Vigna, public domain): small, good enough, the same anywhere.
@@ -135,6 +136,35 @@ fn optics_spec(r: &mut Random, mut lens: LensSpec) -> OpticsSpec {
 
 const EPS: f64 = f64::EPSILON;
 
+/// The last part of the domain: the bounds hold up to it. What is found in it
+/// must still map back to its pixel.
+const LAST: f64 = 1e-6;
+
+fn ulp(x: f64) -> f64 {
+    x.abs().next_up() - x.abs()
+}
+
+/// 8 ulp of a pixel. The lens takes its distance from the principal point, so
+/// where that is the larger number its ulp counts.
+fn pixel_ulps(lens: &Lens, pixel: DVec2) -> f64 {
+    let [[_, _, cx], [_, _, cy], _] = lens.spec().matrix;
+    8.0 * ulp(pixel.x.abs().max(cx.abs())).hypot(ulp(pixel.y.abs().max(cy.abs())))
+}
+
+/// How far 8 ulp of each of a ray's components move the pixel.
+fn ray_ulps(slope: &Matrix2x3<f64>, ray: DVec3) -> f64 {
+    (0..3).map(|j| slope.column(j).norm() * 8.0 * ulp(ray[j])).sum()
+}
+
+/// How far a pixel at most moves a ray, rad/px: the inverse of the smallest
+/// stretch of the ray's plane onto the image.
+fn condition(slope: &Matrix2x3<f64>, length: f64) -> f64 {
+    let gram = slope * slope.transpose();
+    let (half, det) = (0.5 * gram.trace(), gram.determinant());
+    let smallest = (det / (half + (half * half - det).max(0.0).sqrt())).max(0.0);
+    1.0 / (smallest.sqrt() * length)
+}
+
 /// What a run has seen.
 #[derive(Default, Clone, Copy)]
 pub struct Seen {
@@ -142,6 +172,15 @@ pub struct Seen {
     pub checks: u64,
     pub ok: u64,
     pub limits: u64,
+    pub most: Iterations,
+}
+
+/// The largest numbers of iterations met.
+#[derive(Default, Clone, Copy)]
+pub struct Iterations {
+    pub lens: u32,
+    pub climb: u32,
+    pub pupil: u32,
 }
 
 impl Seen {
@@ -151,6 +190,11 @@ impl Seen {
             checks: self.checks + o.checks,
             ok: self.ok + o.ok,
             limits: self.limits + o.limits,
+            most: Iterations {
+                lens: self.most.lens.max(o.most.lens),
+                climb: self.most.climb.max(o.most.climb),
+                pupil: self.most.pupil.max(o.most.pupil),
+            },
         }
     }
 }
@@ -175,27 +219,64 @@ impl Run<'_> {
     }
 
     /// A ray that was found for a pixel is right: within 1e-10 rad of the
-    /// reference, or the reference formula sends it to within 8 ulp of the
-    /// pixel (which is the same as 8 ulp times the condition).
+    /// reference, or within 8 ulp of the pixel times the condition there.
     fn ray_is_right(&self, pixel: DVec2, ray: DVec3, what: &str) {
         let seed = self.seed;
         assert!(ray.is_finite() && (ray.length() - 1.0).abs() < 4.0 * EPS, "seed {seed}: {what} {ray}");
         let theta = Lens::field_angle_rad(ray);
-        assert!(theta <= self.end * (1.0 + 1e-9), "seed {seed}: {what}: {theta} past {}", self.end);
-        if theta > self.end * (1.0 - 1e-6) {
+        assert!(theta <= self.end * (1.0 + 1e-13), "seed {seed}: {what}: {theta} past {}", self.end);
+        if theta > self.end * (1.0 - LAST) {
+            // The branch is the right one, since the domain is one-to-one.
+            let [u, v] = self.reference.lens.pixel(v3(ray));
+            let back = (u - dd(pixel.x)).f64().hypot((v - dd(pixel.y)).f64());
+            let allowed = match self.lens().project_with_jacobian(ray) {
+                Ok((_, slope)) => {
+                    let by_lens = self.reference.lens.coefficient_ulps(ray);
+                    ray_ulps(&slope, ray) + pixel_ulps(self.lens(), pixel) + by_lens
+                }
+                Err(limit) => panic!("seed {seed}: {what}: {limit} for {ray}"),
+            };
+            assert!(back <= allowed, "seed {seed}: {what}: pixel {pixel} maps {back:e} px off");
             return;
         }
         let Some(truth) = self.reference.lens.ray(pixel, self.end, Some(ray)) else {
             panic!("seed {seed}: {what}: no reference for pixel {pixel}, ray {ray}");
         };
         let error = distance(v3(ray), truth);
-        if error <= 1e-10 {
-            return;
+        if error > 1e-10 {
+            let truth = DVec3::from_array(truth.map(Dd::f64));
+            let slope = match self.lens().project_with_jacobian(truth) {
+                Ok((_, slope)) => slope,
+                Err(limit) => panic!("seed {seed}: {what}: {limit} for {truth}"),
+            };
+            let by_lens = self.reference.lens.coefficient_ulps(truth);
+            let allowed = (pixel_ulps(self.lens(), pixel) + by_lens) * condition(&slope, 1.0);
+            assert!(
+                error <= allowed,
+                "seed {seed}: {what}: pixel {pixel}, {error:e} rad, {allowed:e} allowed"
+            );
         }
-        let [u, v] = self.reference.lens.pixel(v3(ray));
-        let back = (u - dd(pixel.x)).f64().hypot((v - dd(pixel.y)).f64());
-        let allowed = 8.0 * EPS * pixel.abs().max_element();
-        assert!(back <= allowed, "seed {seed}: {what}: pixel {pixel}, {error:e} rad, {back:e} px");
+    }
+
+    /// The image of the domain's rim, as a polygon about the pixel's own place.
+    fn is_well_inside(&self, pixel: DVec2) -> bool {
+        let [x, y] = self.reference.lens.image_of_pixel(pixel).map(Dd::f64);
+        let (mut winding, mut nearest) = (0.0, f64::INFINITY);
+        let n = 256;
+        let at = |k: i32| {
+            let ray = Self::direction(self.end * (1.0 - 1e-9), f64::from(k) * 2.0 * PI / f64::from(n));
+            let [u, v] = self.reference.lens.image(v3(ray)).map(Dd::f64);
+            DVec2::new(u - x, v - y)
+        };
+        let (mut a, mut largest) = (at(0), 0.0_f64);
+        for k in 1..=n {
+            let b = at(k);
+            winding += a.perp_dot(b).atan2(a.dot(b));
+            nearest = nearest.min(b.length());
+            largest = largest.max((b - a).length());
+            a = b;
+        }
+        winding.abs() > PI && nearest > largest
     }
 
     fn random_pixel(&mut self, r: &mut Random) {
@@ -213,23 +294,28 @@ impl Run<'_> {
     fn pixel(&mut self, pixel: DVec2) {
         let seed = self.seed;
         self.seen.checks += 1;
-        match self.lens().unproject(pixel) {
-            Ok(ray) => self.ray_is_right(pixel, ray, "unproject"),
+        match self.lens().unproject_solved(pixel) {
+            Ok(found) => {
+                self.seen.most.lens = self.seen.most.lens.max(found.iterations);
+                assert_eq!(self.lens().unproject(pixel), Ok(found.value), "seed {seed}");
+                self.ray_is_right(pixel, found.value, "unproject");
+            }
             Err(limit) => {
                 assert_eq!(limit, self.lens().end_limit(), "seed {seed}: pixel {pixel}");
-                let spec = self.lens().spec();
-                let q = if spec.model == Model::BrownConrady {
-                    spec.distortion[2].hypot(spec.distortion[3])
-                } else {
-                    0.0
+                let tangential = {
+                    let spec = self.lens().spec();
+                    spec.model == Model::BrownConrady
+                        && (spec.distortion[2], spec.distortion[3]) != (0.0, 0.0)
                 };
-                let [x, y] = self.reference.lens.image_of_pixel(pixel);
-                let rho = (x * x + y * y).sqrt().f64();
-                let a = if spec.model == Model::KannalaBrandt { self.end } else { self.end.tan() };
-                let rim = self.reference.lens.radius(dd(a)).f64();
-                // No circle inside the image of the domain is refused.
-                let inside = rim - 3.0 * q * a * a;
-                assert!(rho >= inside * (1.0 - 1e-9), "seed {seed}: pixel {pixel} refused");
+                if tangential {
+                    assert!(!self.is_well_inside(pixel), "seed {seed}: pixel {pixel} refused");
+                } else {
+                    let [x, y] = self.reference.lens.image_of_pixel(pixel);
+                    let rho = (x * x + y * y).sqrt().f64();
+                    let fisheye = self.lens().spec().model == Model::KannalaBrandt;
+                    let rim = self.reference.lens.radius(dd(if fisheye { self.end } else { self.end.tan() }));
+                    assert!(rho >= rim.f64() * (1.0 - 4.0 * EPS), "seed {seed}: pixel {pixel} refused");
+                }
             }
         }
         self.traced(pixel);
@@ -298,9 +384,9 @@ impl Run<'_> {
             return;
         }
         let inside = match r.bits() % 4 {
-            0 => 1.0 - 1e-6 * (1.0 + 100.0 * r.unit()),
+            0 => 1.0 - LAST * (1.0 + 100.0 * r.unit()),
             1 => r.unit() * 1e-6,
-            _ => r.unit() * (1.0 - 1e-6),
+            _ => r.unit() * (1.0 - LAST),
         };
         let ray = Self::direction(self.end * inside, phi) * 10f64.powf(r.range(-3.0, 3.0));
         let [u, v] = self.reference.lens.pixel(v3(ray));
@@ -310,16 +396,25 @@ impl Run<'_> {
             Err(limit) => panic!("seed {seed}: {limit} at {inside} of the domain"),
         };
         assert_eq!(self.lens().project(ray), Ok(pixel), "seed {seed}");
-        let allowed = (8.0 * EPS * (slope.norm() * ray.length() + truth.length())).max(1e-9);
-        assert!((pixel - truth).length() <= allowed, "seed {seed}: {pixel} is not {truth}");
-        // And back: the rounded pixel may lie past the end only near it.
-        match self.lens().unproject(truth) {
-            Ok(back) => self.ray_is_right(truth, back, "back"),
-            Err(limit) => {
-                let fine = inside > 1.0 - 1e-4 && self.lens().spec().model != Model::Pinhole;
-                let close = truth_is_within_an_ulp_of_the_rim(self, truth);
-                assert!(fine && close, "seed {seed}: {limit} for {truth} at {inside} of the domain");
-            }
+        let error = (u - dd(pixel.x)).f64().hypot((v - dd(pixel.y)).f64());
+        // Where the pixel is millions from the raster, its own ulp is the limit.
+        let by_lens = self.reference.lens.coefficient_ulps(ray);
+        let allowed = (ray_ulps(&slope, ray) + by_lens).max(8.0 * ulp(truth.length())).max(1e-9);
+        assert!(error <= allowed, "seed {seed}: {pixel} is not {truth}: {error:e} px, {allowed:e} allowed");
+        // And back, from our own pixel and from the true one.
+        for pixel in [pixel, truth] {
+            let back = match self.lens().unproject_solved(pixel) {
+                Ok(back) => back,
+                Err(limit) => panic!("seed {seed}: {limit} for {pixel} at {inside} of the domain"),
+            };
+            self.seen.most.lens = self.seen.most.lens.max(back.iterations);
+            let error = distance(v3(back.value), unit(v3(ray)));
+            let allowed = (pixel_ulps(self.lens(), pixel) + by_lens) * condition(&slope, ray.length());
+            assert!(
+                error <= allowed.max(1e-10),
+                "seed {seed}: {pixel} at {inside}: {error:e} rad, {allowed:e} allowed"
+            );
+            self.ray_is_right(pixel, back.value, "back");
         }
         self.seen.ok += 1;
     }
@@ -366,6 +461,14 @@ impl Run<'_> {
             (Ok(_), Err(limit)) => panic!("seed {seed}: no derivative at {point}: {limit}"),
         };
         self.seen.ok += 1;
+        match self.optics.project_solved(point) {
+            Ok(solved) => {
+                assert_eq!(solved.pixel, pixel, "seed {seed}");
+                self.seen.most.climb = self.seen.most.climb.max(solved.climb_iterations);
+                self.seen.most.pupil = self.seen.most.pupil.max(solved.pupil_iterations);
+            }
+            Err(limit) => panic!("seed {seed}: {limit} at {point}"),
+        }
         assert!(pixel.is_finite() && motion.pixel == pixel, "seed {seed}: {} is not {pixel}", motion.pixel);
         if theta > self.end * (1.0 - 1e-6) {
             assert!(
@@ -382,7 +485,8 @@ impl Run<'_> {
         let (by_point, by_pose) = (motion.by_point.norm(), motion.by_pose.norm());
         assert!(by_pose.is_finite(), "seed {seed}");
         // 8 ulp of all lengths that go in, times the slope.
-        let allowed = (8.0 * EPS * (by_point * reach + truth.length())).max(1e-9);
+        let by_lens = self.reference.lens.coefficient_ulps(DVec3::from_array(ray.map(Dd::f64)));
+        let allowed = (8.0 * EPS * (by_point * reach + truth.length()) + by_lens).max(1e-9);
         let error = (pixel - truth).length();
         assert!(error <= allowed, "seed {seed}: point {point}: {error:e} px, {allowed:e} allowed");
         if let Some(pixel) = seen_by {
@@ -393,16 +497,6 @@ impl Run<'_> {
             assert!(error <= allowed.max(fold), "seed {seed}: pixel {pixel} came back {error:e} px off");
         }
     }
-}
-
-fn truth_is_within_an_ulp_of_the_rim(run: &Run, pixel: DVec2) -> bool {
-    let [x, y] = run.reference.lens.image_of_pixel(pixel);
-    let length = (x * x + y * y).sqrt();
-    // Nudged inwards by 8 ulp it must be accepted.
-    let [[fx, _, cx], [_, fy, cy], _] = run.lens().spec().matrix;
-    let less = 1.0 - 16.0 * EPS * (1.0 + pixel.length() / (fx * length.f64()));
-    let nudged = DVec2::new(cx + fx * x.f64() * less, cy + fy * y.f64() * less);
-    run.lens().unproject(nudged).is_ok()
 }
 
 fn run(seed: u64, per_lens: u64) -> Seen {
@@ -440,31 +534,31 @@ fn fuzz(lenses: u64, per_lens: u64, seed: u64) -> Seen {
     (0..lenses).into_par_iter().map(|i| run(seed + i, per_lens)).reduce(Seen::default, Seen::plus)
 }
 
+fn first_seed(default: u64) -> u64 {
+    std::env::var("DOMECAST_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(default)
+}
+
+fn within_the_stated_iterations(most: &Iterations) {
+    let stated = [
+        (most.lens, Lens::MAX_UNPROJECT_ITERATIONS),
+        (most.climb, SensorOptics::MAX_CLIMB_ITERATIONS),
+        (most.pupil, SensorOptics::MAX_PUPIL_ITERATIONS),
+    ];
+    for (met, bound) in stated {
+        assert!(met > 0 && met <= bound, "{met} iterations, {bound} stated");
+    }
+}
+
 #[test]
 fn random_optics_agree_with_the_reference() {
-    let seen = fuzz(600, 24, 1);
+    let seen = fuzz(600, 24, first_seed(1));
     assert!(seen.ok > seen.checks / 4 && seen.limits > seen.checks / 20);
+    within_the_stated_iterations(&seen.most);
 }
 
 #[test]
 fn long_a_million_random_optics() {
-    let seed = std::env::var("DOMECAST_FUZZ_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(1_000_000);
-    let seen = fuzz(42_000, 24, seed);
-    println!("{} lenses, {} triples, {} ok, {} limits", seen.lenses, seen.checks, seen.ok, seen.limits);
+    let seen = fuzz(42_000, 24, first_seed(1_000_000));
     assert!(seen.checks >= 1_000_000);
-}
-
-/// Shows and reruns one lens and stack by its seed (`DOMECAST_FUZZ_SEED=..`,
-/// `--no-capture`); without a seed there is nothing to show.
-#[test]
-fn long_show_seed() {
-    let Some(seed) = std::env::var("DOMECAST_FUZZ_SEED").ok().and_then(|s| s.parse().ok()) else {
-        return;
-    };
-    let mut r = Random(seed);
-    let lens = lens_spec(&mut r);
-    println!("{:?}", optics_spec(&mut r, lens.clone()));
-    let built = Lens::new(lens).unwrap();
-    println!("{} {:?} {}", built.max_field_angle_rad(), built.fold_angle_rad(), built.max_radius_px());
-    println!("{:?}", run(seed, 24).checks);
+    within_the_stated_iterations(&seen.most);
 }

@@ -58,6 +58,29 @@ fn check(case: &Case, slack: f64) {
     }
 }
 
+/// Every text in the file that is a number other than zero.
+fn numbers<'a>(value: &'a serde_json::Value, found: &mut Vec<&'a str>) {
+    match value {
+        serde_json::Value::String(text) if text.parse().is_ok_and(|v: f64| v != 0.0) => found.push(text),
+        serde_json::Value::Array(list) => list.iter().for_each(|v| numbers(v, found)),
+        serde_json::Value::Object(map) => map.values().for_each(|v| numbers(v, found)),
+        _ => {}
+    }
+}
+
+#[test]
+fn golden_values_have_thirty_digits() {
+    let file: serde_json::Value = serde_json::from_str(include_str!("../cases/golden_optics.json")).unwrap();
+    let mut found = Vec::new();
+    numbers(&file, &mut found);
+    assert!(found.len() > 1000);
+    for text in found {
+        let mantissa = text.split('e').next().unwrap().trim_start_matches(['-', '0', '.']);
+        let digits = mantissa.chars().filter(char::is_ascii_digit).count();
+        assert!(digits >= 30, "{text} has {digits} digits");
+    }
+}
+
 #[test]
 fn golden_values() {
     let cases = golden();

@@ -36,6 +36,62 @@ fn horner(u: Dd, coefficients: &[f64]) -> Dd {
     coefficients.iter().rev().fold(dd(0.0), |s, &c| s * u + dd(c))
 }
 
+fn horner_f64(u: f64, coefficients: &[f64]) -> f64 {
+    coefficients.iter().rev().fold(0.0, |s, &c| s * u + c)
+}
+
+/// The root in `[0, end]` of a function that rises from below zero: bisected in
+/// doubles by `rough`, then bracketed and closed in on in double-double. `None`
+/// where the function stays below zero.
+fn rising_root(exact: impl Fn(Dd) -> Dd, rough: impl Fn(f64) -> f64, end: f64) -> Option<Dd> {
+    let (mut low, mut high) = (0.0, end);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if rough(middle) < 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let mut width = 4.0 * f64::EPSILON * high + f64::MIN_POSITIVE;
+    let (mut a, mut b) = loop {
+        let (a, b) = ((low - width).max(0.0), (high + width).min(end));
+        let (at_a, at_b) = (exact(dd(a)), exact(dd(b)));
+        if at_a.hi <= 0.0 && at_b.hi >= 0.0 {
+            break ((dd(a), at_a), (dd(b), at_b));
+        }
+        if width > end {
+            return None;
+        }
+        width *= 64.0;
+    };
+    // Regula falsi; an end that stays counts half (the Illinois rule).
+    let (mut stays, mut x) = (0, if -a.1.hi < b.1.hi { a.0 } else { b.0 });
+    for _ in 0..60 {
+        let (rise, before) = (b.1 - a.1, x);
+        if rise.hi <= 0.0 {
+            break;
+        }
+        x = a.0 - a.1 * (b.0 - a.0) / rise;
+        if (x - before).hi.abs() <= 1e-26 * x.hi {
+            break;
+        }
+        let at_x = exact(x);
+        if at_x.hi < 0.0 {
+            if stays == 1 {
+                b.1 = b.1 * dd(0.5);
+            }
+            (a, stays) = ((x, at_x), 1);
+        } else {
+            if stays == -1 {
+                a.1 = a.1 * dd(0.5);
+            }
+            (b, stays) = ((x, at_x), -1);
+        }
+    }
+    Some(x)
+}
+
 pub struct Lens<'a> {
     pub spec: &'a LensSpec,
     numerator: [f64; 4],
@@ -101,35 +157,46 @@ impl<'a> Lens<'a> {
         [x * dd(fx) + dd(cx), y * dd(fy) + dd(cy)]
     }
 
+    /// How far 8 ulp of each coefficient move the pixel of a ray: the lens is an
+    /// input as well, and where large terms cancel the one that counts.
+    pub fn coefficient_ulps(&self, ray: glam::DVec3) -> f64 {
+        let ulp = |k: f64| k.abs().next_up() - k.abs();
+        let across = ray.x.hypot(ray.y);
+        let a = if self.is_fisheye() { across.atan2(ray.z) } else { across / ray.z };
+        let u = a * a;
+        let ulps = |k: &[f64]| k.iter().rev().fold(0.0, |s, &k| s * u + ulp(k));
+        let moved = if self.is_fisheye() {
+            a * u * ulps(&self.spec.distortion)
+        } else {
+            let bottom = horner_f64(u, &self.denominator);
+            let level = horner_f64(u, &self.numerator) / bottom;
+            let by_bottom = level.abs() * ulps(&self.denominator[1..]);
+            a * u * (ulps(&self.numerator[1..]) + by_bottom) / bottom.abs()
+                + 3.0 * u * (ulp(self.q[0]) + ulp(self.q[1]))
+        };
+        8.0 * moved * self.spec.matrix[0][0].max(self.spec.matrix[1][1])
+    }
+
     pub fn image_of_pixel(&self, pixel: DVec2) -> [Dd; 2] {
         let [[fx, _, cx], [_, fy, cy], _] = self.spec.matrix;
         [(dd(pixel.x) - dd(cx)) / dd(fx), (dd(pixel.y) - dd(cy)) / dd(fy)]
     }
 
-    /// The angle variable in `[0, end]` whose image radius is `rho`, by
-    /// bisection to neighbouring doubles and one secant in double-double.
+    /// [`Lens::radius`] in doubles.
+    fn radius_f64(&self, a: f64) -> f64 {
+        let u = a * a;
+        if self.is_fisheye() {
+            return a * (1.0 + u * horner_f64(u, &self.spec.distortion));
+        }
+        a * horner_f64(u, &self.numerator) / horner_f64(u, &self.denominator)
+    }
+
+    /// The angle variable in `[0, end]` whose image radius is `rho`.
     fn bisect(&self, rho: Dd, end: f64) -> Option<Dd> {
-        let (mut low, mut high) = (0.0_f64, end);
         if self.radius(dd(end)) < rho {
             return None;
         }
-        for _ in 0..200 {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                break;
-            }
-            if self.radius(dd(middle)) < rho {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        let (at_low, at_high) = (self.radius(dd(low)), self.radius(dd(high)));
-        let rise = at_high - at_low;
-        if rise.hi <= 0.0 {
-            return Some(dd(low));
-        }
-        Some(dd(low) + (rho - at_low) * (dd(high) - dd(low)) / rise)
+        rising_root(|a| self.radius(a) - rho, |a| self.radius_f64(a) - rho.f64(), end)
     }
 
     /// The ray of a pixel whose field angle is at most `end_rad`; `near` is a
@@ -287,29 +354,20 @@ impl<'a> Sensor<'a> {
                 sum + d * n0 * t / (n * n + a * t * t).sqrt()
             })
         };
-        let (mut low, mut high) = (0.0_f64, 1.0_f64);
+        let rough = |t: f64| {
+            parts.iter().fold(-reach.hi, |sum, &(n, d)| {
+                let (n, d, n0) = (n.hi, d.hi, n0.hi);
+                sum + d * n0 * t / (n * n + (n - n0) * (n + n0) * t * t).sqrt()
+            })
+        };
+        let mut high = 1.0_f64;
         while total(dd(high)) < reach {
-            low = high;
             high *= 8.0;
             if high > 1e30 {
                 return None;
             }
         }
-        for _ in 0..200 {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                break;
-            }
-            if total(dd(middle)) < reach {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        let (at_low, at_high) = (total(dd(low)), total(dd(high)));
-        let rise = at_high - at_low;
-        let t =
-            if rise.hi > 0.0 { dd(low) + (reach - at_low) * (dd(high) - dd(low)) / rise } else { dd(low) };
+        let t = rising_root(|t| total(t) - reach, rough, high)?;
         let sine = n0 * t / (dd(1.0) + t * t).sqrt();
         let left = (dd(1.0) - sine) * (dd(1.0) + sine);
         if left.hi <= 0.0 {
@@ -323,18 +381,24 @@ impl<'a> Sensor<'a> {
         if self.lens.spec.pupil_shift_mm.is_empty() {
             return self.ray_from(point, dd(0.0));
         }
-        // s <- S(theta(s)) contracts strongly for the shifts of real lenses;
-        // when it does not settle there is no reference.
-        let mut shift = dd(0.0);
-        for _ in 0..80 {
+        // The shift that belongs to the field angle of the ray from there, by
+        // secants; when they do not settle there is no reference.
+        let miss = |shift: Dd| {
             let ray = self.ray_from(point, shift)?;
             let theta = field_angle(ray);
             let theta = if theta.hi > end_rad { dd(end_rad) } else { theta };
-            let next = self.lens.shift(theta);
-            if (next - shift).f64().abs() < 1e-29 {
-                return Some(ray);
+            Some((self.lens.shift(theta) - shift, ray))
+        };
+        let mut before = dd(0.0);
+        let (mut at_before, _) = miss(before)?;
+        let mut shift = at_before;
+        for _ in 0..30 {
+            let (at_shift, ray) = miss(shift)?;
+            let step = at_shift * (shift - before) / (at_shift - at_before);
+            if at_shift.f64().abs() < 1e-26 * self.radius || !step.f64().is_finite() {
+                return (at_shift.f64().abs() < 1e-20 * self.radius).then_some(ray);
             }
-            shift = next;
+            (before, at_before, shift) = (shift, at_shift, shift - step);
         }
         None
     }

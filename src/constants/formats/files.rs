@@ -9,25 +9,6 @@ use crate::constants::Constants;
 use crate::design::Design;
 use crate::parts::Part;
 
-/// Densities that the inertia is computed with, g/cm^3: data-sheet values of the materials; the springs, magnets,
-/// lights and wires are not counted.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Densities {
-    /// The platforms' print resin.
-    pub print_g_cm3: f64,
-    /// The sheet.
-    pub sheet_g_cm3: f64,
-    /// The elastomer.
-    pub elastomer_g_cm3: f64,
-}
-
-impl Default for Densities {
-    /// VeroClear 1.18, cast acrylic 1.19, platinum silicone 1.07.
-    fn default() -> Self {
-        Self { print_g_cm3: 1.18, sheet_g_cm3: 1.19, elastomer_g_cm3: 1.07 }
-    }
-}
-
 /// Files of a build's `constants/` folder besides `constants.json`, and why others are left out.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FormatFiles {
@@ -38,12 +19,7 @@ pub struct FormatFiles {
 }
 
 /// Writes every form that can say this sensor. The robot forms need the two platforms among `parts`.
-pub fn format_files(
-    design: &Design,
-    constants: &Constants,
-    parts: &[Part],
-    densities: &Densities,
-) -> FormatFiles {
+pub fn format_files(design: &Design, constants: &Constants, parts: &[Part]) -> FormatFiles {
     let mut made = FormatFiles::default();
     let mut add = |name: &str, text: String| made.files.push((format!("constants/{name}"), text));
     add("opencv.yaml", opencv_yaml(constants));
@@ -52,7 +28,7 @@ pub fn format_files(
         Ok(text) => add("kalibr.yaml", text),
         Err(reason) => made.left_out.push(format!("constants/kalibr.yaml: {reason}")),
     }
-    match robot_of(design, parts, densities) {
+    match robot_of(design, parts) {
         Some(robot) => {
             made.files.push(("constants/sensor.urdf".into(), urdf(constants, &robot)));
             made.files.push(("constants/sensor.xml".into(), mjcf(constants, &robot)));
@@ -62,14 +38,14 @@ pub fn format_files(
     made
 }
 
-/// The two bodies of a design.
-fn robot_of(design: &Design, parts: &[Part], densities: &Densities) -> Option<Robot> {
+/// The two bodies of a design, of the densities that it gives; springs, magnets, lights and wires are not counted.
+fn robot_of(design: &Design, parts: &[Part]) -> Option<Robot> {
     let named = |name: &str| parts.iter().find(|part| part.name == name);
     let (upper, lower) = (named("upper_platform")?, named("lower_platform")?);
     let sections = design.sections();
-    let sheet = mass_of_sheet(design, densities);
-    let dome = MassProperties::hemisphere(sections.dome.radius_mm, densities.elastomer_g_cm3);
-    let print = |part: &Part| mass_of_mesh(&part.mesh, densities.print_g_cm3);
+    let sheet = mass_of_sheet(design);
+    let dome = MassProperties::hemisphere(sections.dome.radius_mm, sections.elastomer.density_g_per_cm3);
+    let print = |part: &Part| mass_of_mesh(&part.mesh, sections.process.density_g_per_cm3);
     let body = |part: &Part, mass: MassProperties| BodyPart {
         name: part.name.clone(),
         mesh: format!("../parts/{}.stl", part.name),
@@ -82,9 +58,9 @@ fn robot_of(design: &Design, parts: &[Part], densities: &Densities) -> Option<Ro
     })
 }
 
-fn mass_of_sheet(design: &Design, densities: &Densities) -> MassProperties {
+fn mass_of_sheet(design: &Design) -> MassProperties {
     let thickness_mm = design.sheet_thickness_mm();
     let [x, y] = design.sections().sheet.size_mm;
     let center = DVec3::new(0.0, 0.0, -0.5 * thickness_mm);
-    MassProperties::cuboid(DVec3::new(x, y, thickness_mm), center, densities.sheet_g_cm3)
+    MassProperties::cuboid(DVec3::new(x, y, thickness_mm), center, design.sections().sheet.density_g_per_cm3)
 }

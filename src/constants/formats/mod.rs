@@ -5,14 +5,18 @@
 
 mod files;
 mod kalibr;
+mod mass;
+mod mjcf;
 mod opencv;
 mod robot;
 mod ros;
 
-pub use files::{Densities, FormatFiles, format_files};
+pub use files::{FormatFiles, format_files};
 pub use kalibr::kalibr_yaml;
+pub use mass::{MassProperties, mass_of_mesh};
+pub use mjcf::mjcf;
 pub use opencv::opencv_yaml;
-pub use robot::{BodyPart, MassProperties, Robot, mass_of_mesh, mjcf, urdf};
+pub use robot::{BodyPart, Robot, urdf};
 pub use ros::camera_info_yaml;
 
 /// A number as all these forms read it: the shortest that reads back the same, always with a point, and with a

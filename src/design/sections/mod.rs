@@ -164,9 +164,17 @@ pub struct ElastomerSection {
     /// Linear shrinkage on curing, percent of the length.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub shrinkage_percent: f64,
+    /// Density, g/cm^3; as data sheets give it for platinum silicone where it is left out.
+    #[serde(default = "silicone_density")]
+    #[schemars(range(min = 0.1, max = 25.0))]
+    pub density_g_per_cm3: f64,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
+}
+
+fn silicone_density() -> f64 {
+    1.07
 }
 
 /// The room that the whole sensor may take at rest.

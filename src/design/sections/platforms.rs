@@ -118,9 +118,17 @@ pub struct SheetSection {
     /// Width of the laser's cut, mm; the drawing for the cutter grows by half of it.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub kerf_mm: f64,
+    /// Density, g/cm^3; that of cast acrylic where it is left out.
+    #[serde(default = "acrylic_density")]
+    #[schemars(range(min = 0.1, max = 25.0))]
+    pub density_g_per_cm3: f64,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
+}
+
+fn acrylic_density() -> f64 {
+    1.19
 }
 
 /// The pockets for the magnets.

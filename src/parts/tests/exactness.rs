@@ -115,6 +115,80 @@ fn long_every_part_is_sound_at_every_tolerance() {
     }
 }
 
+/// A piece, as `scripts/exact_volumes.py` reads it.
+fn piece_json(piece: &Piece) -> serde_json::Value {
+    let map = piece.part_from_shape;
+    let rows = [map.matrix3.row(0), map.matrix3.row(1), map.matrix3.row(2)].map(|row| row.to_array());
+    let shape = match &piece.shape {
+        Shape::Turned { profile, .. } => serde_json::json!({
+            "points": profile.points_mm.iter().map(|p| p.to_array()).collect::<Vec<_>>(),
+            "arc_centers": profile.edges.iter().map(|edge| match edge {
+                crate::mesh::ProfileEdge::Line => None,
+                crate::mesh::ProfileEdge::Arc { center_z_mm } => Some(*center_z_mm),
+            }).collect::<Vec<_>>(),
+        }),
+        Shape::Prism { outline_mm, corner_radius_mm, bottom_z_mm, top_z_mm } => serde_json::json!({
+            "outline": outline_mm.iter().map(|p| p.to_array()).collect::<Vec<_>>(),
+            "radius": corner_radius_mm, "heights": [bottom_z_mm, top_z_mm],
+        }),
+    };
+    serde_json::json!({ "shape": shape, "matrix": rows, "origin": map.translation.to_array() })
+}
+
+/// Volumes of the exact solids by OpenCASCADE, whose shapes have no facets; `None` where it is not at hand.
+fn exact_volumes_by_opencascade(parts: &[Part]) -> Option<Vec<f64>> {
+    let python = std::env::var_os("DOMECAST_PYTHON")?;
+    let pieces = |list: &[Piece]| list.iter().map(piece_json).collect::<Vec<_>>();
+    let all: Vec<_> = parts
+        .iter()
+        .map(|p| serde_json::json!({ "added": pieces(&p.construction.added), "cut": pieces(&p.construction.cut) }))
+        .collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("constructions.json");
+    std::fs::write(&path, serde_json::to_vec(&all).unwrap()).unwrap();
+    let said =
+        std::process::Command::new(python).arg("scripts/exact_volumes.py").arg(&path).output().unwrap();
+    if said.status.code() == Some(3) {
+        println!("skipped: OpenCASCADE (cadquery-ocp) is not installed");
+        return None;
+    }
+    assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+    Some(serde_json::from_slice(&said.stdout).unwrap())
+}
+
+/// Every part's volume goes to that of the exact solid, at least as fast as the tolerance: no step of the ladder
+/// is worse, for its tolerance, than the coarse ones.
+#[test]
+fn long_every_volume_converges_to_the_exact_solid() {
+    let Some(exact) = exact_volumes_by_opencascade(&at_tolerance(LADDER[0])) else { return };
+    let m = Measures::of(&thumb24()).unwrap();
+    for (i, closed_form) in [(2, exact_volumes(&m)[0]), (3, exact_volumes(&m)[1])] {
+        assert!((exact[i] / closed_form - 1.0).abs() < 1e-9, "{}: {} {closed_form}", i, exact[i]);
+    }
+    let mut off = vec![Vec::new(); exact.len()];
+    for tolerance in LADDER {
+        for ((part, volume), list) in at_tolerance(tolerance).iter().zip(&exact).zip(&mut off) {
+            let error = (part.volume_mm3 - volume).abs();
+            assert!(error <= tolerance * part.area_mm2, "{} at {tolerance}: {error}", part.name);
+            list.push((part.name.clone(), tolerance, error));
+        }
+    }
+    for ((steps, volume), i) in off.iter().zip(&exact).zip(0..) {
+        let line: Vec<String> = steps.iter().map(|(_, t, e)| format!("{t}: {e:.2e}")).collect();
+        println!("{:16} {volume:12.5} mm3, off by {}", steps[0].0, line.join(", "));
+        // What OpenCASCADE's own integration is sure of.
+        let floor = 1e-8 * volume;
+        let worst = |part: &[(String, f64, f64)]| part.iter().map(|(_, t, e)| e / t).fold(0.0, f64::max);
+        let (coarse, fine) = (worst(&steps[..3]), worst(&steps[3..]));
+        let allowed = coarse * 1.5 + floor / LADDER[4];
+        assert!(
+            fine <= allowed,
+            "{i} {}: {fine} mm2 of error by tolerance, coarse ones {coarse}",
+            steps[0].0
+        );
+    }
+}
+
 /// Another kernel, which shares no code with ours, gets the same volume.
 #[test]
 fn second_kernel_agrees() {
@@ -158,7 +232,7 @@ fn step_keeps_exact_faces_where_it_can() {
     let parts = at_tolerance(0.1);
     let exact: Vec<&str> =
         parts.iter().filter(|p| Brep::exact(&p.construction).is_some()).map(|p| p.name.as_str()).collect();
-    assert_eq!(exact, ["mould_cavity", "mould_base", "acrylic_sheet", "marker_stencil"]);
+    assert_eq!(exact, ["mould_cavity", "mould_base", "acrylic_sheet", "marker_stencil", "fit_coupon"]);
     // Block: 6 faces; cavity: two half spheres and cylinders; three blind holes
     // of two half cylinders and a floor.
     assert_eq!(Brep::exact(&parts[2].construction).unwrap().face_count(), 6 + 4 + 3 * 3);

@@ -21,6 +21,12 @@ fn scale_lengths(value: &mut Value, scale: f64, is_length: bool) {
     }
 }
 
+/// Stiffness grows with the size, forces with its square.
+fn scale_grip(design: &mut Value, scale: f64) {
+    let grip = &mut design["magnets"]["grip_force_n"];
+    *grip = json!(grip.as_f64().unwrap() * scale * scale);
+}
+
 fn random_design(rng: &mut TestRng, index: usize) -> Value {
     let text = std::fs::read_to_string("designs/thumb24.json").unwrap();
     let mut d: Value = serde_json::from_str(&text).unwrap();
@@ -28,7 +34,8 @@ fn random_design(rng: &mut TestRng, index: usize) -> Value {
     let scale = size_mm / 24.0;
     scale_lengths(&mut d, scale, false);
     d["name"] = json!(format!("random-{index}"));
-    // Loads that press the springs as far as the scaled original's.
+    // Loads that press the springs as far as the scaled original's, magnets that hold as far.
+    scale_grip(&mut d, scale);
     for claim in d["loads"]["claims"].as_array_mut().unwrap() {
         for x in claim["force_n"].as_array_mut().unwrap() {
             *x = json!(x.as_f64().unwrap() * scale * scale * 0.8);
@@ -209,6 +216,7 @@ fn parts_of_a_millimetre_and_of_two_hundred_are_sound() {
         let scale = size_mm / 24.0;
         scale_lengths(&mut d, scale, false);
         d["loads"]["claims"] = json!([]);
+        scale_grip(&mut d, scale);
         d["sheet"]["kerf_mm"] = json!(0.1);
         // The same number of triangles at every size.
         d["mesh"]["chord_tolerance_mm"] = json!((0.03 * scale).max(1e-3));

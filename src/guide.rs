@@ -1,0 +1,12 @@
+//! A page for each subject, short, with the formulas and their sources.
+
+#[doc = include_str!("guide/dots.md")]
+pub mod dots {}
+#[doc = include_str!("guide/printing.md")]
+pub mod printing {}
+#[doc = include_str!("guide/casting.md")]
+pub mod casting {}
+#[doc = include_str!("guide/force.md")]
+pub mod force {}
+#[doc = include_str!("guide/formats.md")]
+pub mod formats {}

@@ -1,0 +1,225 @@
+//! What a new user does in the first hour: start a design, ask what a field means, make the likeliest mistakes,
+//! compare, watch.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use common::domecast;
+use serde_json::{Value, json};
+
+const DESIGN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/designs/thumb24.json");
+const FISHEYE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/designs/thumb24-fisheye.json");
+
+fn said(arguments: &[&str], folder: &Path) -> String {
+    let output = domecast(arguments, folder);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("UTF-8")
+}
+
+#[test]
+fn a_new_design_builds_like_the_one_it_starts_from() {
+    let folder = tempfile::tempdir().expect("a folder");
+    said(&["new", "mine"], folder.path());
+    let text = fs::read_to_string(folder.path().join("mine.json")).expect("written");
+    let schema: Value = serde_json::from_str(
+        &fs::read_to_string(folder.path().join("domecast.schema.json")).expect("beside it"),
+    )
+    .expect("JSON");
+    assert!(text.contains("\"$schema\": \"domecast.schema.json\"") && text.contains("\"why\""));
+    assert!(schema["properties"]["dome"].is_object());
+    let told: Value = serde_json::from_str(&said(&["compare", "mine.json", DESIGN, "--json"], folder.path()))
+        .expect("JSON");
+    let fields: Vec<&str> = told["fields"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|field| field["name"].as_str())
+        .collect();
+    assert_eq!(fields, ["name"]);
+    assert_eq!(told["dots"]["surface_mm"], json!([0.0, 0.0]));
+    // a second one of that name is refused, and the first is whole
+    let again = domecast(&["new", "mine"], folder.path());
+    assert_eq!(again.status.code(), Some(1));
+    assert_eq!(fs::read_to_string(folder.path().join("mine.json")).expect("kept"), text);
+    // a name that is no folder's name is refused before anything is written
+    assert_eq!(domecast(&["new", "a/b"], folder.path()).status.code(), Some(1));
+    // another start
+    said(&["new", "wide", "--from", FISHEYE], folder.path());
+    assert!(fs::read_to_string(folder.path().join("wide.json")).expect("written").contains("kannala_brandt"));
+}
+
+#[test]
+fn fields_are_explained() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = said(&["explain", "springs.wire_diameter_mm"], folder.path());
+    for part in ["0.3", "paper: 0.3 mm wire", "unit: mm", "must be there"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(said(&["explain"], folder.path()).contains("white_markers"));
+    let wrong = domecast(&["explain", "spring.wire"], folder.path());
+    assert_eq!(wrong.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("\"springs\""));
+}
+
+#[test]
+fn two_designs_are_compared() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let told: Value =
+        serde_json::from_str(&said(&["compare", DESIGN, FISHEYE, "--json"], folder.path())).expect("JSON");
+    let changed = told["fields"].as_array().expect("a list");
+    assert!(changed.iter().any(|field| field["name"] == "camera.model" && field["b"] == "kannala_brandt"));
+    // the same pattern in the image, elsewhere on the dome
+    assert!(told["dots"]["image_px"][1].as_f64().expect("px") < 1e-9);
+    let on_dome_mm = told["dots"]["surface_mm"][0].as_f64().expect("mm");
+    assert!((0.005..0.2).contains(&on_dome_mm), "{on_dome_mm}");
+    assert!(!told["wrench_sd"].as_array().expect("a list").is_empty());
+    // a folder that is no build is named
+    let wrong = domecast(&["compare", ".", DESIGN], folder.path());
+    assert_eq!(wrong.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("design.json"));
+}
+
+/// A mistake, made in thumb24, and the words that must name it.
+type Mistake = (&'static str, fn(&mut Value), &'static [&'static str]);
+
+#[test]
+fn the_likeliest_mistakes_are_named() {
+    let mistakes: [Mistake; 12] = [
+        ("metres", |d| d["dome"]["radius_mm"] = json!(0.01), &["dome.radius_mm", "wrong unit"]),
+        (
+            "micrometres",
+            |d| d["optics"]["layers"][0]["thickness_mm"] = json!(1000),
+            &["optics.layers", "wrong unit"],
+        ),
+        ("focal length in mm", |d| d["camera"]["matrix"][0][0] = json!(1.8), &["camera.matrix", "pixels"]),
+        (
+            "width and height",
+            |d| (d["camera"]["width"], d["camera"]["height"]) = (json!(480), json!(640)),
+            &["camera.width", "swapped"],
+        ),
+        (
+            "four coefficients",
+            |d| d["camera"]["distortion"] = json!([-0.02, 0.003, -0.001, 0.0002]),
+            &["kannala_brandt"],
+        ),
+        (
+            "fisheye coefficients padded",
+            |d| d["camera"]["distortion"] = json!([0.02, 0.003, -0.001, 0.0002, 0.0]),
+            &["camera.model", "kannala_brandt"],
+        ),
+        (
+            "order",
+            |d| d["camera"]["distortion"] = json!([-0.2917, 0.0878, -0.01156, 0.0, 0.0]),
+            &["camera.distortion", "another order"],
+        ),
+        ("diameter", |d| d["dome"]["radius_mm"] = json!(20), &["dome.radius_mm", "radius for diameter"]),
+        ("above", |d| d["camera"]["position_mm"][2] = json!(10), &["camera.position_mm", "sign"]),
+        (
+            "radians",
+            |d| d["camera"]["field_of_view_deg"] = json!(2.79),
+            &["camera.field_of_view_deg", "radians"],
+        ),
+        ("radians out of range", |d| d["leds"]["tilt_deg"] = json!(1.4835), &["leds.tilt_deg", "radians"]),
+        ("old version", |d| d["version"] = json!(0), &["version", "1"]),
+    ];
+    let design: Value = serde_json::from_str(&fs::read_to_string(DESIGN).expect("there")).expect("JSON");
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, make, words) in mistakes {
+        let mut wrong = design.clone();
+        make(&mut wrong);
+        fs::write(folder.path().join("wrong.json"), wrong.to_string()).expect("written");
+        let output = domecast(&["build", "wrong.json", "--out", "out"], folder.path());
+        let mut told = String::from_utf8_lossy(&output.stderr).into_owned();
+        if output.status.success() {
+            // it works all the same: then the page says it
+            let page = fs::read_to_string(folder.path().join("out/report/index.html")).expect("a page");
+            told = page[page.find("id=\"warnings\"").expect("warnings")..]
+                .split("</section>")
+                .next()
+                .expect("one")
+                .into();
+        }
+        for word in words {
+            assert!(told.contains(word), "{name}: \"{word}\" is missing in: {told}");
+        }
+    }
+}
+
+#[test]
+fn a_folder_and_a_decimal_comma_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = domecast(&["build", "."], folder.path());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("this is a folder"));
+    let text = fs::read_to_string(DESIGN).expect("there");
+    for (right, wrong) in
+        [("\"radius_mm\": 10", "\"radius_mm\": 10,5"), ("\"radius_mm\": 10", "\"radius_mm\": \"10,5\"")]
+    {
+        fs::write(folder.path().join("comma.json"), text.replacen(right, wrong, 1)).expect("written");
+        let output = domecast(&["build", "comma.json"], folder.path());
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(told.contains("decimal comma"), "{told}");
+    }
+}
+
+/// Ends the watching program even if a test fails.
+struct Watching(Child);
+
+impl Drop for Watching {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Waits until `holds`; gives up only where something is broken.
+fn wait_until(what: &str, holds: impl Fn() -> bool) {
+    for _ in 0..2400 {
+        if holds() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    panic!("{what} did not happen");
+}
+
+#[test]
+fn a_watched_design_is_built_again_when_it_is_saved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let design = folder.path().join("d.json");
+    let text = fs::read_to_string(DESIGN).expect("there");
+    fs::write(&design, &text).expect("written");
+    let child = Command::new(env!("CARGO_BIN_EXE_domecast"))
+        .args(["build", "d.json", "--out", "out", "--watch", "--quiet"])
+        .current_dir(folder.path())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("it runs");
+    let _watching = Watching(child);
+    let stamp = || fs::read_to_string(folder.path().join("out/report/fresh-stamp.js")).unwrap_or_default();
+    wait_until("the first build", || !stamp().is_empty());
+    let first = stamp();
+    let page = fs::read_to_string(folder.path().join("out/report/index.html")).expect("a page");
+    assert!(page.contains("fresh-stamp.js"));
+    // a fault in between leaves the result and does not end the watching
+    fs::write(&design, "{ not JSON").expect("written");
+    std::thread::sleep(Duration::from_millis(600));
+    assert_eq!(stamp(), first);
+    fs::write(&design, text.replacen("\"pitch_px\": 18", "\"pitch_px\": 19", 1)).expect("written");
+    wait_until("the second build", || !stamp().is_empty() && stamp() != first);
+    assert!(domecast(&["check", "out"], folder.path()).status.success());
+}
+
+#[test]
+fn shells_and_manuals_get_their_text() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let text = said(&["completions", shell], folder.path());
+        assert!(text.contains("domecast") && text.contains("calibrate-optics"), "{shell}");
+    }
+    let man = said(&["man"], folder.path());
+    assert!(man.contains(".TH") && man.contains("calibrate"));
+}

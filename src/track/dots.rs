@@ -15,6 +15,11 @@ const OWN_REACH: f64 = 0.3;
 const NEIGHBOR_REACH: f64 = 0.35;
 /// Two dots nearer than this part of their spacing are one blob.
 const ONE_BLOB: f64 = 0.3;
+/// Two starts nearer than this part of the spacing lead to the same spot.
+const SAME_PLACE: f64 = 0.25;
+/// How far a dot's displacement may differ from the mean of its neighbours', in parts of its spacing: a neighbour's blob
+/// is one spacing off, a dome's own folds are less.
+const MOST_TORN: f64 = 0.65;
 /// How far a dot's motion may differ from its neighbours', in parts of its spacing.
 const MOST_UNLIKE: f64 = 0.4;
 /// Rounds in which found dots lead to their neighbours.
@@ -126,7 +131,7 @@ impl DotSearch<'_, '_> {
             let mut more = false;
             for index in 0..self.tracks.len() {
                 let track = self.tracks[index];
-                if track.spot.is_some() || !track.is_wanted() || track.state == MarkState::Merged {
+                if track.spot.is_some() || !track.is_wanted() {
                     continue;
                 }
                 let (moved, displaced, count) = self.neighbors(index);
@@ -135,6 +140,11 @@ impl DotSearch<'_, '_> {
                 let guess = expected + track.displaced_px.map_or(displaced, |own| own + moved);
                 let starts = [guess, expected + displaced];
                 for start in starts {
+                    // What was no spot from there is none from there again.
+                    let again = track.start_px.is_some_and(|p| p.distance(start) < SAME_PLACE * spacing);
+                    if track.state == MarkState::Merged && again {
+                        continue;
+                    }
                     let Ok(spot) = self.measure(index, start, NEIGHBOR_REACH * spacing) else { continue };
                     if self.is_free(index, spot.at_px) {
                         if self.tracks[index].start_px.is_none() {
@@ -186,10 +196,16 @@ impl DotSearch<'_, '_> {
         for index in 0..self.tracks.len() {
             let track = self.tracks[index];
             let (Some(now), Some(start)) = (track.now_px(), track.start_px) else { continue };
-            let (moved, _, count) = self.neighbors(index);
-            let unlike = (now - start).distance(moved) > MOST_UNLIKE * self.models[index].spacing_px;
-            if count >= 2 && unlike {
-                self.tracks[index].lose(track.absent());
+            let (moved, displaced, count) = self.neighbors(index);
+            let spacing = self.models[index].spacing_px;
+            let unlike = (now - start).distance(moved) > MOST_UNLIKE * spacing;
+            let own = track.expected_px.map_or(displaced, |expected| now - expected);
+            let torn = own.distance(displaced) > MOST_TORN * spacing;
+            if count >= 2 && (unlike || torn) {
+                let track = &mut self.tracks[index];
+                track.lose(track.absent());
+                // Where it was is not where it is to be looked for.
+                track.displaced_px = None;
             }
         }
     }

@@ -15,6 +15,14 @@ use crate::pose::{Marker, PoseOptions, PoseSolver, outline_centroid_offset};
 
 /// Dots that constants may have.
 pub const MOST_DOTS: usize = 20_000;
+/// Residuals of the pose as many times what the constants' own tolerances mean are another sensor's.
+const FOREIGN: f64 = 3.0;
+/// Residuals (px) that nothing is said of: what light and lens do to a marker's edge.
+const ANYONES_RMS_PX: f64 = 0.15;
+/// Noise of a centroid where the constants say nothing of it, px.
+const CENTROID_PX: f64 = 0.1;
+/// Two poses both fit where they do so within this rms, px.
+const AMBIGUOUS_RMS_PX: f64 = 1.0;
 /// Farthest that the platform can be from rest where the constants do not say, mm.
 const MOST_SHIFT_MM: f64 = 5.0;
 
@@ -45,6 +53,8 @@ pub(super) struct SensorModel {
     /// How far from there it can be, px.
     pub markers_reach_px: Vec<f64>,
     pub solver: PoseSolver,
+    /// Rms of the markers' residuals above which the constants are not those of the camera, px.
+    pub foreign_rms_px: f64,
     pub mask: Mask,
     pub springs: Option<Springs>,
 }
@@ -107,15 +117,46 @@ impl SensorModel {
         let most_shift_mm = deepest.map_or(MOST_SHIFT_MM, |d| d.clamp(0.5, 100.0) + 2.0);
         let markers = constants.markers();
         // Eight residuals less six of the pose: the solver's gate lets 1.84 times its noise pass as rms.
-        let options = PoseOptions::new(most_residual_px / 1.84, most_shift_mm);
+        let options = PoseOptions::new(most_residual_px.min(AMBIGUOUS_RMS_PX) / 1.84, most_shift_mm);
         let solver = PoseSolver::new(&optics, &markers, options)
             .map_err(|error| TrackError::at("white_markers", format!("are not usable: {error}")))?;
         let dots = dots_of(constants, &optics)?;
         let at_mm = springs.as_ref().map_or(DVec3::ZERO, Springs::at_mm);
         let (markers_px, markers_reach_px) = reach_of(&optics, &markers, at_mm, deepest)?;
         let mask = Mask::new(optics.lens(), camera, mask);
-        Ok(Self { optics, dots, markers, markers_px, markers_reach_px, solver, mask, springs })
+        let foreign_rms_px = foreign_rms_of(constants, &optics, &markers);
+        Ok(Self {
+            optics,
+            dots,
+            markers,
+            markers_px,
+            markers_reach_px,
+            solver,
+            foreign_rms_px,
+            mask,
+            springs,
+        })
     }
+}
+
+/// How far residuals may be by what the constants say of themselves: nominal markers are off by their tolerance, measured
+/// ones by the noise of a centroid only.
+fn foreign_rms_of(constants: &Constants, optics: &SensorOptics, markers: &[Marker]) -> f64 {
+    let is_measured = constants.calibrations.iter().any(|c| c["kind"] == "optics");
+    let usable = |v: f64| if v.is_finite() { v.clamp(0.0, 1e3) } else { 0.0 };
+    let (mut centroid_px, mut marker_mm) = (CENTROID_PX, 0.0);
+    if let Some(tolerances) = &constants.tolerances {
+        centroid_px = usable(tolerances.white_centroid_px);
+        marker_mm = if is_measured { 0.0 } else { usable(tolerances.white_marker_mm) };
+    }
+    let px_by_mm = markers.iter().filter_map(|marker| {
+        let by_point = optics.project_with_motion(marker.position_mm).ok()?.by_point;
+        Some((0.5 * by_point.columns(0, 2).norm_squared()).sqrt())
+    });
+    let sd_px = centroid_px.hypot(marker_mm * px_by_mm.fold(0.0, f64::max));
+    // Of 2 n residuals the pose takes six.
+    let n = 2.0 * markers.len() as f64;
+    (FOREIGN * sd_px * ((n - 6.0).max(1.0) / n).sqrt()).max(ANYONES_RMS_PX)
 }
 
 fn dots_of(constants: &Constants, optics: &SensorOptics) -> Result<Vec<DotModel>, TrackError> {

@@ -79,7 +79,8 @@ pub struct TrackOptions {
     pub motion: Motion,
     /// Where displacements and wrenches are counted from.
     pub reference: Reference,
-    /// Largest rms of the white markers' residuals with which constants still pass for the camera's, px.
+    /// Largest rms of the white markers' residuals that is still a pose, px. The constants' own tolerances say above which
+    /// they are told to be another camera's.
     pub most_residual_px: f64,
     /// Largest distance, in parts of the dots' spacing, at which a quarter of the dots may lie from where the pose
     /// puts them, with which constants still pass for the camera's.
@@ -96,7 +97,7 @@ impl Default for TrackOptions {
             steps: Steps::default(),
             motion: Motion::Predicted,
             reference: Reference::Constants,
-            most_residual_px: 1.0,
+            most_residual_px: 2.0,
             most_misplaced: 0.25,
             search_every: 30,
         }

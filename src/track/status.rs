@@ -19,6 +19,9 @@ pub enum Problem {
     MarkersDoNotFit,
     /// The dots are not where pose and constants put them: the constants are those of another camera or sensor.
     ForeignConstants,
+    /// The pose is one that the springs cannot have (bound, torn off their magnets): damage, or constants of another
+    /// sensor. There is no wrench where their law ends.
+    BeyondSprings,
     /// Two poses explain the white markers.
     AmbiguousPose,
     /// Marks are much wider than they should be.
@@ -35,7 +38,7 @@ pub enum Problem {
 
 impl Problem {
     /// All of them, the gravest first.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Unreadable,
         Self::WrongSize,
         Self::Dark,
@@ -44,6 +47,7 @@ impl Problem {
         Self::MarkersMissing,
         Self::MarkersDoNotFit,
         Self::ForeignConstants,
+        Self::BeyondSprings,
         Self::AmbiguousPose,
         Self::Blurred,
         Self::Frozen,
@@ -63,6 +67,7 @@ impl Problem {
             Self::MarkersMissing => "markers_missing",
             Self::MarkersDoNotFit => "markers_do_not_fit",
             Self::ForeignConstants => "foreign_constants",
+            Self::BeyondSprings => "beyond_springs",
             Self::AmbiguousPose => "ambiguous_pose",
             Self::Blurred => "blurred",
             Self::Frozen => "frozen",

@@ -33,8 +33,13 @@ const FIT_REACH_PX: f64 = 4.0;
 /// Candidates for each marker, and combinations of them that are tried.
 const CANDIDATES: usize = 4;
 const MOST_COMBINATIONS: usize = 96;
-/// Offsets of centroids are found anew when the platform has moved so far (mm; a turn counts at ten millimetres).
-const RENEW_MM: f64 = 0.15;
+/// Offsets of centroids from centres change with the pose, by a few hundredths of a pixel a millimetre. After a move of
+/// the first length (mm; a turn counts at ten millimetres) each frame finds some of them anew, the oldest first; after
+/// one of the second, all at once.
+const RENEW_SOME_MM: f64 = 0.02;
+const RENEW_ALL_MM: f64 = 0.6;
+/// Part of the dots that one frame finds offsets anew for.
+const RENEWED_PART: usize = 8;
 /// A spread wider than expected by this factor is blur.
 const BLURRED: f64 = 1.7;
 /// Contrast below which there is nothing to see, levels.
@@ -61,9 +66,12 @@ pub struct Tracker {
     scratch: Vec<f64>,
     seen: Vec<Seen>,
     discs: Vec<Option<Disc>>,
-    /// The last pose that was found, and the one that offsets are for.
+    /// The last pose that was found.
     pose: Option<Rigid>,
+    /// The oldest pose that an offset may be for, the one that the newest are for, and the dot whose turn is next.
+    offsets_from: Option<Rigid>,
     offsets_at: Option<Rigid>,
+    next_offset: usize,
     last_number: Option<u64>,
     since_search: u32,
     reference: ReferenceSum,
@@ -124,7 +132,9 @@ impl Tracker {
             seen: Vec::with_capacity(model.markers.len()),
             discs: vec![None; model.markers.len()],
             pose: None,
+            offsets_from: None,
             offsets_at: None,
+            next_offset: 0,
             last_number: None,
             since_search: u32::MAX,
             reference: ReferenceSum { displacement: vec![(DVec3::ZERO, 0); dots], ..ReferenceSum::default() },
@@ -404,18 +414,25 @@ impl Tracker {
     /// Where the pose puts each dot on the undeformed dome.
     fn place_dots(&mut self) {
         let Some(pose) = self.pose else { return };
-        let far = |at: &Rigid| {
-            let between = at.inverse().compose(&pose);
-            let turn = between.rotation - glam::DMat3::IDENTITY;
-            let turned = turn.to_cols_array().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-            between.translation_mm.length() > RENEW_MM || 10.0 * turned > RENEW_MM
+        let is_all_old =
+            self.offsets_from.as_ref().is_none_or(|from| distance_mm(from, &pose) > RENEW_ALL_MM);
+        let is_some_old = self.offsets_at.as_ref().is_none_or(|at| distance_mm(at, &pose) > RENEW_SOME_MM);
+        let count = self.tracks.len();
+        let part = count.div_ceil(RENEWED_PART);
+        // A round over all dots that began after the last move ends it.
+        let renewed = if is_all_old {
+            0..count
+        } else if is_some_old || self.next_offset > 0 {
+            self.next_offset..(self.next_offset + part).min(count)
+        } else {
+            0..0
         };
-        let renew = self.offsets_at.as_ref().is_none_or(far);
-        for (track, model) in self.tracks.iter_mut().zip(&self.model.dots) {
+        for (index, (track, model)) in self.tracks.iter_mut().zip(&self.model.dots).enumerate() {
             track.expected_px = None;
             track.state = MarkState::Hidden;
             let Ok(center) = self.optics.project(model.surface_mm) else { continue };
-            if renew {
+            // A dot that could not be seen whole when its turn was has no shape yet.
+            if renewed.contains(&index) || track.shape.area_px == 0.0 {
                 let Some((offset, shape)) = model.look(&self.optics, center) else { continue };
                 (track.offset_px, track.shape) = (offset, shape);
             }
@@ -425,8 +442,14 @@ impl Tracker {
                 track.state = MarkState::Missing;
             }
         }
-        if renew {
-            self.offsets_at = Some(pose);
+        if is_all_old {
+            (self.offsets_from, self.offsets_at, self.next_offset) = (Some(pose), Some(pose), 0);
+        } else if !renewed.is_empty() {
+            if renewed.start == 0 {
+                // What the last round left is as old as its beginning.
+                self.offsets_from = self.offsets_at.replace(pose);
+            }
+            self.next_offset = if renewed.end == count { 0 } else { renewed.end };
         }
     }
 
@@ -598,7 +621,8 @@ impl Tracker {
         let lost = result.count(MarkState::Lost) + result.count(MarkState::Merged);
         let missing = result.count(MarkState::Missing);
         let unknown = known && wanted >= 8 && 2 * missing > wanted;
-        if misplaced || unknown {
+        let foreign = refined.is_some_and(|found| found.rms_px > self.model.foreign_rms_px);
+        if misplaced || unknown || foreign {
             result.problems.add(Problem::ForeignConstants);
         }
         if lost as f64 > (LOST_PART * wanted as f64).max(1.0) {
@@ -641,11 +665,15 @@ impl Tracker {
         result.pose_sd = deviations(&covariance);
         if let Some(springs) = &self.model.springs {
             let displacement = Displacement::of_pose(&refined.pose, at_mm);
-            let tangent = springs.tangent(&displacement);
-            let wrench = springs.wrench(&displacement);
-            if wrench.iter().all(|v| v.is_finite()) {
-                result.wrench = Some(wrench);
-                result.wrench_sd = deviations(&(tangent * covariance * tangent.transpose()));
+            if !springs.can_stand(&refined.pose) {
+                result.problems.add(Problem::BeyondSprings);
+            }
+            match springs.wrench(&displacement) {
+                Some((wrench, tangent)) => {
+                    result.wrench = Some(wrench);
+                    result.wrench_sd = deviations(&(tangent * covariance * tangent.transpose()));
+                }
+                None => result.problems.add(Problem::BeyondSprings),
             }
         }
     }
@@ -685,6 +713,14 @@ impl Tracker {
             }
         }
     }
+}
+
+/// How far a pose is from another, mm; a turn counts at ten millimetres.
+fn distance_mm(from: &Rigid, to: &Rigid) -> f64 {
+    let between = from.inverse().compose(to);
+    let turn = between.rotation - glam::DMat3::IDENTITY;
+    let turned = turn.to_cols_array().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    between.translation_mm.length().max(10.0 * turned)
 }
 
 fn result_is_good(result: &Tracked) -> bool {

@@ -142,7 +142,7 @@ impl View {
     pub fn fit(&self, plane: &Plane<'_>, start: DVec2, stray_px: f64) -> Option<Disc> {
         let mut at = start;
         let mut normal = SMatrix::<f64, 5, 5>::zeros();
-        let (mut left, mut count) = (0.0, 0.0);
+        let (mut left, mut count, mut noise) = (0.0, 0.0, 0.0);
         let mut levels: Option<SVector<f64, 3>> = None;
         let mut settled = false;
         for _ in 0..MOST_STEPS {
@@ -163,7 +163,7 @@ impl View {
             };
             let sums = self.sums(plane, at, Some(&known))?;
             let step = solve_all(&sums.normal, &sums.right)?;
-            (normal, left, count) = (sums.normal, sums.left, sums.count);
+            (normal, left, count, noise) = (sums.normal, sums.left, sums.count, sums.noise());
             levels = Some(known + step.fixed_rows::<3>(0));
             let shift = DVec2::new(step[3], step[4]).clamp_length_max(1.5);
             at += shift;
@@ -180,7 +180,7 @@ impl View {
             return None;
         }
         let inverse = with_floor(&normal).cholesky()?.inverse();
-        let sd_px = rms * (0.5 * (inverse[(3, 3)] + inverse[(4, 4)])).max(0.0).sqrt();
+        let sd_px = noise * (0.5 * (inverse[(3, 3)] + inverse[(4, 4)])).max(0.0).sqrt();
         at.is_finite().then_some(Disc { centroid_px: at, sd_px })
     }
 
@@ -188,7 +188,7 @@ impl View {
     fn sums(&self, plane: &Plane<'_>, at: DVec2, levels: Option<&SVector<f64, 3>>) -> Option<Sums> {
         let mut normal = SMatrix::<f64, 5, 5>::zeros();
         let mut right = SVector::<f64, 5>::zeros();
-        let (mut left, mut count) = (0.0, 0.0);
+        let (mut left, mut count, mut flat_left, mut flat_count) = (0.0, 0.0, 0.0, 0.0);
         let (cx, cy) = (at.x.round() as i32, at.y.round() as i32);
         let transposed = self.mm_by_px.transpose();
         // A pixel is at most this many mm: beyond that and the ground's width nothing is looked at.
@@ -237,6 +237,10 @@ impl View {
                 }
                 left += rest * rest;
                 count += 1.0;
+                if disc_slope == 0.0 && (dome == 0.0 || dome == 1.0) {
+                    flat_left += rest * rest;
+                    flat_count += 1.0;
+                }
             }
         }
         for i in 0..5 {
@@ -244,7 +248,7 @@ impl View {
                 normal[(i, j)] = normal[(j, i)];
             }
         }
-        (count > 12.0).then_some(Sums { normal, right, left, count })
+        (count > 12.0).then_some(Sums { normal, right, left, count, flat_left, flat_count })
     }
 }
 
@@ -255,6 +259,21 @@ struct Sums {
     /// Sum of squared residuals, and the number of pixels.
     left: f64,
     count: f64,
+    /// The same where no edge is near: there nothing but noise is left.
+    flat_left: f64,
+    flat_count: f64,
+}
+
+impl Sums {
+    /// Standard deviation of a pixel, levels; quantisation alone leaves a twelfth.
+    fn noise(&self) -> f64 {
+        let (left, freedom) = if self.flat_count >= 12.0 {
+            (self.flat_left, self.flat_count - 3.0)
+        } else {
+            (self.left, self.count - 5.0)
+        };
+        (left / freedom.max(1.0)).max(1.0 / 12.0).sqrt()
+    }
 }
 
 /// From 1 inside to 0 outside of an outline, and the slope, over the distance from it, px.

@@ -30,9 +30,9 @@ fn missing_and_false_dots_are_named() {
         let s = score(tracked, &drawn);
         assert_eq!(names(tracked), Vec::<&str>::new(), "frame {number}");
         assert_eq!(ids(MarkState::Missing, tracked), missing, "frame {number}");
-        // A dot that a false one touches may be let go, none may be mistaken.
+        // A dot that a false one all but touches may be let go, or be off by a part of it; none may be mistaken.
         assert!(
-            s.wanted - s.ok <= 2 && s.worst_px < 0.3,
+            s.wanted - s.ok <= 2 && s.worst_px < 0.6 && s.rms_px < 0.05,
             "frame {number}: {} of {}, {}",
             s.ok,
             s.wanted,

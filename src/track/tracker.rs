@@ -21,7 +21,7 @@ use super::whites::{Disc, View};
 use crate::constants::Constants;
 use crate::mechanics::Displacement;
 use crate::numeric::Rigid;
-use crate::optics::SensorOptics;
+use crate::optics::{Limit, SensorOptics, SurfacePoint};
 use crate::pose::{Sighting, displacement_from_motion};
 
 /// How far from where the last pose puts it a white marker is looked for, in parts of the dots' spacing, when it is
@@ -40,6 +40,8 @@ const RENEW_SOME_MM: f64 = 0.02;
 const RENEW_ALL_MM: f64 = 0.6;
 /// Part of the dots that one frame finds offsets anew for.
 const RENEWED_PART: usize = 8;
+/// Dots whose rays are traced at a time.
+const TRACE_RUN: usize = 1024;
 /// A spread wider than expected by this factor is blur.
 const BLURRED: f64 = 1.7;
 /// Contrast below which there is nothing to see, levels.
@@ -64,6 +66,10 @@ pub struct Tracker {
     tracks: Vec<DotTrack>,
     order: Vec<usize>,
     scratch: Vec<f64>,
+    /// Dots that were found, their centres in the image, and where those are on the dome.
+    found: Vec<usize>,
+    centers: Vec<DVec2>,
+    hits: Vec<Result<SurfacePoint, Limit>>,
     seen: Vec<Seen>,
     discs: Vec<Option<Disc>>,
     /// The last pose that was found.
@@ -129,6 +135,9 @@ impl Tracker {
             tracks: vec![DotTrack::default(); dots],
             order: Vec::with_capacity(dots),
             scratch: Vec::with_capacity(dots),
+            found: Vec::with_capacity(dots),
+            centers: Vec::with_capacity(dots),
+            hits: Vec::with_capacity(dots),
             seen: Vec::with_capacity(model.markers.len()),
             discs: vec![None; model.markers.len()],
             pose: None,
@@ -303,21 +312,22 @@ impl Tracker {
     }
 
     fn markers_near(&mut self, plane: &Plane<'_>, pose: &Rigid) {
-        self.discs.fill(None);
         if self.optics.move_to(pose).is_err() {
+            self.discs.fill(None);
             return;
         }
         let spacing = self.model.dots.first().map_or(MARKER_REACH_PX, |d| MARKER_REACH * d.spacing_px);
         let white = self.white();
         for (marker, disc) in self.model.markers.iter().zip(&mut self.discs) {
+            let levels = disc.take().map(|d| d.levels);
             let Ok(image) = marker.image(&self.optics) else { continue };
             let Some(view) = View::new(&self.optics, marker) else { continue };
             let start = image.centroid_px;
-            *disc = view.fit(plane, start, FIT_REACH_PX);
+            *disc = view.fit(plane, start, FIT_REACH_PX, levels);
             if disc.is_none() {
                 let mut best = [(0.0, DVec2::ZERO); 1];
                 if view.candidates(plane, start, spacing, white, &mut best) > 0 {
-                    *disc = view.fit(plane, best[0].1, FIT_REACH_PX);
+                    *disc = view.fit(plane, best[0].1, FIT_REACH_PX, None);
                 }
             }
         }
@@ -350,7 +360,7 @@ impl Tracker {
             let n = view.candidates(plane, start, reach, self.white(), &mut places);
             let mut next = 0;
             for (_, at) in &places[..n] {
-                if let Some(disc) = view.fit(plane, *at, FIT_REACH_PX) {
+                if let Some(disc) = view.fit(plane, *at, FIT_REACH_PX, None) {
                     found[index][next] = Some(disc);
                     next += 1;
                 }
@@ -398,7 +408,7 @@ impl Tracker {
             let view = View::new(&self.optics, &self.model.markers[index]);
             let at = found[index][choice[index]]?.centroid_px;
             self.discs[index] =
-                view.and_then(|v| v.fit(plane, at, FIT_REACH_PX)).or(found[index][choice[index]]);
+                view.and_then(|v| v.fit(plane, at, FIT_REACH_PX, None)).or(found[index][choice[index]]);
         }
         let refined = self.refine_seen(&coarse.pose)?;
         let mut sightings = [Sighting { id: 0, centroid_px: DVec2::ZERO }; 4];
@@ -581,9 +591,11 @@ impl Tracker {
         self.tell_pose(refined);
         let known = refined.is_some();
         self.scratch.clear();
+        self.found.clear();
+        self.centers.clear();
         let result = &mut self.result;
-        for ((track, model), dot) in self.tracks.iter_mut().zip(&self.model.dots).zip(&mut result.black_dots)
-        {
+        let dots = self.tracks.iter_mut().zip(&self.model.dots).zip(&mut result.black_dots);
+        for (index, ((track, model), dot)) in dots.enumerate() {
             *dot = DotResult { id: model.id, state: track.state, ..DotResult::default() };
             if known && track.is_wanted() {
                 dot.undeformed_px = track.expected_px.map(|p| p - track.offset_px);
@@ -598,10 +610,24 @@ impl Tracker {
             dot.sd_px = Some(spot.sd_px);
             dot.motion_px = track.last_px.map(|last| spot.at_px - last);
             track.last_px = Some(spot.at_px);
-            if known && let Ok(hit) = self.optics.trace(center) {
-                dot.displacement_mm = Some(hit.surface_mm - model.surface_mm);
-            }
+            self.found.push(index);
+            self.centers.push(center);
             self.scratch.push(spot.spread_px2 / track.shape.spread_px2.max(1e-9));
+        }
+        if known {
+            self.hits.clear();
+            self.hits.resize(self.centers.len(), Err(Limit::MissesDome));
+            // In runs, which one thread does: a long slice would be shared among several.
+            for (centers, hits) in self.centers.chunks(TRACE_RUN).zip(self.hits.chunks_mut(TRACE_RUN)) {
+                // Slices of one length are all that it asks for.
+                let _ = self.optics.trace_all(centers, hits);
+            }
+            for (index, hit) in self.found.iter().zip(&self.hits) {
+                if let Ok(hit) = hit {
+                    let rest = self.model.dots[*index].surface_mm;
+                    result.black_dots[*index].displacement_mm = Some(hit.surface_mm - rest);
+                }
+            }
         }
         let found = self.scratch.len();
         if quantile(&mut self.scratch, 0.5).is_some_and(|wide| found >= 8 && wide > BLURRED) {

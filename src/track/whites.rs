@@ -14,8 +14,11 @@ use crate::pose::Marker;
 const EDGE_PX: f64 = 1.1;
 /// Pixels that far outside of the outline are part of the fit: the ground around.
 const GROUND_PX: f64 = 2.6;
+/// Pixels so far from every outline are flat: what is left of them is noise.
+const FLAT_PX: f64 = 1.6;
 const MOST_STEPS: u32 = 12;
-const SETTLED_PX: f64 = 1e-3;
+/// A step below this ends the fit, px; the next one would be a tenth of it.
+const SETTLED_PX: f64 = 4e-3;
 /// Least difference between marker and ground, levels.
 const LEAST_RISE: f64 = 12.0;
 /// Largest half of a window, px.
@@ -26,6 +29,8 @@ const MOST_HALF: i32 = 40;
 pub(super) struct Disc {
     pub centroid_px: DVec2,
     pub sd_px: f64,
+    /// Levels of ground, disc and dome, the last two counted from the ground: a start for the next frame.
+    pub levels: [f64; 3],
 }
 
 /// How a marker's surroundings map to the image.
@@ -138,12 +143,18 @@ impl View {
     }
 
     /// The disc near `start`, at most `stray_px` from it: Gauss-Newton on the pixels, for the place, the levels of
-    /// ground, disc and dome.
-    pub fn fit(&self, plane: &Plane<'_>, start: DVec2, stray_px: f64) -> Option<Disc> {
+    /// ground, disc and dome; `levels`: those of the last frame, if there was one.
+    pub fn fit(
+        &self,
+        plane: &Plane<'_>,
+        start: DVec2,
+        stray_px: f64,
+        levels: Option<[f64; 3]>,
+    ) -> Option<Disc> {
         let mut at = start;
         let mut normal = SMatrix::<f64, 5, 5>::zeros();
         let (mut left, mut count, mut noise) = (0.0, 0.0, 0.0);
-        let mut levels: Option<SVector<f64, 3>> = None;
+        let mut levels = levels.map(SVector::from);
         let mut settled = false;
         for _ in 0..MOST_STEPS {
             let inside = at.x > 2.0
@@ -181,21 +192,30 @@ impl View {
         }
         let inverse = with_floor(&normal).cholesky()?.inverse();
         let sd_px = noise * (0.5 * (inverse[(3, 3)] + inverse[(4, 4)])).max(0.0).sqrt();
-        at.is_finite().then_some(Disc { centroid_px: at, sd_px })
+        at.is_finite().then_some(Disc { centroid_px: at, sd_px, levels: levels.into() })
     }
 
     /// Normal equations over the window: columns ground, disc, dome, and the place (with `levels` known).
     fn sums(&self, plane: &Plane<'_>, at: DVec2, levels: Option<&SVector<f64, 3>>) -> Option<Sums> {
-        let mut normal = SMatrix::<f64, 5, 5>::zeros();
-        let mut right = SVector::<f64, 5>::zeros();
-        let (mut left, mut count, mut flat_left, mut flat_count) = (0.0, 0.0, 0.0, 0.0);
+        let mut normal = [[0.0; 5]; 5];
+        let mut right = [0.0; 5];
+        let (mut left, mut count) = (0.0, 0.0);
+        // On ground, disc and dome: pixels, sum of what is left of them, sum of its squares.
+        let mut flats = [[0.0; 3]; 3];
         let (cx, cy) = (at.x.round() as i32, at.y.round() as i32);
         let transposed = self.mm_by_px.transpose();
         // A pixel is at most this many mm: beyond that and the ground's width nothing is looked at.
         let far =
             self.radius_mm + GROUND_PX * (self.mm_by_px.x_axis.length() + self.mm_by_px.y_axis.length());
         // So far from the rim there is no dome.
-        let has_rim = self.place_mm.length() - far < self.rim_mm + far;
+        let from_axis = self.place_mm.length().max(1e-9);
+        let has_rim = from_axis - far < self.rim_mm + far;
+        // Over the window the rim's direction, and so the pixels to a millimetre across it, hardly change.
+        let rim_px_by_mm = 1.0 / (transposed * (self.place_mm / from_axis)).length().max(1e-9);
+        let mut known = [0.0; 3];
+        if let Some(levels) = levels {
+            known = [levels[0], levels[1], levels[2]];
+        }
         for y in cy - self.half..=cy + self.half {
             for x in cx - self.half..=cx + self.half {
                 let u = self.mm_by_px * (DVec2::new(f64::from(x), f64::from(y)) - at);
@@ -203,52 +223,50 @@ impl View {
                 if square > far * far {
                     continue;
                 }
-                let distance = square.sqrt();
-                let slope = transposed * (u / distance.max(1e-9));
+                let distance = square.sqrt().max(1e-9);
+                let slope = transposed * (u / distance);
                 let steep = slope.length().max(1e-9);
                 let outside = (distance - self.radius_mm) / steep;
                 if outside > GROUND_PX {
                     continue;
                 }
                 let (disc, disc_slope) = edge(outside);
-                let dome = if has_rim {
-                    let place = self.place_mm + u;
-                    let from_axis = place.length().max(1e-9);
-                    let rim_slope = (transposed * (place / from_axis)).length().max(1e-9);
-                    edge((from_axis - self.rim_mm) / rim_slope).0
-                } else {
-                    0.0
-                };
+                let (mut dome, mut from_rim) = (0.0, f64::INFINITY);
+                if has_rim {
+                    from_rim = ((self.place_mm + u).length() - self.rim_mm) * rim_px_by_mm;
+                    dome = edge(from_rim).0;
+                }
                 let value = f64::from(plane.at(x, y));
-                let mut row = [1.0, disc, dome * (1.0 - disc), 0.0, 0.0];
+                let beside = dome * (1.0 - disc);
+                let mut row = [1.0, disc, beside, 0.0, 0.0];
                 let mut rest = value;
-                if let Some(levels) = levels {
+                if levels.is_some() {
                     // The outline moves with the place: outside falls by the unit normal.
-                    let by_place = slope / steep * (-disc_slope * (levels[1] - dome * levels[2]));
+                    let by_place = slope * (-disc_slope * (known[1] - dome * known[2]) / steep);
                     row[3] = by_place.x;
                     row[4] = by_place.y;
-                    rest -= levels[0] + levels[1] * disc + levels[2] * row[2];
+                    rest -= known[0] + known[1] * disc + known[2] * beside;
                 }
                 for i in 0..5 {
                     right[i] += row[i] * rest;
                     for j in 0..=i {
-                        normal[(i, j)] += row[i] * row[j];
+                        normal[i][j] += row[i] * row[j];
                     }
                 }
                 left += rest * rest;
                 count += 1.0;
-                if disc_slope == 0.0 && (dome == 0.0 || dome == 1.0) {
-                    flat_left += rest * rest;
-                    flat_count += 1.0;
+                if outside.abs() > FLAT_PX && from_rim.abs() > FLAT_PX + 1.0 {
+                    let place = if disc == 1.0 { 1 } else { 2 * usize::from(dome == 1.0) };
+                    let [n, sum, square] = &mut flats[place];
+                    *n += 1.0;
+                    *sum += rest;
+                    *square += rest * rest;
                 }
             }
         }
-        for i in 0..5 {
-            for j in i + 1..5 {
-                normal[(i, j)] = normal[(j, i)];
-            }
-        }
-        (count > 12.0).then_some(Sums { normal, right, left, count, flat_left, flat_count })
+        let normal = SMatrix::from_fn(|i, j| if i < j { normal[j][i] } else { normal[i][j] });
+        let right = SVector::from(right);
+        (count > 12.0).then_some(Sums { normal, right, left, count, flats })
     }
 }
 
@@ -259,19 +277,22 @@ struct Sums {
     /// Sum of squared residuals, and the number of pixels.
     left: f64,
     count: f64,
-    /// The same where no edge is near: there nothing but noise is left.
-    flat_left: f64,
-    flat_count: f64,
+    /// Where no edge is near, on ground, disc and dome: pixels, sum of residuals, sum of squared ones.
+    flats: [[f64; 3]; 3],
 }
 
 impl Sums {
     /// Standard deviation of a pixel, levels; quantisation alone leaves a twelfth.
     fn noise(&self) -> f64 {
-        let (left, freedom) = if self.flat_count >= 12.0 {
-            (self.flat_left, self.flat_count - 3.0)
-        } else {
-            (self.left, self.count - 5.0)
-        };
+        // About each flat's own mean: edges that are not quite like the model's shift the levels of the fit.
+        let (mut left, mut freedom) = (0.0, 0.0);
+        for [n, sum, square] in self.flats.iter().filter(|flat| flat[0] >= 4.0) {
+            left += (square - sum * sum / n).max(0.0);
+            freedom += n - 1.0;
+        }
+        if freedom < 9.0 {
+            (left, freedom) = (self.left, self.count - 5.0);
+        }
         (left / freedom.max(1.0)).max(1.0 / 12.0).sqrt()
     }
 }

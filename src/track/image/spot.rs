@@ -58,24 +58,28 @@ pub enum NoSpot {
     Misshapen,
 }
 
-/// A pixel of a stencil: place from its middle.
-#[derive(Debug, Clone, Copy)]
-struct Place {
-    x: f32,
-    y: f32,
-    index: u32,
-}
+/// Numbers that the inner loops take at a time: two vectors of the smallest x86-64.
+const LANES: usize = 8;
 
 /// The pixels that are looked at for outlines of one radius.
 #[derive(Debug, Clone)]
 struct Stencil {
+    /// Half of the square around all of them, and of the square around the soft window.
     half: i32,
-    disc: Vec<Place>,
-    ring: Vec<Place>,
+    disc_half: i32,
+    /// Places of the columns of the soft window from its middle, a whole number of lanes.
+    columns: Vec<f32>,
+    /// The ring that shows the ground: places in the square, from its middle, and there.
+    ring: Vec<u32>,
+    ring_x: Vec<f32>,
+    ring_y: Vec<f32>,
     /// Radius of the soft window.
     reach_px: f32,
     /// Part of the disc that is surely inside of the outline: squared radius.
     core_px2: f32,
+    /// Sum of squared windows, and of those times x^2 + y^2: what noise comes through.
+    count: f64,
+    lever: f64,
 }
 
 impl Stencil {
@@ -84,31 +88,53 @@ impl Stencil {
         let outer = reach + 0.5 + GROUND_PX;
         // Half a pixel for the middle's distance from the pixel's.
         let half = (outer + 0.5).ceil() as i32;
+        // The window may lie half a diagonal off the middle.
+        let disc_half = ((reach + 0.5 + 0.75).ceil() as i32).min(half);
         let side = 2 * half + 1;
-        let (mut disc, mut ring) = (Vec::new(), Vec::new());
+        let (mut ring, mut ring_x, mut ring_y) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut count, mut lever) = (0.0, 0.0);
+        let core = (0.5 * radius_px).max(0.8) as f32;
+        let reach_px = reach as f32;
         for y in -half..=half {
             for x in -half..=half {
-                let place = Place { x: x as f32, y: y as f32, index: ((y + half) * side + x + half) as u32 };
-                let distance = f64::from(x * x + y * y).sqrt();
-                // The window may lie half a diagonal off the middle.
-                if distance < reach + 0.5 + 0.75 {
-                    disc.push(place);
-                }
+                let square = f64::from(x * x + y * y);
+                let distance = square.sqrt();
+                let part = f64::from(window_at(square as f32, reach_px));
+                count += part * part;
+                lever += part * part * square;
                 if distance >= reach + 0.25 && distance <= outer {
-                    ring.push(place);
+                    ring.push(((y + half) * side + x + half) as u32);
+                    ring_x.push(x as f32);
+                    ring_y.push(y as f32);
                 }
             }
         }
-        let core = (0.5 * radius_px).max(0.8) as f32;
-        Self { half, disc, ring, reach_px: reach as f32, core_px2: core * core }
+        let width = (2 * disc_half + 1) as usize;
+        let columns =
+            (0..width.next_multiple_of(LANES)).map(|column| column as f32 - disc_half as f32).collect();
+        Self { half, disc_half, columns, ring, ring_x, ring_y, reach_px, core_px2: core * core, count, lever }
+    }
+
+    fn side(&self) -> usize {
+        (2 * self.half + 1) as usize
     }
 }
 
-/// Measures spots; keeps its stencils and its window.
+/// The soft round window at a squared distance: 1 within half a pixel of its radius, 0 beyond it.
+fn window_at(square: f32, reach_px: f32) -> f32 {
+    let end = reach_px + 0.5;
+    // Linear in the square: a root less, and no different over one pixel.
+    ((end * end - square) / (2.0 * reach_px)).max(0.0).min(1.0)
+}
+
+/// Measures spots; keeps its stencils and its buffers.
 #[derive(Debug, Clone, Default)]
 pub struct SpotMeter {
     stencils: Vec<Option<Stencil>>,
-    window: Vec<f32>,
+    /// The square of levels, how much darker than the ground the soft window's pixels are, the ring's levels.
+    levels: Vec<f32>,
+    dark: Vec<f32>,
+    ring: Vec<f32>,
 }
 
 /// Radii share a stencil in steps of this, px.
@@ -133,11 +159,14 @@ impl SpotMeter {
         if self.stencils.len() <= class {
             self.stencils.resize(class + 1, None);
         }
-        let stencil = Stencil::new(class as f64 * STEP_PX);
-        let side = (2 * stencil.half + 1) as usize;
-        if self.window.len() < side * side {
-            self.window.resize(side * side, 0.0);
+        if self.stencils[class].is_some() {
+            return;
         }
+        let stencil = Stencil::new(class as f64 * STEP_PX);
+        let grow = |buffer: &mut Vec<f32>, size: usize| buffer.resize(buffer.len().max(size), 0.0);
+        grow(&mut self.levels, stencil.side() * stencil.side());
+        grow(&mut self.dark, stencil.columns.len() * (2 * stencil.disc_half + 1) as usize);
+        grow(&mut self.ring, stencil.ring.len());
         self.stencils[class] = Some(stencil);
     }
 
@@ -156,12 +185,14 @@ impl SpotMeter {
         let Some(Some(stencil)) = self.stencils.get(class_of(shape.radius_px)) else {
             return Err(NoSpot::NoGround);
         };
-        let side = (2 * stencil.half + 1) as usize;
-        let window = &mut self.window[..side * side];
+        let side = stencil.side();
+        let levels = &mut self.levels[..side * side];
+        let dark = &mut self.dark[..stencil.columns.len() * (2 * stencil.disc_half + 1) as usize];
         let mut at = start;
         let mut middle = (i32::MIN, i32::MIN);
         let mut ground = Ground { a: 0.0, b: 0.0, c: 0.0, noise: 0.0 };
         let mut sums = Sums::default();
+        let mut from = DVec2::ZERO;
         for _ in 0..MOST_STEPS {
             let inside = |v: f64, end: usize| v > 0.0 && v < end as f64 - 1.0;
             if !(inside(at.x, plane.width())
@@ -173,17 +204,18 @@ impl SpotMeter {
             let next = (at.x.round() as i32, at.y.round() as i32);
             if next != middle {
                 middle = next;
-                plane.square_into(middle.0 - stencil.half, middle.1 - stencil.half, side, window);
-                ground = ground_of(stencil, window).ok_or(NoSpot::NoGround)?;
+                plane.square_into(middle.0 - stencil.half, middle.1 - stencil.half, side, levels);
+                ground = ground_of(stencil, levels, &mut self.ring).ok_or(NoSpot::NoGround)?;
+                darken(stencil, levels, &ground, dark);
             }
-            let from = DVec2::new(at.x - f64::from(middle.0), at.y - f64::from(middle.1));
-            sums = Sums::over(stencil, window, &ground, from);
+            from = DVec2::new(at.x - f64::from(middle.0), at.y - f64::from(middle.1));
+            sums = Sums::over(stencil, dark, from);
             let noise = f64::from(ground.noise / ground.a.max(1.0));
             // Less than four times what noise leaves of such a sum is nothing.
-            if sums.weight <= 4.0 * noise * sums.count.sqrt() || sums.weight < 0.02 * shape.area_px {
+            if sums.weight <= 4.0 * noise * stencil.count.sqrt() || sums.weight < 0.02 * shape.area_px {
                 return Err(NoSpot::Faint);
             }
-            let step = DVec2::new(sums.x, sums.y) / sums.weight - from;
+            let step = DVec2::new(sums.x, sums.y) / sums.weight;
             // Half of the spot outside of the window halves the step; it never overshoots by more than the window.
             at += step.clamp_length_max(f64::from(stencil.reach_px));
             if step.length_squared() < SETTLED_PX * SETTLED_PX {
@@ -193,53 +225,93 @@ impl SpotMeter {
         if !(at.is_finite() && at.distance(start) <= stray_px) {
             return Err(NoSpot::Strayed);
         }
-        finish(&sums, &ground, shape, at)
+        finish(stencil, dark, from, &sums, &ground, shape, at)
     }
 }
 
-/// Weighted sums over the window.
+/// How much darker than the ground each pixel of the soft window is, as a part of the ground's level; the columns that
+/// only fill the lanes are 0.
+fn darken(stencil: &Stencil, levels: &[f32], ground: &Ground, dark: &mut [f32]) {
+    let (side, stride) = (stencil.side(), stencil.columns.len());
+    let offset = (stencil.half - stencil.disc_half) as usize;
+    let width = (2 * stencil.disc_half + 1) as usize;
+    for (row, out) in dark.chunks_exact_mut(stride).enumerate() {
+        let start = (row + offset) * side + offset;
+        let y = row as f32 - stencil.disc_half as f32;
+        let (out, rest) = out.split_at_mut(width);
+        for ((to, value), x) in out.iter_mut().zip(&levels[start..start + width]).zip(&stencil.columns) {
+            let level = (ground.a + ground.b * x + ground.c * y).max(1.0);
+            *to = 1.0 - value / level;
+        }
+        rest.fill(0.0);
+    }
+}
+
+/// Weighted sums over the window, about its middle.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     weight: f64,
     x: f64,
     y: f64,
     square: f64,
-    /// Sum of squared windows, and of those times x^2 + y^2 about the window's middle: what noise comes through.
-    count: f64,
-    lever: f64,
-    core: f64,
-    core_count: f64,
 }
 
 impl Sums {
-    fn over(stencil: &Stencil, window: &[f32], ground: &Ground, from: DVec2) -> Self {
+    fn over(stencil: &Stencil, dark: &[f32], from: DVec2) -> Self {
         let (cx, cy) = (from.x as f32, from.y as f32);
-        let mut s = [0.0_f32; 8];
-        // The ground's level over the few pixels of a window: its reciprocal to first order in the slope would do;
-        // the quotient is exact and no slower than what else is done for the pixel.
-        for place in &stencil.disc {
-            let (dx, dy) = (place.x - cx, place.y - cy);
-            let square = dx * dx + dy * dy;
-            let part = (stencil.reach_px + 0.5 - square.sqrt()).clamp(0.0, 1.0);
-            let level = ground.a + ground.b * place.x + ground.c * place.y;
-            let weight = part * (1.0 - window[place.index as usize] / level.max(1.0));
-            s[0] += weight;
-            s[1] += weight * place.x;
-            s[2] += weight * place.y;
-            s[3] += weight * square;
-            s[4] += part * part;
-            s[5] += part * part * square;
-            let core = if square < stencil.core_px2 { 1.0 } else { 0.0 };
-            s[6] += core * weight;
-            s[7] += core;
+        let end = stencil.reach_px + 0.5;
+        let (end, per) = (end * end, 1.0 / (2.0 * stencil.reach_px));
+        // Sums in lanes of their own: the order of the additions is fixed, and the loop goes in vectors.
+        let [mut weights, mut xs, mut ys, mut squares] = [[0.0_f32; LANES]; 4];
+        let (columns, _) = stencil.columns.as_chunks::<LANES>();
+        for (row, values) in dark.chunks_exact(stencil.columns.len()).enumerate() {
+            let dy = row as f32 - stencil.disc_half as f32 - cy;
+            let (values, _) = values.as_chunks::<LANES>();
+            for (values, columns) in values.iter().zip(columns) {
+                for k in 0..LANES {
+                    let dx = columns[k] - cx;
+                    let square = dx * dx + dy * dy;
+                    let weight = ((end - square) * per).max(0.0).min(1.0) * values[k];
+                    weights[k] += weight;
+                    xs[k] += weight * dx;
+                    ys[k] += weight * dy;
+                    squares[k] += weight * square;
+                }
+            }
         }
-        let [weight, x, y, square, count, lever, core, core_count] = s.map(f64::from);
-        Self { weight, x, y, square, count, lever, core, core_count }
+        let sum = |lanes: [f32; LANES]| f64::from(lanes.iter().sum::<f32>());
+        Self { weight: sum(weights), x: sum(xs), y: sum(ys), square: sum(squares) }
     }
 }
 
-fn finish(sums: &Sums, ground: &Ground, shape: &Shape, at_px: DVec2) -> Result<Spot, NoSpot> {
-    let contrast = sums.core / sums.core_count.max(1.0);
+/// Mean darkness of the pixels that are surely inside of the outline.
+fn core_of(stencil: &Stencil, dark: &[f32], from: DVec2) -> f64 {
+    let (cx, cy) = (from.x as f32, from.y as f32);
+    let reach = stencil.core_px2.sqrt().ceil() as i32 + 1;
+    let (mut sum, mut count) = (0.0, 0.0);
+    for y in -reach..=reach {
+        for x in -reach..=reach {
+            let (dx, dy) = (x as f32 - cx, y as f32 - cy);
+            if dx * dx + dy * dy < stencil.core_px2 {
+                let at = (y + stencil.disc_half) as usize * stencil.columns.len();
+                sum += dark.get(at + (x + stencil.disc_half) as usize).copied().unwrap_or(0.0);
+                count += 1.0;
+            }
+        }
+    }
+    f64::from(sum / f32::max(count, 1.0))
+}
+
+fn finish(
+    stencil: &Stencil,
+    dark: &[f32],
+    from: DVec2,
+    sums: &Sums,
+    ground: &Ground,
+    shape: &Shape,
+    at_px: DVec2,
+) -> Result<Spot, NoSpot> {
+    let contrast = core_of(stencil, dark, from);
     let level = f64::from(ground.a);
     let noise = f64::from(ground.noise) / level.max(1.0);
     if !(contrast > 0.06 && contrast > 3.0 * noise) {
@@ -254,7 +326,7 @@ fn finish(sums: &Sums, ground: &Ground, shape: &Shape, at_px: DVec2) -> Result<S
         return Err(NoSpot::Misshapen);
     }
     // Each axis has half of the lever.
-    let sd_px = noise * (0.5 * sums.lever).sqrt() / sums.weight;
+    let sd_px = noise * (0.5 * stencil.lever).sqrt() / sums.weight;
     Ok(Spot { at_px, contrast, area_px, spread_px2, sd_px, ground: level })
 }
 
@@ -277,49 +349,62 @@ fn plane_through(s: &[f32; 9]) -> Option<[f32; 3]> {
     Some([(mv - b * mx - c * my) as f32, b as f32, c as f32])
 }
 
-fn ground_of(stencil: &Stencil, window: &[f32]) -> Option<Ground> {
-    let ring = &stencil.ring;
-    let mut sum = 0.0_f32;
-    for place in ring {
-        sum += window[place.index as usize];
+/// Sums over the ring: `of(x, y, level)` gives what is added of a pixel.
+fn ring_sums<const N: usize>(
+    stencil: &Stencil,
+    levels: &[f32],
+    of: impl Fn(f32, f32, f32) -> [f32; N],
+) -> [f32; N] {
+    const HALF: usize = LANES / 2;
+    let mut lanes = [[0.0_f32; HALF]; N];
+    let ((xs, last_x), (ys, last_y)) =
+        (stencil.ring_x.as_chunks::<HALF>(), stencil.ring_y.as_chunks::<HALF>());
+    let (values, last) = levels.as_chunks::<HALF>();
+    for ((x, y), v) in xs.iter().zip(ys).zip(values) {
+        for k in 0..HALF {
+            let add = of(x[k], y[k], v[k]);
+            for i in 0..N {
+                lanes[i][k] += add[i];
+            }
+        }
     }
-    let mut floor = GROUND_PART * sum / ring.len() as f32;
+    let mut sums = lanes.map(|lane| lane.iter().sum::<f32>());
+    for ((x, y), v) in last_x.iter().zip(last_y).zip(last) {
+        for (sum, add) in sums.iter_mut().zip(of(*x, *y, *v)) {
+            *sum += add;
+        }
+    }
+    sums
+}
+
+fn ground_of(stencil: &Stencil, levels: &[f32], ring: &mut [f32]) -> Option<Ground> {
+    let count = stencil.ring.len() as f32;
+    let ring = &mut ring[..stencil.ring.len()];
+    for (to, index) in ring.iter_mut().zip(&stencil.ring) {
+        *to = levels[*index as usize];
+    }
+    let kept = |v: f32, floor: f32| if v >= floor { 1.0 } else { 0.0 };
+    let [sum] = ring_sums(stencil, ring, |_, _, v| [v]);
+    let floor = GROUND_PART * sum / count;
     // Another mark in the ring drags the mean down: once more without it.
-    let (mut above, mut count) = (0.0_f32, 0.0_f32);
-    for place in ring {
-        let value = window[place.index as usize];
-        let kept = if value >= floor { 1.0 } else { 0.0 };
-        above += kept * value;
-        count += kept;
-    }
-    if count < 0.35 * ring.len() as f32 {
+    let [above, light] = ring_sums(stencil, ring, |_, _, v| [kept(v, floor) * v, kept(v, floor)]);
+    if light < 0.35 * count {
         return None;
     }
-    floor = GROUND_PART * above / count;
-    let mut s = [0.0_f32; 9];
-    let mut squares = 0.0_f32;
-    for place in ring {
-        let value = window[place.index as usize];
-        let kept = if value >= floor { 1.0 } else { 0.0 };
-        let (x, y, v) = (kept * place.x, kept * place.y, kept * value);
-        s[0] += kept;
-        s[1] += x;
-        s[2] += y;
-        s[3] += x * place.x;
-        s[4] += x * place.y;
-        s[5] += y * place.y;
-        s[6] += v;
-        s[7] += v * place.x;
-        s[8] += v * place.y;
-        squares += v * value;
-    }
-    let [a, b, c] = plane_through(&s)?;
+    let floor = GROUND_PART * above / light;
+    let s = ring_sums(stencil, ring, |x, y, v| {
+        let k = kept(v, floor);
+        let (kx, ky, kv) = (k * x, k * y, k * v);
+        [k, kx, ky, kx * x, kx * y, ky * y, kv, kv * x, kv * y, kv * v]
+    });
+    let [n, x, y, xx, xy, yy, v, vx, vy, squares] = s;
+    let [a, b, c] = plane_through(&[n, x, y, xx, xy, yy, v, vx, vy])?;
     // Sum of squared residuals of a least-squares fit: what the fit explains is taken off.
     let left = f64::from(squares)
-        - f64::from(a) * f64::from(s[6])
-        - f64::from(b) * f64::from(s[7])
-        - f64::from(c) * f64::from(s[8]);
-    let freedom = (f64::from(s[0]) - 3.0).max(1.0);
+        - f64::from(a) * f64::from(v)
+        - f64::from(b) * f64::from(vx)
+        - f64::from(c) * f64::from(vy);
+    let freedom = (f64::from(n) - 3.0).max(1.0);
     // Quantisation alone leaves a twelfth.
     let noise = (left / freedom).max(1.0 / 12.0).sqrt() as f32;
     (a > 0.5 && a.is_finite() && noise.is_finite()).then_some(Ground { a, b, c, noise })

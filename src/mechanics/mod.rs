@@ -5,6 +5,7 @@
 
 mod balance;
 mod column;
+pub mod contact;
 mod dual;
 mod envelope;
 mod law;

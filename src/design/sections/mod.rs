@@ -164,6 +164,15 @@ pub struct ElastomerSection {
     /// Linear shrinkage on curing, percent of the length.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub shrinkage_percent: f64,
+    /// Young's modulus at small strain, MPa.
+    #[schemars(range(min = 0.001, max = 100000.0))]
+    pub young_modulus_mpa: f64,
+    /// Poisson's ratio; silicone is nearly incompressible, 0.5 itself has no finite bulk modulus.
+    #[schemars(range(min = 0.0, max = 0.4999))]
+    pub poisson_ratio: f64,
+    /// Coulomb's coefficient of friction between the membrane and what touches it.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub friction: f64,
     /// Density, g/cm^3; as data sheets give it for platinum silicone where it is left out.
     #[serde(default = "silicone_density")]
     #[schemars(range(min = 0.1, max = 25.0))]

@@ -1,0 +1,159 @@
+//! Where the dome can be touched: rings of nodes about its axis.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::{DMat3, DVec3};
+
+use super::element::{GAUSS, quadratic};
+
+/// The contact nodes: ring j lies at the polar angle j h, and carries evenly spaced nodes.
+///
+/// A node's force is spread as a hat over its two neighbours' distance, along the ring and across it, and the gap
+/// is measured with the same hat: so the compliance is symmetric, and finite on any mesh.
+#[derive(Debug, Clone)]
+pub(crate) struct Grid {
+    pub radius_mm: f64,
+    /// Elements along the meridian; ring `elements` would be the bonded rim, and is left out.
+    pub elements: usize,
+    /// Azimuths that the tables know: every ring's count divides it.
+    pub azimuths: usize,
+    /// Nodes of each ring, and the number of its first.
+    pub counts: Vec<usize>,
+    pub first: Vec<usize>,
+    /// Surface that a node of each ring stands for, mm2.
+    pub areas_mm2: Vec<f64>,
+}
+
+/// A node by ring and azimuth step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct GridNode {
+    pub ring: usize,
+    /// Azimuth in steps of the tables.
+    pub step: usize,
+}
+
+impl Grid {
+    pub fn new(radius_mm: f64, elements: usize) -> Self {
+        let around = 4 * elements;
+        let mut azimuths = 12;
+        while azimuths < around {
+            azimuths *= 2;
+        }
+        let h = FRAC_PI_2 / elements as f64;
+        let mut grid = Self {
+            radius_mm,
+            elements,
+            azimuths,
+            counts: Vec::new(),
+            first: Vec::new(),
+            areas_mm2: Vec::new(),
+        };
+        let mut next = 0;
+        for ring in 0..elements {
+            let wanted = (around as f64 * (h * ring as f64).sin()).ceil() as usize;
+            // The least divisor of the table's count that is fine enough; six at least, to turn alike.
+            let count = if ring == 0 {
+                1
+            } else {
+                (6..=azimuths).find(|n| azimuths % n == 0 && *n >= wanted).unwrap_or(azimuths)
+            };
+            let band: f64 = grid.quadrature(ring).iter().map(|(angle, w, hat)| w * hat * angle.sin()).sum();
+            grid.areas_mm2.push(band * radius_mm * radius_mm * TAU / count as f64);
+            grid.counts.push(count);
+            grid.first.push(next);
+            next += count;
+        }
+        grid
+    }
+
+    /// All nodes.
+    pub fn len(&self) -> usize {
+        self.first.last().map_or(0, |first| first + self.counts[self.counts.len() - 1])
+    }
+
+    pub fn node(&self, number: usize) -> GridNode {
+        let ring = self.first.partition_point(|first| *first <= number) - 1;
+        GridNode { ring, step: (number - self.first[ring]) * (self.azimuths / self.counts[ring]) }
+    }
+
+    pub fn polar(&self, ring: usize) -> f64 {
+        FRAC_PI_2 * ring as f64 / self.elements as f64
+    }
+
+    pub fn azimuth(&self, node: GridNode) -> f64 {
+        TAU * node.step as f64 / self.azimuths as f64
+    }
+
+    /// The node's frame, columns e_r, e_z, e_phi in the sensor frame.
+    pub fn frame(&self, node: GridNode) -> DMat3 {
+        let (sine, cosine) = self.azimuth(node).sin_cos();
+        DMat3::from_cols(DVec3::new(cosine, sine, 0.0), DVec3::Z, DVec3::new(-sine, cosine, 0.0))
+    }
+
+    pub fn place(&self, node: GridNode) -> DVec3 {
+        let (sine, cosine) = self.polar(node.ring).sin_cos();
+        let (s, c) = self.azimuth(node).sin_cos();
+        DVec3::new(sine * c, sine * s, cosine) * self.radius_mm
+    }
+
+    /// Standard deviations of a node's hat along the meridian and along the ring, as vectors, mm.
+    pub fn spread(&self, node: GridNode) -> [DVec3; 2] {
+        let (sine, cosine) = self.polar(node.ring).sin_cos();
+        let (s, c) = self.azimuth(node).sin_cos();
+        let (south, east) = (DVec3::new(cosine * c, cosine * s, -sine), DVec3::new(-s, c, 0.0));
+        let spacing = self.radius_mm * FRAC_PI_2 / self.elements as f64;
+        if node.ring == 0 {
+            // A cone over a disc: 3/20 of its radius squared.
+            return [south * spacing * 0.15_f64.sqrt(), east * spacing * 0.15_f64.sqrt()];
+        }
+        let along = self.radius_mm * sine * TAU / self.counts[node.ring] as f64;
+        [south * spacing / 6.0_f64.sqrt(), east * along / 6.0_f64.sqrt()]
+    }
+
+    /// Points (polar angle), weights and the hat's value over the ring's elements.
+    fn quadrature(&self, ring: usize) -> Vec<(f64, f64, f64)> {
+        let h = FRAC_PI_2 / self.elements as f64;
+        let mut points = Vec::with_capacity(6);
+        for element in ring.saturating_sub(1)..=ring {
+            if (ring == 0 && element > 0) || element >= self.elements {
+                continue;
+            }
+            for (t, w) in GAUSS {
+                let s = element as f64 + 0.5 * (t + 1.0);
+                points.push((s * h, 0.5 * h * w, 1.0 - (s - ring as f64).abs()));
+            }
+        }
+        points
+    }
+
+    /// The hat as a load on the surface nodes (two per element and one more): number and part of the unit force.
+    pub fn hat(&self, ring: usize) -> Vec<(usize, f64)> {
+        let h = FRAC_PI_2 / self.elements as f64;
+        let mut parts = vec![0.0; 2 * self.elements + 1];
+        let mut total = 0.0;
+        for (angle, weight, hat) in self.quadrature(ring) {
+            let element = ((angle / h) as usize).min(self.elements - 1);
+            let (n, _) = quadratic(2.0 * (angle / h - element as f64) - 1.0);
+            let load = weight * hat * angle.sin();
+            total += load;
+            for (k, n) in n.into_iter().enumerate() {
+                parts[2 * element + k] += load * n;
+            }
+        }
+        parts.iter().enumerate().filter(|(_, p)| **p != 0.0).map(|(k, p)| (k, p / total)).collect()
+    }
+
+    /// Harmonic m of a ring's hat along the ring: sinc^2(m / count), 1 for the pole's harmonics.
+    pub fn hat_harmonic(&self, ring: usize, m: usize) -> f64 {
+        if ring == 0 || m == 0 {
+            return 1.0;
+        }
+        let x = PI * m as f64 / self.counts[ring] as f64;
+        (x.sin() / x).powi(2)
+    }
+
+    /// Harmonics that a ring's hat excites: up to its first zero; the pole has two.
+    pub fn harmonics(&self, ring: usize) -> usize {
+        if ring == 0 { 2 } else { self.counts[ring] }
+    }
+}

@@ -1,0 +1,20 @@
+//! Linear finite elements of the bonded dome, as a body of revolution.
+//!
+//! The dome is the same at every azimuth, so its stiffness falls apart into harmonics; each is a small sparse
+//! problem over the meridian ([`mesh`], [`element`], [`body`]), factored once ([`compliance`]). What remains per
+//! frame lives on the surface: forces on the nodes of a [`grid`], and the field that they make ([`field`]).
+
+mod body;
+mod compliance;
+mod element;
+mod field;
+mod grid;
+mod mesh;
+
+pub(super) use compliance::Compliance;
+pub(super) use field::SurfaceField;
+#[cfg(test)]
+use grid::GridNode;
+
+#[cfg(test)]
+mod tests;

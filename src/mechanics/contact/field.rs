@@ -1,0 +1,141 @@
+//! Displacement of the dome's surface, by level.
+
+use glam::DVec3;
+
+use super::fem::SurfaceField;
+use super::geometric::{Placed, pushed_out};
+use super::hertz::Patch;
+use super::neo::BrickField;
+use super::state::Extent;
+
+/// A displacement field over the dome.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Field {
+    /// Nothing moves.
+    Still,
+    /// The geometric rule.
+    PushedOut(PushedOut),
+    /// Hertz' field, carried to the dome.
+    Sunk(Sunk),
+    /// The finite elements' own.
+    Elastic(SurfaceField),
+    /// The bricks' own.
+    Bricks(BrickField),
+}
+
+/// See [`super::geometric`].
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PushedOut {
+    pub placed: Placed,
+    pub dome_radius_mm: f64,
+    pub axis: DVec3,
+    pub angle_rad: f64,
+    /// Sideways drag of the touched region.
+    pub shift_mm: DVec3,
+    pub turn_rad: f64,
+}
+
+/// Hertz' displacement with the finite body's correction.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Sunk {
+    pub patch: Patch,
+    /// Contact normal of the dome (outwards), the patch's axes.
+    pub normal: DVec3,
+    pub first: DVec3,
+    pub second: DVec3,
+    pub dome_radius_mm: f64,
+    pub modulus_mpa: f64,
+    /// The dome's part of the approach: 1 over 1 + the object's yield ratio.
+    pub share: f64,
+    /// Displacement that the finite body takes back at the contact, mm.
+    pub held_mm: f64,
+    pub shift_mm: DVec3,
+    pub turn_rad: f64,
+}
+
+impl Field {
+    /// Makes ready for many points.
+    pub fn prepare(&self, points: usize) {
+        if let Self::Elastic(field) = self {
+            field.prepare(points);
+        }
+    }
+
+    /// The displacement of a point of the dome.
+    pub fn at(&self, at_mm: DVec3) -> DVec3 {
+        match self {
+            Self::Still => DVec3::ZERO,
+            Self::PushedOut(field) => field.at(at_mm),
+            Self::Sunk(field) => field.at(at_mm),
+            Self::Elastic(field) => field.at(at_mm),
+            Self::Bricks(field) => field.at(at_mm),
+        }
+    }
+
+    /// Where it differs from zero.
+    pub fn extent(&self) -> Extent {
+        match self {
+            Self::Still => Extent { direction: DVec3::Z, angle_rad: 0.0, beyond_mm: 0.0 },
+            Self::PushedOut(field) => {
+                Extent { direction: field.axis, angle_rad: field.angle_rad, beyond_mm: 0.0 }
+            }
+            Self::Sunk(field) => field.extent(),
+            Self::Elastic(field) => field.extent(),
+            Self::Bricks(field) => field.extent(),
+        }
+    }
+}
+
+impl PushedOut {
+    fn at(&self, at_mm: DVec3) -> DVec3 {
+        let push = pushed_out(&self.placed, self.dome_radius_mm, at_mm);
+        if push == DVec3::ZERO {
+            return push;
+        }
+        push + self.shift_mm + (self.axis * self.turn_rad).cross(at_mm - self.axis * self.axis.dot(at_mm))
+    }
+}
+
+impl Sunk {
+    fn at(&self, at_mm: DVec3) -> DVec3 {
+        let (x, y) = (at_mm.dot(self.first), at_mm.dot(self.second));
+        let cosine = (at_mm.dot(self.normal) / self.dome_radius_mm).clamp(-1.0, 1.0);
+        let angle = cosine.acos();
+        // Chord lengths from the contact keep their bearing: the half-space's plane, wrapped on the dome.
+        let flat = x.hypot(y);
+        let chord = 2.0 * self.dome_radius_mm * (0.5 * angle).sin();
+        let scale = if angle > std::f64::consts::FRAC_PI_2 && flat > 0.0 { chord / flat } else { 1.0 };
+        let (x, y) = (x * scale, y * scale);
+        let q = (x / self.patch.a_mm).powi(2) + (y / self.patch.b_mm).powi(2);
+        let sink = self.patch.sink_mm(x, y, self.modulus_mpa) * self.share;
+        let fade = rim_fade(at_mm.z / self.dome_radius_mm);
+        let held = self.held_mm * self.share * profile(angle);
+        let sideways = if q <= 1.0 { 1.0 } else { std::f64::consts::FRAC_2_PI * q.sqrt().recip().asin() };
+        let mut u = self.normal * -((sink - held) * fade);
+        u += self.shift_mm * (sideways * fade);
+        let turn = if q <= 1.0 { 1.0 } else { q.powf(-1.5) };
+        u += (self.normal * (self.turn_rad * turn * fade)).cross(at_mm);
+        u
+    }
+
+    fn extent(&self) -> Extent {
+        // At right angles from the contact what is left of the sink is bounded by its half-space value there.
+        let far = std::f64::consts::FRAC_PI_2;
+        let reach = self.dome_radius_mm * std::f64::consts::SQRT_2;
+        let sink = self.patch.force_n / (std::f64::consts::PI * self.modulus_mpa * reach) * 2.0;
+        let drag = self.shift_mm.length() * self.patch.a_mm / reach
+            + self.turn_rad.abs() * self.dome_radius_mm * (self.patch.a_mm / reach).powi(3);
+        Extent { direction: self.normal, angle_rad: far, beyond_mm: sink + drag + self.held_mm.abs() }
+    }
+}
+
+/// How the finite body's hold falls off with the angle from the contact.
+fn profile(angle: f64) -> f64 {
+    angle.cos().max(0.0)
+}
+
+/// Falls to zero at the bonded rim.
+fn rim_fade(height: f64) -> f64 {
+    let t = (height / 0.3).clamp(0.0, 1.0);
+    t * (2.0 - t)
+}

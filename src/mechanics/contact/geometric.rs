@@ -1,0 +1,248 @@
+//! The geometric level: what lies inside the object is pushed out of it.
+//!
+//! A point of the dome inside the object moves along the dome's own inward normal until it lies on the object's
+//! surface; every other point stays. The force is that of an elastic foundation, p = K d for a push-out d, with
+//! K = (4 sqrt 2 / 3 pi) E* / a, a the radius of a disc of the touched area, measured as 4/3 (int d)^2 / int d^2 so
+//! that it changes smoothly: then a ball gets Hertz' force exactly (its push-out is a paraboloid of radius
+//! sqrt(2 Re d)), a cone Sneddon's to 5 %, a flat punch its own to 19 %.
+
+use glam::DVec3;
+
+use super::solid::Solid;
+use super::state::TouchedNode;
+use crate::numeric::Rigid;
+
+/// The foundation's constant, 4 sqrt 2 / (3 pi): see the module.
+pub(super) const FOUNDATION: f64 = 4.0 * std::f64::consts::SQRT_2 / (3.0 * std::f64::consts::PI);
+
+/// Steps of a walk to the surface.
+const MOST_STEPS: usize = 64;
+
+/// An object at its place, seen from the dome.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Placed {
+    pub solid: Solid,
+    pub sensor_from_object: Rigid,
+}
+
+impl Placed {
+    /// Signed distance and outward direction, sensor frame.
+    pub fn distance(&self, at_mm: DVec3) -> (f64, DVec3) {
+        let found = self.solid.distance(self.sensor_from_object.inverse().point(at_mm));
+        (found.value_mm, self.sensor_from_object.vector(found.outward))
+    }
+
+    /// Where a walk from inside the object along a direction leaves it: the way walked (mm), and the object's
+    /// outward direction there; `None` if it does not within `most_mm`. Zero for a point outside.
+    ///
+    /// Newton's steps along the way; where the surface turns away, the distance itself is a safe step, since no
+    /// point of the surface is nearer than that.
+    pub fn walk_out(&self, from_mm: DVec3, along: DVec3, most_mm: f64) -> Option<(f64, DVec3)> {
+        let (mut value, mut outward) = self.distance(from_mm);
+        if value >= 0.0 {
+            return Some((0.0, outward));
+        }
+        let tiny = 1e-10 * most_mm;
+        let (mut inside, mut way) = (0.0, 0.0_f64);
+        for _ in 0..MOST_STEPS {
+            let slope = outward.dot(along);
+            let step = if value < 0.0 {
+                inside = f64::max(inside, way);
+                -value / slope.clamp(0.25, 1.0)
+            } else if slope > 0.25 {
+                -value / slope
+            } else {
+                -value
+            };
+            let next = (way + step).max(0.5 * (inside + way));
+            way = next;
+            if way > most_mm {
+                return None;
+            }
+            (value, outward) = self.distance(from_mm + along * way);
+            if value.abs() <= tiny {
+                return Some((way, outward));
+            }
+        }
+        // A crease met at a grazing angle: the point is as near as the last steps brought it.
+        (value.abs() <= 1e-4 * most_mm).then_some((way, outward))
+    }
+}
+
+/// Displacement of one point of the dome under the rule.
+pub(super) fn pushed_out(placed: &Placed, dome_radius_mm: f64, at_mm: DVec3) -> DVec3 {
+    let inward = -at_mm.normalize_or_zero();
+    placed.walk_out(at_mm, inward, dome_radius_mm).map_or(DVec3::ZERO, |(way, _)| inward * way)
+}
+
+/// The touched region, sampled.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Overlap {
+    /// Deepest point of the undeformed dome, and the signed distance there.
+    pub deepest_mm: DVec3,
+    pub distance_mm: f64,
+    /// Samples inside the object: place, area, push-out, the object's outward direction.
+    pub samples: Vec<(DVec3, f64, f64, DVec3)>,
+    /// Touched area by the push-out's moments, mm2.
+    pub area_mm2: f64,
+    /// Half angle of the cap about the deepest point that holds the samples, rad.
+    pub angle_rad: f64,
+    /// Distances asked for.
+    pub queries: usize,
+    /// Whether every sample found its way out.
+    pub all_out: bool,
+}
+
+/// Scattered directions over the hemisphere (a golden-angle spiral), for the first look.
+fn spiral(count: usize) -> impl Iterator<Item = DVec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    (0..count).map(move |i| {
+        let z = 1.0 - (i as f64 + 0.5) / count as f64;
+        let (sine, cosine) = (golden * i as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * cosine, r * sine, z)
+    })
+}
+
+const FIRST_LOOK: usize = 400;
+const RINGS: usize = 24;
+const SPOKES: usize = 48;
+const STARTS: usize = 3;
+
+/// Two directions that complete a unit vector to a right-handed frame.
+pub(super) fn frame_of(normal: DVec3) -> (DVec3, DVec3) {
+    normal.any_orthonormal_pair()
+}
+
+/// Deepest point of the dome in the object: first look, then a pattern search from the best looks.
+pub(super) fn deepest(placed: &Placed, radius: f64) -> (DVec3, f64, usize) {
+    let (center, reach) = placed.solid.bounding_sphere();
+    let center = placed.sensor_from_object.point(center);
+    let nearest_possible = center.length() - reach - radius;
+    let towards = {
+        let d = center.normalize_or(DVec3::Z);
+        DVec3::new(d.x, d.y, d.z.max(0.0)).normalize_or(DVec3::Z)
+    };
+    let mut queries = 1;
+    if nearest_possible > 0.0 {
+        return (towards * radius, nearest_possible, queries);
+    }
+    let mut looks: Vec<(f64, DVec3)> = spiral(FIRST_LOOK)
+        .chain([towards])
+        .map(|direction| (placed.distance(direction * radius).0, direction))
+        .collect();
+    queries += looks.len();
+    looks.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut starts: Vec<(f64, DVec3)> = Vec::new();
+    for look in looks {
+        if starts.len() < STARTS && starts.iter().all(|other| other.1.dot(look.1) < 0.97) {
+            starts.push(look);
+        }
+    }
+    let mut best = (f64::INFINITY, DVec3::Z);
+    for (mut value, mut direction) in starts {
+        let mut step = 0.08;
+        while step > 1e-7 {
+            let (u, v) = frame_of(direction);
+            let tries = [u, v, -u, -v].map(|way| {
+                let mut d = direction + way * step;
+                d.z = d.z.max(0.0);
+                let d = d.normalize_or(direction);
+                (placed.distance(d * radius).0, d)
+            });
+            queries += 4;
+            let found = tries.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+            match found {
+                Some((lower, d)) if lower < value => (value, direction) = (lower, d),
+                _ => step *= 0.5,
+            }
+        }
+        if value < best.0 {
+            best = (value, direction);
+        }
+    }
+    (best.1 * radius, best.0, queries)
+}
+
+/// Samples the part of the dome that lies inside the object.
+pub(super) fn overlap(placed: &Placed, radius: f64) -> Overlap {
+    let (deepest_mm, distance_mm, queries) = deepest(placed, radius);
+    let mut found = Overlap { deepest_mm, distance_mm, queries, all_out: true, ..Default::default() };
+    if distance_mm >= 0.0 {
+        return found;
+    }
+    let axis = deepest_mm / radius;
+    let (u, v) = frame_of(axis);
+    let place =
+        |angle: f64, azimuth: f64| axis * angle.cos() + (u * azimuth.cos() + v * azimuth.sin()) * angle.sin();
+    // The cap that holds every touched look, then the same cap looked at closely.
+    let spacing = (2.0 * std::f64::consts::PI / FIRST_LOOK as f64).sqrt();
+    let coarse = spiral(FIRST_LOOK)
+        .filter(|d| placed.distance(*d * radius).0 < 0.0)
+        .map(|d| d.dot(axis).clamp(-1.0, 1.0).acos())
+        .fold(0.0, f64::max)
+        + 1.5 * spacing;
+    let azimuth = |k: usize| (k as f64 + 0.5) * std::f64::consts::TAU / SPOKES as f64;
+    let touched = |angle: f64| {
+        (0..SPOKES / 2).any(|k| {
+            let d = place(angle, azimuth(2 * k));
+            d.z >= 0.0 && placed.distance(d * radius).0 < 0.0
+        })
+    };
+    let rings = (1..=RINGS).rev().find(|ring| touched(coarse * *ring as f64 / RINGS as f64)).unwrap_or(0);
+    // The edge by bisection, so that the samples move smoothly with the object.
+    let (mut low, mut high) =
+        (coarse * rings as f64 / RINGS as f64, coarse * (rings + 1) as f64 / RINGS as f64);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if touched(middle) { low = middle } else { high = middle }
+    }
+    let cap = (1.02 * high).min(std::f64::consts::PI);
+    found.queries += FIRST_LOOK + (RINGS + 30) * (SPOKES / 2);
+    let (mut first, mut second) = (0.0, 0.0);
+    for ring in 0..RINGS {
+        // Rings of equal width; each sample stands for its exact share of the sphere.
+        let (low, high) = (cap * ring as f64 / RINGS as f64, cap * (ring + 1) as f64 / RINGS as f64);
+        let area = radius * radius * (low.cos() - high.cos()) * std::f64::consts::TAU / SPOKES as f64;
+        let angle = 0.5 * (low + high);
+        for spoke in 0..SPOKES {
+            let direction = place(angle, azimuth(spoke));
+            if direction.z < 0.0 {
+                continue;
+            }
+            let at = direction * radius;
+            found.queries += 1;
+            if placed.distance(at).0 >= 0.0 {
+                continue;
+            }
+            found.queries += 4;
+            match placed.walk_out(at, -direction, radius) {
+                Some((way, outward)) => {
+                    found.samples.push((at, area, way, outward));
+                    first += way * area;
+                    second += way * way * area;
+                    found.angle_rad = high;
+                }
+                None => found.all_out = false,
+            }
+        }
+    }
+    if second > 0.0 {
+        found.area_mm2 = 4.0 / 3.0 * first * first / second;
+    }
+    found
+}
+
+/// Pressures on the samples for a foundation of the modulus `k_mpa_per_mm`.
+pub(super) fn nodes_of(overlap: &Overlap, k_mpa_per_mm: f64) -> Vec<TouchedNode> {
+    overlap
+        .samples
+        .iter()
+        .map(|&(at_mm, area_mm2, way, outward)| {
+            let pressure_mpa = k_mpa_per_mm * way;
+            // Across a side wall the way out is not along the object's normal; the push still is.
+            let force_n = outward * (pressure_mpa * area_mm2);
+            TouchedNode { at_mm, area_mm2, force_n, pressure_mpa, sticks: false }
+        })
+        .collect()
+}

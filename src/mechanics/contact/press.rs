@@ -1,0 +1,403 @@
+//! Contact and springs in balance.
+//!
+//! The unknowns are the platform's displacement and, where a force is asked for, the object's way along its
+//! approach; the equations say that the springs carry the contact's wrench, and that its force is the one asked
+//! for. Solved by Broyden's method (C. G. Broyden, Math. Comp. 19, 1965) from the springs' exact tangent and the
+//! half-space stiffness of the contact, with halved steps where the residual grows.
+
+use glam::{DMat3, DVec3};
+use nalgebra::{DMatrix, DVector};
+
+use super::{Contact, ContactError, ContactState, Indenter};
+use crate::mechanics::{Displacement, MechanicsError, Suspension, Wrench};
+use crate::numeric::{Rigid, cross_matrix};
+
+/// How a balance ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PressStatus {
+    /// Balanced, every spring within its travel.
+    Balanced,
+    /// Balanced, but this spring (by number) is pressed beyond its coils: the true platform stops there.
+    SpringsBind {
+        /// Number of the spring, from 0.
+        spring: usize,
+    },
+    /// The bound on iterations, or the end of the springs' law, was reached with this residual, N.
+    NotBalanced {
+        /// Residual, N (moments counted over the springs' reach).
+        residual_n: f64,
+    },
+}
+
+/// An object pressed on the sprung dome.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pressed {
+    /// Where the platform is.
+    pub rest_from_platform: Rigid,
+    /// Where the object is.
+    pub rest_from_object: Rigid,
+    /// The contact, in the moved sensor frame.
+    pub state: ContactState,
+    /// What the contact puts on the platform: rest frame, about [`Suspension::at_mm`].
+    pub wrench: Wrench,
+    /// What the balance is off, N (moments counted over the springs' reach).
+    pub residual_n: f64,
+    /// Contact solves.
+    pub iterations: u32,
+    /// How the balance ended.
+    pub status: PressStatus,
+}
+
+/// Contact solves that a balance may take.
+const MOST_SOLVES: u32 = 80;
+/// The search ends when the residual is below this part of the load; ten times that still counts as
+/// balanced.
+const TOLERANCE: f64 = 1e-7;
+/// Loads below this one are balanced as closely as it is, N.
+const LEAST_SCALE_N: f64 = 0.05;
+
+/// One trial of the unknowns.
+struct Trial {
+    state: ContactState,
+    platform: Rigid,
+    object: Rigid,
+    wrench: Wrench,
+    /// Springs' wrench less the contact's, moments over the reach; then the force's miss.
+    residual: DVector<f64>,
+    size: f64,
+}
+
+/// What is to be balanced.
+struct Task<'a> {
+    contact: &'a Contact,
+    indenter: &'a Indenter,
+    suspension: &'a Suspension,
+    rest_from_object: Rigid,
+    before: Option<&'a ContactState>,
+    /// The way that the object may move, and the force wanted along it.
+    force: Option<(DVec3, f64)>,
+}
+
+impl Task<'_> {
+    fn unknowns(&self) -> usize {
+        6 + usize::from(self.force.is_some())
+    }
+
+    fn try_at(&self, x: &DVector<f64>) -> Result<Trial, ContactError> {
+        let reach = self.suspension.reach_mm();
+        let displacement = Displacement::from_array(std::array::from_fn(|i| x[i]));
+        let platform = displacement.to_pose(self.suspension.at_mm());
+        let mut object = self.rest_from_object;
+        if let Some((way, _)) = self.force {
+            object.translation_mm += way * x[6];
+        }
+        let sensor_from_object = platform.inverse().compose(&object);
+        let state = self.contact.solve(self.indenter, &sensor_from_object, self.before)?;
+        let wrench = Wrench::of_load(
+            platform.vector(state.wrench.force_n),
+            platform.vector(state.wrench.moment_nmm),
+            platform.translation_mm,
+            self.suspension.at_mm(),
+        );
+        let springs = self.suspension.wrench_at(&displacement)?.to_array();
+        let mut residual = DVector::zeros(self.unknowns());
+        for (i, (spring, contact)) in springs.into_iter().zip(wrench.to_array()).enumerate() {
+            residual[i] = (spring - contact) / if i < 3 { 1.0 } else { reach };
+        }
+        if let Some((way, force_n)) = self.force {
+            residual[6] = wrench.force_n.dot(way) - force_n;
+        }
+        let size = residual.norm();
+        Ok(Trial { state, platform, object, wrench, residual, size })
+    }
+
+    /// Derivative of the residual: the springs' exactly, the contact's as a half-space's.
+    fn jacobian(&self, x: &DVector<f64>, trial: &Trial) -> Result<DMatrix<f64>, MechanicsError> {
+        let reach = self.suspension.reach_mm();
+        let displacement = Displacement::from_array(std::array::from_fn(|i| x[i]));
+        let mut tangent = self.suspension.tangent_at(&displacement)?;
+        let n = self.unknowns();
+        let mut jacobian = DMatrix::zeros(n, n);
+        let mut stiffness = DMat3::ZERO;
+        let mut arm = DVec3::ZERO;
+        if let Some((at, normal)) = middle(&trial.state) {
+            let elastomer = self.contact.elastomer();
+            let sharing = 1.0 + self.indenter.yield_ratio(elastomer);
+            let a = trial.state.contact_radius_mm;
+            let axial = 2.0 * a * elastomer.plane_strain_mpa() / sharing;
+            let lateral = if self.before.is_some() && elastomer.friction > 0.0 {
+                8.0 * a * elastomer.shear_mpa() / (sharing * (2.0 - elastomer.poisson))
+            } else {
+                0.0
+            };
+            let normal = trial.platform.vector(normal);
+            let outer = DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
+            stiffness = outer * axial + (DMat3::IDENTITY - outer) * lateral;
+            arm = trial.platform.point(at) - self.suspension.at_mm();
+            // Displacement of the touched place: t + w x arm.
+            let turn = -cross_matrix(arm);
+            let by_turn = stiffness * turn;
+            let moment = cross_matrix(arm);
+            let (mt, mr) = (moment * stiffness, moment * by_turn);
+            for row in 0..3 {
+                for column in 0..3 {
+                    tangent[(row, column)] += stiffness.col(column)[row];
+                    tangent[(row, column + 3)] += by_turn.col(column)[row];
+                    tangent[(row + 3, column)] += mt.col(column)[row];
+                    tangent[(row + 3, column + 3)] += mr.col(column)[row];
+                }
+            }
+        }
+        for row in 0..6 {
+            for column in 0..6 {
+                jacobian[(row, column)] = tangent[(row, column)] / if row < 3 { 1.0 } else { reach };
+            }
+        }
+        if let Some((way, _)) = self.force {
+            let force = stiffness * way;
+            let moment = arm.cross(force) / reach;
+            for i in 0..3 {
+                jacobian[(i, 6)] = -force[i];
+                jacobian[(i + 3, 6)] = -moment[i];
+                // The contact's force falls when the platform gives way.
+                jacobian[(6, i)] = -force[i];
+                jacobian[(6, i + 3)] = -arm.cross(force)[i];
+            }
+            jacobian[(6, 6)] = way.dot(force).max(1e-3);
+        }
+        Ok(jacobian)
+    }
+
+    fn run(&self, start: DVector<f64>) -> Result<Pressed, ContactError> {
+        let mut x = start;
+        let mut solves = 1;
+        let mut trial = match self.try_at(&x) {
+            Ok(trial) => trial,
+            // A start that the models refuse is no answer to the task: from rest, then.
+            Err(_) => {
+                x.fill(0.0);
+                solves += 1;
+                self.try_at(&x)?
+            }
+        };
+        let mut jacobian = self.jacobian(&x, &trial)?;
+        let mut fresh = true;
+        let mut best_size = trial.size;
+        while solves < MOST_SOLVES {
+            let scale =
+                trial.wrench.force_n.length().max(self.force.map_or(0.0, |f| f.1.abs())).max(LEAST_SCALE_N);
+            if trial.size <= TOLERANCE * scale {
+                break;
+            }
+            let Some(step) = jacobian.clone().lu().solve(&-&trial.residual) else { break };
+            let mut part = self.step_part(&step);
+            let mut next = None;
+            while part > 1e-4 && solves < MOST_SOLVES {
+                solves += 1;
+                let there = &x + &step * part;
+                if let Ok(found) = self.try_at(&there)
+                    && found.size < 1.5 * best_size.max(0.3 * trial.size)
+                {
+                    next = Some((there, found));
+                    break;
+                }
+                part *= 0.4;
+            }
+            let Some((there, found)) = next else {
+                if fresh {
+                    break;
+                }
+                jacobian = self.jacobian(&x, &trial)?;
+                fresh = true;
+                continue;
+            };
+            let moved = &there - &x;
+            let miss = &found.residual - &trial.residual - &jacobian * &moved;
+            jacobian += &miss * moved.transpose() / moved.norm_squared().max(f64::MIN_POSITIVE);
+            fresh = false;
+            best_size = best_size.min(found.size);
+            (x, trial) = (there, found);
+        }
+        self.finish(trial, &x, solves)
+    }
+
+    /// Long steps are cut: no more than a tenth of the dome, or of a radian, at once.
+    fn step_part(&self, step: &DVector<f64>) -> f64 {
+        let radius = self.contact.elastomer().dome_radius_mm;
+        let shift = step.rows(0, 3).norm().max(step.get(6).map_or(0.0, |s| s.abs()));
+        let turn = step.rows(3, 3).norm();
+        (0.15 * radius / shift.max(f64::MIN_POSITIVE)).min(0.15 / turn.max(f64::MIN_POSITIVE)).min(1.0)
+    }
+
+    fn finish(&self, trial: Trial, x: &DVector<f64>, iterations: u32) -> Result<Pressed, ContactError> {
+        let scale = trial.wrench.force_n.length().max(LEAST_SCALE_N);
+        let displacement = Displacement::from_array(std::array::from_fn(|i| x[i]));
+        let solid = self.suspension.spec().spring.solid_compression_mm();
+        let bound = self.suspension.springs_at(&displacement).ok().and_then(|springs| {
+            springs
+                .iter()
+                .enumerate()
+                .filter(|(_, spring)| spring.compression_mm > solid)
+                .max_by(|a, b| a.1.compression_mm.total_cmp(&b.1.compression_mm))
+                .map(|(number, _)| number)
+        });
+        let status = if trial.size > 10.0 * TOLERANCE * scale {
+            PressStatus::NotBalanced { residual_n: trial.size }
+        } else {
+            bound.map_or(PressStatus::Balanced, |spring| PressStatus::SpringsBind { spring })
+        };
+        Ok(Pressed {
+            rest_from_platform: trial.platform,
+            rest_from_object: trial.object,
+            wrench: trial.wrench,
+            residual_n: trial.size,
+            iterations,
+            status,
+            state: trial.state,
+        })
+    }
+}
+
+/// Middle of the pressure and the dome's normal there, sensor frame.
+fn middle(state: &ContactState) -> Option<(DVec3, DVec3)> {
+    let weight: f64 = state.nodes.iter().map(|n| n.pressure_mpa * n.area_mm2).sum();
+    let at = state.nodes.iter().map(|n| n.at_mm * (n.pressure_mpa * n.area_mm2)).sum::<DVec3>() / weight;
+    (weight > 0.0 && at.is_finite()).then(|| (at, at.normalize_or(DVec3::Z)))
+}
+
+/// The platform's displacement of the frame before, as a start.
+fn start(suspension: &Suspension, before: Option<&Pressed>, unknowns: usize) -> DVector<f64> {
+    let mut x = DVector::zeros(unknowns);
+    if let Some(pressed) = before {
+        let then = Displacement::of_pose(&pressed.rest_from_platform, suspension.at_mm());
+        for (i, value) in then.to_array().into_iter().enumerate() {
+            x[i] = value;
+        }
+    }
+    x
+}
+
+impl Contact {
+    /// The object held at a pose of the rest frame: where the platform comes to rest on its springs.
+    ///
+    /// # Errors
+    /// As [`Contact::solve`], and where the springs have no force at rest. A balance that is not found, or binds
+    /// the springs, is a [`PressStatus`].
+    pub fn press(
+        &self,
+        indenter: &Indenter,
+        suspension: &Suspension,
+        rest_from_object: &Rigid,
+        before: Option<&Pressed>,
+    ) -> Result<Pressed, ContactError> {
+        let task = Task {
+            contact: self,
+            indenter,
+            suspension,
+            rest_from_object: *rest_from_object,
+            before: before.map(|pressed| &pressed.state),
+            force: None,
+        };
+        task.run(start(suspension, before, 6))
+    }
+
+    /// The object moved along `approach` (rest frame) from a start pose until the contact's force along it is
+    /// `force_n`, the platform at rest on its springs.
+    ///
+    /// # Errors
+    /// As [`Contact::press`]; [`ContactError::Dimension`] for a force that is not positive,
+    /// [`ContactError::BadPose`] for an approach without direction.
+    pub fn press_with_force(
+        &self,
+        indenter: &Indenter,
+        suspension: &Suspension,
+        rest_from_object: &Rigid,
+        approach: DVec3,
+        force_n: f64,
+        before: Option<&Pressed>,
+    ) -> Result<Pressed, ContactError> {
+        let way = approach
+            .try_normalize()
+            .ok_or_else(|| ContactError::BadPose(format!("{approach} is no direction of approach")))?;
+        let force_n = super::error::positive("force_n", force_n)?;
+        rest_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
+        let mut task = Task {
+            contact: self,
+            indenter,
+            suspension,
+            rest_from_object: *rest_from_object,
+            before: before.map(|pressed| &pressed.state),
+            force: Some((way, force_n)),
+        };
+        let mut x = start(suspension, before, 7);
+        let platform = before.map_or(Rigid::identity(), |pressed| pressed.rest_from_platform);
+        x[6] = match before {
+            // Where the object was, as far as it lies on this way.
+            Some(pressed) if !pressed.state.nodes.is_empty() => {
+                (pressed.rest_from_object.translation_mm - rest_from_object.translation_mm).dot(way)
+            }
+            _ => {
+                self.touch_mm(indenter, &platform, rest_from_object, way)?
+                    + self.first_depth_mm(indenter, force_n)
+            }
+        };
+        // Loading in steps where the whole force is not found at once.
+        let whole = task.run(x.clone())?;
+        if !matches!(whole.status, PressStatus::NotBalanced { .. }) {
+            return Ok(whole);
+        }
+        let (mut best, mut iterations) = (whole, 0);
+        for part in [0.1, 0.25, 0.45, 0.7, 1.0] {
+            task.force = Some((way, force_n * part));
+            let found = task.run(x.clone())?;
+            iterations += found.iterations;
+            let then = Displacement::of_pose(&found.rest_from_platform, suspension.at_mm());
+            for (i, value) in then.to_array().into_iter().enumerate() {
+                x[i] = value;
+            }
+            x[6] = (found.rest_from_object.translation_mm - rest_from_object.translation_mm).dot(way);
+            best = found;
+        }
+        best.iterations += iterations;
+        Ok(best)
+    }
+
+    /// How far the object goes along a way until it touches the dome at a platform's pose.
+    fn touch_mm(
+        &self,
+        indenter: &Indenter,
+        platform: &Rigid,
+        rest_from_object: &Rigid,
+        way: DVec3,
+    ) -> Result<f64, ContactError> {
+        let radius = self.elastomer().dome_radius_mm;
+        let mut gone = 0.0;
+        // The distance is a safe step forwards; from inside, its depth is one backwards.
+        for _ in 0..64 {
+            let mut object = *rest_from_object;
+            object.translation_mm += way * gone;
+            let placed = super::geometric::Placed {
+                solid: indenter.solid.clone(),
+                sensor_from_object: platform.inverse().compose(&object),
+            };
+            let (_, distance_mm, _) = super::geometric::deepest(&placed, radius);
+            gone += distance_mm;
+            if distance_mm.abs() < 1e-6 * radius {
+                return Ok(gone);
+            }
+            if gone.abs() > 1e3 * radius {
+                break;
+            }
+        }
+        Err(ContactError::BadPose(format!("the object does not meet the dome along {way}")))
+    }
+
+    /// Hertz' depth for the force of a ball of the object's size: a start, no result.
+    fn first_depth_mm(&self, indenter: &Indenter, force_n: f64) -> f64 {
+        let elastomer = self.elastomer();
+        let modulus = elastomer.plane_strain_mpa() / (1.0 + indenter.yield_ratio(elastomer));
+        let curvature = 1.0 / elastomer.dome_radius_mm + 1.0 / indenter.solid.bounding_sphere().1;
+        let depth = (0.75 * force_n / modulus * curvature.sqrt()).powf(2.0 / 3.0);
+        depth.min(0.2 * elastomer.dome_radius_mm)
+    }
+}

@@ -5,7 +5,7 @@
 A sequence is a folder of `domecast simulate`: frames and truth.jsonl. Prints one table: error of the dots (px, raw frame,
 rms on each axis, against the truth's centroids) and of the wrench, frames with an answer, time a frame.
 The peer's dots are matched to the truth by the nearest, which favours it: it has no identities of its own; its flow's
-answer is called mislabelled where it is 4 px off, on another dot. Its time is that of its thread on the processor, ours
+answer is called mislabelled where it is 4 px off, on another dot. Its two levels are the best fixed ones for the first frame. Its time is that of its thread on the processor, ours
 the time that passed, which other work on the machine makes longer.
 """
 import json
@@ -31,6 +31,7 @@ def rms(errors):
 
 def of_peer(constants, frames, truth):
     runtime = PaperRuntime(constants)
+    runtime.choose_levels(cv2.imread(str(frames[0])), [d["image_px"] for d in constants["black_dots"]])
     dots, flowed, wrenches, times, wanted, found = [], [], [], [], 0, 0
     near = np.empty((0, 2))
     for path, true in zip(frames, truth):

@@ -32,13 +32,35 @@ class PaperRuntime:
         self.black, self.white = black, white
         self.last, self.p0 = None, None
 
-    def step(self, frame):
-        """A frame as cv2.imread gives it -> black centroids, where flow says that the last ones went, wrench."""
+    def grey(self, frame):
+        """Undistorted, blurred, masked, sharpened, grey."""
         frame = cv2.remap(frame, *self.maps, cv2.INTER_LINEAR)
         frame = cv2.GaussianBlur(frame, (3, 3), 0)
         frame = cv2.bitwise_and(frame, frame, mask=self.mask)
         frame = cv2.filter2D(frame, -1, SHARPEN)
-        grey = cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
+        return cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
+
+    def choose_levels(self, frame, dots_px):
+        """The best fixed levels for a sequence, from a frame at rest: half way between the brightest dot and the darkest
+        ground beside one, and between the darkest marker and the brightest of what lies outside of it."""
+        grey = self.grey(frame)
+        at = lambda p: int(grey[int(round(p[1])), int(round(p[0]))]) if 0 <= p[0] < grey.shape[1] - 1 and 0 <= p[1] < grey.shape[0] - 1 else None
+        dots = self.from_raw(dots_px)
+        dark = [v for v in map(at, dots) if v is not None]
+        step = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]) * 0.5 * np.median(
+            np.sort(np.linalg.norm(dots[:, None] - dots[None], axis=2), axis=1)[:, 1])
+        ground = [v for d in dots for s in step if (v := at(d + s)) is not None]
+        self.black = (np.percentile(dark, 95) + np.percentile(ground, 2)) / 2
+        away = self.at_rest - self.at_rest.mean(0)
+        away /= np.linalg.norm(away, axis=1)[:, None]
+        beside = [at(p + 16 * a) for p, a in zip(self.at_rest, away)]
+        bright = [at(p) for p in self.at_rest]
+        if None not in beside + bright:
+            self.white = (min(bright) + max(beside)) / 2
+
+    def step(self, frame):
+        """A frame as cv2.imread gives it -> black centroids, where flow says that the last ones went, wrench."""
+        grey = self.grey(frame)
         dark = cv2.bitwise_and(cv2.threshold(grey, self.black, 255, cv2.THRESH_BINARY_INV)[1], self.mask)
         dark = cv2.morphologyEx(dark, cv2.MORPH_OPEN, SQUARE)
         _, _, stats, centroids = cv2.connectedComponentsWithStats(dark)
@@ -67,6 +89,11 @@ class PaperRuntime:
         moved = np.linalg.inv(self.F0) @ pose
         shift = moved[:3, :3] @ self.at + moved[:3, 3] - self.at
         return self.stiffness @ np.r_[shift, cv2.Rodrigues(moved[:3, :3])[0][:, 0]]
+
+    def from_raw(self, points):
+        """Places in the raw frame -> the undistorted one."""
+        lens = cv2.fisheye if self.fisheye else cv2
+        return lens.undistortPoints(np.array(points, float)[:, None], self.K, self.D, P=self.Ku)[:, 0]
 
     def to_raw(self, points):
         """Places in the undistorted frame -> the raw one."""

@@ -8,5 +8,7 @@ pub mod printing {}
 pub mod casting {}
 #[doc = include_str!("guide/force.md")]
 pub mod force {}
+#[doc = include_str!("guide/tracking.md")]
+pub mod tracking {}
 #[doc = include_str!("guide/formats.md")]
 pub mod formats {}

@@ -24,7 +24,7 @@
 //! | replace nominal numbers by measured ones | [`calibrate`] |
 //! | do all of it | [`build`], and [`report`] for its page; [`compare`] two of them |
 //!
-//! Formulas and their sources stand with the functions; [`guide`] tells the five subjects in one page each.
+//! Formulas and their sources stand with the functions; [`guide`] tells the six subjects in one page each.
 //!
 //! # In five lines
 //!

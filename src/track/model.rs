@@ -52,6 +52,8 @@ pub(super) struct SensorModel {
     pub markers_px: Vec<DVec2>,
     /// How far from there it can be, px.
     pub markers_reach_px: Vec<f64>,
+    /// Farthest that the platform can be pressed, mm.
+    pub deepest_mm: f64,
     pub solver: PoseSolver,
     /// Rms of the markers' residuals above which the constants are not those of the camera, px.
     pub foreign_rms_px: f64,
@@ -122,7 +124,8 @@ impl SensorModel {
             .map_err(|error| TrackError::at("white_markers", format!("are not usable: {error}")))?;
         let dots = dots_of(constants, &optics)?;
         let at_mm = springs.as_ref().map_or(DVec3::ZERO, Springs::at_mm);
-        let (markers_px, markers_reach_px) = reach_of(&optics, &markers, at_mm, deepest)?;
+        let deepest_mm = deepest.unwrap_or(3.0).clamp(0.0, 100.0);
+        let (markers_px, markers_reach_px) = reach_of(&optics, &markers, at_mm, deepest_mm)?;
         let mask = Mask::new(optics.lens(), camera, mask);
         let foreign_rms_px = foreign_rms_of(constants, &optics, &markers);
         Ok(Self {
@@ -131,6 +134,7 @@ impl SensorModel {
             markers,
             markers_px,
             markers_reach_px,
+            deepest_mm,
             solver,
             foreign_rms_px,
             mask,
@@ -235,7 +239,7 @@ fn reach_of(
     optics: &SensorOptics,
     markers: &[Marker],
     at_mm: DVec3,
-    deepest_mm: Option<f64>,
+    deepest_mm: f64,
 ) -> Result<(Vec<DVec2>, Vec<f64>), TrackError> {
     let mut places = Vec::with_capacity(markers.len());
     for (index, marker) in markers.iter().enumerate() {
@@ -251,7 +255,7 @@ fn reach_of(
     }
     let mut reach = vec![0.0_f64; markers.len()];
     let mut moved = optics.clone();
-    for down in [-1.0, 0.0, deepest_mm.unwrap_or(3.0).clamp(0.0, 100.0)] {
+    for down in [-1.0, 0.0, deepest_mm] {
         for turn in 0..8 {
             let (sin, cos) = (f64::from(turn) * std::f64::consts::FRAC_PI_4).sin_cos();
             for (shift, tilt, twist) in

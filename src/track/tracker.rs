@@ -344,7 +344,6 @@ impl Tracker {
     fn markers_anywhere(&mut self, plane: &Plane<'_>) -> Option<Refined> {
         self.discs.fill(None);
         let rest = Rigid::identity();
-        self.optics.move_to(&rest).ok()?;
         let count = self.model.markers.len();
         if count != 4 {
             // More markers than the paper's four: the nearest to rest, or to the last pose, will do.
@@ -352,15 +351,26 @@ impl Tracker {
             self.markers_near(plane, &start);
             return self.refine_seen(&start);
         }
-        let mut found = [[None; CANDIDATES]; 4];
-        for (index, marker) in self.model.markers.iter().enumerate() {
-            let view = View::new(&self.optics, marker)?;
+        // A platform pressed down shows its markers larger: each is looked at as at rest, half way down, and down.
+        let mut views = [[None; 4]; 3];
+        for (views, part) in views.iter_mut().zip([0.0, 0.5, 1.0]) {
+            let down = DVec3::new(0.0, 0.0, -part * self.model.deepest_mm);
+            if self.optics.move_to(&Rigid::new(glam::DMat3::IDENTITY, down)).is_ok() {
+                for (view, marker) in views.iter_mut().zip(&self.model.markers) {
+                    *view = View::new(&self.optics, marker);
+                }
+            }
+        }
+        let mut found: [[Option<Disc>; CANDIDATES]; 4] = [[None; CANDIDATES]; 4];
+        for index in 0..4 {
+            let view = views[1][index].or(views[0][index])?;
             let mut places = [(0.0, DVec2::ZERO); CANDIDATES];
             let (start, reach) = (self.model.markers_px[index], self.model.markers_reach_px[index]);
             let n = view.candidates(plane, start, reach, self.white(), &mut places);
             let mut next = 0;
             for (_, at) in &places[..n] {
-                if let Some(disc) = view.fit(plane, *at, FIT_REACH_PX, None) {
+                let fits = views.iter().filter_map(|views| views[index]?.fit(plane, *at, FIT_REACH_PX, None));
+                if let Some(disc) = fits.min_by(|a, b| a.misfit.total_cmp(&b.misfit)) {
                     found[index][next] = Some(disc);
                     next += 1;
                 }

@@ -20,7 +20,7 @@ const MOST_STEPS: u32 = 12;
 /// A step below this ends the fit, px; the next one would be a tenth of it.
 const SETTLED_PX: f64 = 4e-3;
 /// Least difference between marker and ground, levels.
-const LEAST_RISE: f64 = 12.0;
+const LEAST_RISE: f64 = 8.0;
 /// Largest half of a window, px.
 const MOST_HALF: i32 = 40;
 
@@ -29,6 +29,8 @@ const MOST_HALF: i32 = 40;
 pub(super) struct Disc {
     pub centroid_px: DVec2,
     pub sd_px: f64,
+    /// Part of the contrast that the picture of a disc leaves unexplained.
+    pub misfit: f64,
     /// Levels of ground, disc and dome, the last two counted from the ground: a start for the next frame.
     pub levels: [f64; 3],
 }
@@ -36,13 +38,14 @@ pub(super) struct Disc {
 /// How a marker's surroundings map to the image.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
-    /// Pixels by mm on the sheet.
-    px_by_mm: DMat2,
+    /// Millimetres on the sheet by pixels.
     mm_by_px: DMat2,
     place_mm: DVec2,
     radius_mm: f64,
     rim_mm: f64,
     half: i32,
+    /// Eight places outside of the outline, a fifth larger than it is, from its middle, whole pixels.
+    around: [[i32; 2]; 8],
 }
 
 impl View {
@@ -59,16 +62,21 @@ impl View {
         let half = (reach + GROUND_PX + 1.0).ceil();
         let usable = mm_by_px.is_finite() && half.is_finite() && half <= f64::from(MOST_HALF);
         usable.then_some(Self {
-            px_by_mm,
             mm_by_px,
             place_mm: marker.position_mm.truncate(),
             radius_mm,
             rim_mm: optics.dome_radius_mm(),
             half: half as i32,
+            around: std::array::from_fn(|k| {
+                let (sin, cos) = (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
+                let edge = px_by_mm * (DVec2::new(cos, sin) * radius_mm);
+                let out = edge * (1.2 + 1.6 / edge.length().max(0.5));
+                [out.x.round() as i32, out.y.round() as i32]
+            }),
         })
     }
 
-    /// Brightness in the middle less that around, levels.
+    /// By how much the middle is brighter than what is around, levels.
     fn rise(&self, plane: &Plane<'_>, x: i32, y: i32) -> f64 {
         let mut middle = 0;
         for dy in -1..=1 {
@@ -76,17 +84,21 @@ impl View {
                 middle += i32::from(plane.at(x + dx, y + dy));
             }
         }
-        let mut around = 0;
-        for k in 0..8 {
-            const H: f64 = std::f64::consts::FRAC_1_SQRT_2;
-            const ROUND: [[f64; 2]; 8] =
-                [[1.0, 0.0], [H, H], [0.0, 1.0], [-H, H], [-1.0, 0.0], [-H, -H], [0.0, -1.0], [H, -H]];
-            let [cos, sin] = ROUND[k];
-            let edge = self.px_by_mm * (DVec2::new(cos, sin) * self.radius_mm);
-            let out = edge * (1.0 + 1.6 / edge.length().max(0.5));
-            around += i32::from(plane.at(x + out.x.round() as i32, y + out.y.round() as i32));
+        // The fourth brightest around: three may fall on the dome beside; between dots, or on an edge, four and more are
+        // as bright as the middle.
+        let mut top = [0; 4];
+        for [dx, dy] in self.around {
+            let mut value = i32::from(plane.at(x + dx, y + dy));
+            for place in &mut top {
+                if value > *place {
+                    std::mem::swap(&mut value, place);
+                }
+            }
+            if 9 * top[3] >= middle {
+                return 0.0;
+            }
         }
-        f64::from(middle) / 9.0 - f64::from(around) / 8.0
+        f64::from(middle) / 9.0 - f64::from(top[3])
     }
 
     /// The places within `reach_px` of `start` that look most like a marker, the best first, at least its own size
@@ -102,7 +114,7 @@ impl View {
         let mut count = 0;
         let (cx, cy) = (start.x.round() as i32, start.y.round() as i32);
         let reach = reach_px.clamp(1.0, 2000.0).ceil() as i32;
-        // Far searches look at every other pixel first; markers are wider than that.
+        // Far searches look at every other pixel; markers are wider than that.
         let step = if reach > 24 { 2 } else { 1 };
         let apart = 0.7 * f64::from(self.half);
         let rows = (cy - reach).max(1)..=(cy + reach).min(plane.height() as i32 - 2);
@@ -186,13 +198,19 @@ impl View {
         let levels = levels?;
         let rise = levels[1];
         let rms = (left / (count - 5.0).max(1.0)).max(1.0 / 12.0).sqrt();
-        // What is a disc leaves a small part of its rise unexplained.
-        if !settled || !(rise > LEAST_RISE && rms < 0.25 * rise) {
+        // What is a disc, perhaps beside a dome brighter than it, leaves a small part of that unexplained.
+        let contrast = rise.max(0.5 * levels[2].abs());
+        if !settled || !(rise > LEAST_RISE && rms < 0.25 * contrast) {
             return None;
         }
         let inverse = with_floor(&normal).cholesky()?.inverse();
         let sd_px = noise * (0.5 * (inverse[(3, 3)] + inverse[(4, 4)])).max(0.0).sqrt();
-        at.is_finite().then_some(Disc { centroid_px: at, sd_px, levels: levels.into() })
+        at.is_finite().then_some(Disc {
+            centroid_px: at,
+            sd_px,
+            misfit: rms / contrast,
+            levels: levels.into(),
+        })
     }
 
     /// Normal equations over the window: columns ground, disc, dome, and the place (with `levels` known).

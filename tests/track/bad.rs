@@ -224,3 +224,35 @@ fn fuzzed_frames_do_no_harm() {
         assert!(s.worst_px < 0.15);
     }
 }
+
+// Digits and signs of the constants' text changed at random: an error with a name, or a tracker that does no harm.
+#[test]
+fn mutated_constants_do_no_harm() {
+    let text = SENSOR.constants.to_json();
+    let picture = drawn(&still(Rigid::identity()));
+    let mut state = 2_463_534_242_u64;
+    let mut random = move |end: usize| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state % end as u64) as usize
+    };
+    let digits: Vec<usize> =
+        text.bytes().enumerate().filter(|(_, b)| b.is_ascii_digit() || *b == b'-').map(|(i, _)| i).collect();
+    let mut made = 0;
+    for round in 0..160 {
+        let mut bytes = text.clone().into_bytes();
+        // Few changes, and of them many in the first part: camera, optics, mask.
+        for _ in 0..1 + random(6) {
+            let end = if round % 2 == 0 { 150 } else { digits.len() };
+            bytes[digits[random(end)]] = b"0123456789-eE.+"[random(15)];
+        }
+        let Ok(constants) = Constants::parse(&String::from_utf8(bytes).unwrap()) else { continue };
+        let Ok(mut tracker) = Tracker::new(&constants, TrackOptions::default()) else { continue };
+        let tracked = tracker.track(0, &frame(&picture.bytes));
+        let numbers = tracked.wrench.iter().chain(&tracked.wrench_sd).chain(&tracked.pose_sd).flatten();
+        assert!(numbers.into_iter().all(|v| v.is_finite()));
+        made += 1;
+    }
+    assert!(made > 20, "{made}");
+}

@@ -9,7 +9,7 @@ mod simulated;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use domecast::constants::Constants;
+use domecast::constants::{Constants, MarkerSight};
 use domecast::design::Design;
 use domecast::layout::Layout;
 use domecast::mechanics::{
@@ -153,14 +153,46 @@ fn any_pose_is_found_in_the_first_frame() {
     }
 }
 
+/// Loads over the envelope: each of its directions alone and on top of a press, at parts of what the platform bears and
+/// the camera sees.
+fn loads(azimuths: u32, parts: &[f64]) -> Vec<(String, Wrench, Rigid)> {
+    let suspension = suspension();
+    let limits = limits_of(&SENSOR.design);
+    let sight = MarkerSight::of(&SENSOR.design);
+    let alone = standard_directions(suspension.at_mm(), 10.0, azimuths);
+    let press = alone[0].clone();
+    let mut both = alone.clone();
+    both.extend(alone.iter().map(|d| {
+        let wrench = Wrench::from_array(std::array::from_fn(|i| {
+            d.wrench.to_array()[i] * 0.2 + press.wrench.to_array()[i]
+        }));
+        Direction { name: format!("press and {}", d.name), wrench }
+    }));
+    let mut loads = Vec::new();
+    for direction in both {
+        let reached = reach(&suspension, &limits, &|pose| sight.checks(pose), &direction);
+        for part in parts {
+            let wrench = direction.wrench.scaled(reached.factor.min(1e3) * part);
+            if let Ok(equilibrium) = &try_load(&suspension, &limits, &wrench).equilibrium {
+                loads.push((format!("{} at {part}", direction.name), wrench, equilibrium.pose));
+            }
+        }
+    }
+    loads
+}
+
 // Bias and spread of the wrench over noise, against what each frame says of its own uncertainty.
 #[test]
-fn the_wrench_is_unbiased_and_knows_its_spread() {
-    const SEEDS: u64 = 16;
+fn the_wrench_is_unbiased_and_knows_its_spread_over_the_envelope() {
+    const SEEDS: u64 = 12;
+    let (mut square, mut predicted, mut worst) = ([0.0; 6], [0.0; 6], [0.0_f64; 6]);
+    let mut cases: Vec<(String, Rigid)> =
+        POSES.iter().map(|(t, r)| (format!("{t:?} {r:?}"), pose(*t, *r))).collect();
+    cases.extend(loads(4, &[0.5, 0.95]).into_iter().map(|(name, _, pose)| (name, pose)));
+    assert!(cases.len() > 60, "{}", cases.len());
     let suspension = suspension();
-    let (mut square, mut predicted) = ([0.0; 6], [0.0; 6]);
-    for (t, r) in POSES {
-        let picture = still(pose(t, r));
+    for (name, pose) in &cases {
+        let picture = still(*pose);
         let mut drawn = drawn(&picture);
         let truth = Displacement::of_pose(&picture.pose, suspension.at_mm());
         let truth = suspension.wrench_at(&truth).unwrap().to_array();
@@ -181,16 +213,16 @@ fn the_wrench_is_unbiased_and_knows_its_spread() {
             let allowed = if axis < 3 { 0.02 } else { 0.2 };
             // What the mean of so many frames may be off by chance comes on top.
             let chance = 3.0 * said[axis] / (SEEDS as f64).sqrt();
-            assert!(mean[axis].abs() < allowed + chance, "{t:?} {r:?} axis {axis}: {mean:?} said {said:?}");
+            assert!(mean[axis].abs() < allowed + chance, "{name} axis {axis}: {mean:?} said {said:?}");
+            worst[axis] = worst[axis].max(mean[axis].abs());
             let n = SEEDS as f64;
             square[axis] += (spread[axis] - n * mean[axis] * mean[axis]) / (n - 1.0);
             predicted[axis] += said[axis] * said[axis];
         }
     }
-    for axis in 0..6 {
-        let ratio = (square[axis] / predicted[axis]).sqrt();
-        assert!(ratio < 1.5 && ratio > 0.5, "axis {axis}: spread over prediction {ratio}");
-    }
+    let ratio: [f64; 6] = std::array::from_fn(|axis| (square[axis] / predicted[axis]).sqrt());
+    println!("{} loads: largest mean error {worst:.4?}, spread over what is said {ratio:.3?}", cases.len());
+    assert!(ratio.iter().all(|r| *r < 1.5 && *r > 0.5), "spread over prediction {ratio:?}");
 }
 
 // The constants' springs against the design's own law over all that it carries.
@@ -198,33 +230,18 @@ fn the_wrench_is_unbiased_and_knows_its_spread() {
 fn the_constants_give_the_wrench() {
     let suspension = suspension();
     let springs = Springs::new(SENSOR.constants.springs.as_ref().unwrap()).unwrap();
-    let limits = limits_of(&SENSOR.design);
     let mut tried = 0;
-    let alone = standard_directions(suspension.at_mm(), 10.0, 8);
-    let press = alone[0].clone();
-    let mut both = alone.clone();
-    both.extend(alone.iter().map(|d| {
-        let wrench = Wrench::from_array(std::array::from_fn(|i| {
-            d.wrench.to_array()[i] * 0.2 + press.wrench.to_array()[i]
-        }));
-        Direction { name: format!("press and {}", d.name), wrench }
-    }));
-    for direction in both {
-        let reached = reach(&suspension, &limits, &|_| vec![], &direction);
-        for part in [0.25, 0.5, 0.75, 1.0] {
-            let wrench = direction.wrench.scaled(reached.factor.min(1e3) * part);
-            let case = try_load(&suspension, &limits, &wrench);
-            let Ok(equilibrium) = &case.equilibrium else { continue };
-            let d = Displacement::of_pose(&equilibrium.pose, suspension.at_mm());
-            let (found, tangent) = springs.wrench(&d).expect("a pose that the springs have");
-            let exact = suspension.tangent_at(&d).expect("the same");
-            assert!((tangent - exact).norm() < 1e-9 * exact.norm());
-            for axis in 0..6 {
-                let miss = found[axis] - wrench.to_array()[axis];
-                assert!(miss.abs() < 1e-6, "{} axis {axis}: {miss}", direction.name);
-            }
-            tried += 1;
+    for (name, wrench, pose) in loads(8, &[0.25, 0.5, 0.75, 1.0]) {
+        let d = Displacement::of_pose(&pose, suspension.at_mm());
+        assert!(springs.can_stand(&pose), "{name}");
+        let (found, tangent) = springs.wrench(&d).expect("a pose that the springs have");
+        let exact = suspension.tangent_at(&d).expect("the same");
+        assert!((tangent - exact).norm() < 1e-9 * exact.norm());
+        for axis in 0..6 {
+            let miss = found[axis] - wrench.to_array()[axis];
+            assert!(miss.abs() < 1e-6, "{name} axis {axis}: {miss}");
         }
+        tried += 1;
     }
     assert!(tried > 150, "{tried}");
 }

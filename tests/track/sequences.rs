@@ -232,13 +232,18 @@ fn manoeuvre(number: u64) -> (Rigid, f64, f64) {
     (pose, 0.9 * wave(1.3, 0.0), 0.15 * wave(1.7, 0.3))
 }
 
-// 10,000 frames of pressing, shearing, twisting: every dot that is seen is the one that it is called.
+/// So many frames, or as many as the environment's DOMECAST_FRAMES asks for.
+fn frames_or(default: u64) -> u64 {
+    std::env::var("DOMECAST_FRAMES").map_or(default, |n| n.parse().expect("a number of frames"))
+}
+
+// Pressing, shearing, twisting: every dot that is seen is the one that it is called. Also run over 10,000 frames.
 #[test]
-fn long_none_is_mislabelled_in_ten_thousand_frames() {
+fn long_none_is_mislabelled_over_thousands_of_frames() {
     let missing = [3, 40, 41, 120];
     let mut tracker = tracker(TrackOptions::default());
     let (mut square, mut count, mut wanted) = (0.0, 0.0, 0.0);
-    for number in 0..10_000_u64 {
+    for number in 0..frames_or(3_000) {
         let (pose, shear, twist) = manoeuvre(number);
         let shear = sheared(shear);
         let displace = |p: DVec3| {
@@ -261,9 +266,9 @@ fn long_none_is_mislabelled_in_ten_thousand_frames() {
     assert!(rms.sqrt() < 0.05 && count > 0.999 * wanted, "{} {}", rms.sqrt(), count / wanted);
 }
 
-// Memory over 100,000 frames: the buffers of the first are those of the last.
+// Memory: the buffers of the first frames are those of the last. Also run over 100,000 frames.
 #[test]
-fn long_memory_is_flat_over_a_hundred_thousand_frames() {
+fn long_memory_is_flat_over_thousands_of_frames() {
     let frames: Vec<_> = (0..6)
         .map(|k| drawn(&Picture { seed: k, ..still(pose([0.0, 0.0, -0.1 * k as f64], [0.0; 3])) }))
         .collect();
@@ -272,7 +277,7 @@ fn long_memory_is_flat_over_a_hundred_thousand_frames() {
         tracker.track(number, &frame(&frames[number as usize % 6].bytes));
     }
     let counted = allocation_counter::measure(|| {
-        for number in 12..100_000_u64 {
+        for number in 12..frames_or(20_000) {
             tracker.track(number, &frame(&frames[number as usize % 6].bytes));
         }
     });

@@ -139,3 +139,69 @@ pub fn png_of(width: usize, height: usize, channels: usize, bytes: &[u8]) -> Res
     writer.finish().map_err(|e| e.to_string())?;
     Ok(out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Files that are whole: PNG, JPEG, PGM, PPM.
+    fn files() -> [Vec<u8>; 4] {
+        let bytes: Vec<u8> = (0..32 * 24 * 3).map(|i| (i % 251) as u8).collect();
+        let mut pgm = b"P5\n32 24\n255\n".to_vec();
+        pgm.extend(&bytes[..32 * 24]);
+        let mut ppm = b"P6 # a comment\n32 24 255\n".to_vec();
+        ppm.extend(&bytes);
+        let jpeg = include_bytes!("../../../tests/cases/tiny.jpg").to_vec();
+        [png_of(32, 24, 3, &bytes).unwrap(), jpeg, pgm, ppm]
+    }
+
+    #[test]
+    fn whole_files_are_read_and_cut_ones_named() {
+        for file in files() {
+            let whole = picture(&file).unwrap();
+            assert_eq!((whole.width, whole.height), (32, 24));
+            assert_eq!(whole.bytes.len(), 32 * 24 * whole.channels);
+            for part in [0, 1, 2, 8, file.len() / 2, file.len() - 40] {
+                assert!(picture(&file[..part]).is_err(), "{part} of {}", file.len());
+            }
+        }
+    }
+
+    // Bytes changed, cut out and doubled at random: a picture of its own size, or an error; never a panic.
+    #[test]
+    fn corrupt_files_do_no_harm() {
+        let mut state = 88_172_645_463_325_252_u64;
+        let mut random = move |end: usize| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state % end as u64) as usize
+        };
+        let mut refused = 0;
+        let files = files();
+        for round in 0..8_000 {
+            let mut file = files[round % 4].clone();
+            for _ in 0..1 + random(8) {
+                let at = random(file.len());
+                match random(8) {
+                    0 => drop(file.drain(at..(at + random(16)).min(file.len()))),
+                    1 => file.insert(at, random(256) as u8),
+                    // Most in the head, where sizes and tables are.
+                    2..5 => file[at.min(40)] = random(256) as u8,
+                    _ => file[at] = random(256) as u8,
+                }
+                if file.len() < 8 {
+                    break;
+                }
+            }
+            match picture(&file) {
+                Ok(whole) => assert_eq!(whole.bytes.len(), whole.width * whole.height * whole.channels),
+                Err(problem) => {
+                    assert!(!problem.is_empty());
+                    refused += 1;
+                }
+            }
+        }
+        assert!(refused > 2_000, "{refused}");
+    }
+}

@@ -91,8 +91,8 @@ pub struct TrackArguments {
     /// Search the whole frame at least every so many frames; 0: only when needed.
     #[arg(long, default_value_t = 30)]
     search_every: u32,
-    /// Largest rms of the white markers' residuals with which the constants pass for the camera's, px.
-    #[arg(long, default_value_t = 1.0)]
+    /// Largest rms of the white markers' residuals that is still a pose, px.
+    #[arg(long, default_value_t = 2.0)]
     most_residual_px: f64,
 }
 

@@ -1,7 +1,8 @@
 """`domecast track` beside the paper's runtime in Python-OpenCV, on the same simulated frames, one core each.
 
-    python3 scripts/compare_tracking.py target/release/domecast output/thumb24/constants/constants.json SEQUENCE ...
+    python3 scripts/compare_tracking.py [--noise LEVELS] target/release/domecast output/thumb24/constants/constants.json SEQUENCE ...
 
+`--noise` adds Gaussian noise of that standard deviation to every value of every frame (seeded), for scenes that have none.
 A sequence is a folder of `domecast simulate`: frames and truth.jsonl. Prints one table: error of the dots (px, raw frame,
 rms on each axis, against the truth's centroids) and of the wrench, frames with an answer, time a frame.
 The peer's dots are matched to the truth by the nearest, which favours it: it has no identities of its own; its flow's
@@ -93,11 +94,28 @@ def wrench_lines(name, errors):
     return f"  {name:<22} {len(errors):>4} frames: " + "  ".join(words)
 
 
-program, constants_path, *folders = sys.argv[1:]
+def noisy(frames, levels, folder):
+    """The frames with noise, in another folder."""
+    random, made = np.random.default_rng(1), []
+    for path in frames:
+        picture = cv2.imread(str(path)).astype(np.float32)
+        picture = np.clip(np.rint(picture + random.normal(0, levels, picture.shape)), 0, 255).astype(np.uint8)
+        made.append(pathlib.Path(folder) / path.name)
+        cv2.imwrite(str(made[-1]), picture)
+    return made
+
+
+arguments, noise = sys.argv[1:], 0.0
+if arguments[:1] == ["--noise"]:
+    noise, arguments = float(arguments[1]), arguments[2:]
+program, constants_path, *folders = arguments
 constants = json.loads(pathlib.Path(constants_path).read_text())
 for folder in map(pathlib.Path, folders):
     frames = sorted(folder.glob("frame_*.png"))
     truth = [json.loads(line) for line in (folder / "truth.jsonl").read_text().splitlines()]
+    with_noise = tempfile.TemporaryDirectory()
+    if noise:
+        frames = noisy(frames, noise, with_noise.name)
     # Once each to warm up, then turn about; the medians of all.
     peer_times, our_times, our_p99 = [], [], []
     for _ in range(3):

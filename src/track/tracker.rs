@@ -30,6 +30,8 @@ const MARKER_REACH: f64 = 0.9;
 const MARKER_REACH_PX: f64 = 14.0;
 /// A fit may go so far from its candidate, px.
 const FIT_REACH_PX: f64 = 4.0;
+/// Markers that are looked for again from the pose of the others.
+const MOST_AGAIN: usize = 8;
 /// Candidates for each marker, and combinations of them that are tried.
 const CANDIDATES: usize = 4;
 const MOST_COMBINATIONS: usize = 96;
@@ -277,6 +279,12 @@ impl Tracker {
         if let Some(pose) = self.pose {
             self.markers_near(plane, &pose);
             refined = self.refine_seen(&pose);
+            if let Some(found) = &refined
+                && self.discs.iter().any(Option::is_none)
+            {
+                let found = found.pose;
+                refined = self.markers_left(plane, &found).or(refined);
+            }
         }
         if refined.is_none() {
             refined = self.markers_anywhere(plane);
@@ -330,6 +338,38 @@ impl Tracker {
                     *disc = view.fit(plane, best[0].1, FIT_REACH_PX, None);
                 }
             }
+        }
+    }
+
+    /// Looks for the markers that were not found where the pose of the others puts them; `None` if none is there.
+    fn markers_left(&mut self, plane: &Plane<'_>, pose: &Rigid) -> Option<Refined> {
+        self.optics.move_to(pose).ok()?;
+        let mut more = [None; MOST_AGAIN];
+        let mut count = 0;
+        for (index, (marker, disc)) in self.model.markers.iter().zip(&mut self.discs).enumerate() {
+            if disc.is_some() || count == MOST_AGAIN {
+                continue;
+            }
+            let Ok(image) = marker.image(&self.optics) else { continue };
+            let Some(view) = View::new(&self.optics, marker) else { continue };
+            *disc = view.fit(plane, image.centroid_px, FIT_REACH_PX, None);
+            if disc.is_some() {
+                more[count] = Some(index);
+                count += 1;
+            }
+        }
+        if count == 0 {
+            return None;
+        }
+        let refined = self.refine_seen(pose);
+        if refined.is_none() {
+            // What was there was no marker.
+            for index in more.into_iter().flatten() {
+                self.discs[index] = None;
+            }
+            self.refine_seen(pose)
+        } else {
+            refined
         }
     }
 

@@ -17,6 +17,8 @@ const GROUND_PX: f64 = 2.6;
 /// Pixels so far from every outline are flat: what is left of them is noise.
 const FLAT_PX: f64 = 1.6;
 const MOST_STEPS: u32 = 12;
+/// Steps from a place in a disc to its middle.
+const CENTER_STEPS: u32 = 6;
 /// A step below this ends the fit, px; the next one would be a tenth of it.
 const SETTLED_PX: f64 = 4e-3;
 /// Least difference between marker and ground, levels.
@@ -76,8 +78,8 @@ impl View {
         })
     }
 
-    /// By how much the middle is brighter than what is around, levels.
-    fn rise(&self, plane: &Plane<'_>, x: i32, y: i32) -> f64 {
+    /// Levels of the middle and of what is around, where the first is brighter.
+    fn levels(&self, plane: &Plane<'_>, x: i32, y: i32) -> Option<[f64; 2]> {
         let mut middle = 0;
         for dy in -1..=1 {
             for dx in -1..=1 {
@@ -95,10 +97,47 @@ impl View {
                 }
             }
             if 9 * top[3] >= middle {
-                return 0.0;
+                return None;
             }
         }
-        f64::from(middle) / 9.0 - f64::from(top[3])
+        Some([f64::from(middle) / 9.0, f64::from(top[3])])
+    }
+
+    /// By how much the middle is brighter than what is around, levels.
+    fn rise(&self, plane: &Plane<'_>, x: i32, y: i32) -> f64 {
+        self.levels(plane, x, y).map_or(0.0, |[middle, around]| middle - around)
+    }
+
+    /// The middle of what is as bright as a place, in an outline of the marker's size that moves with it.
+    fn center(&self, plane: &Plane<'_>, start: DVec2) -> DVec2 {
+        let (x, y) = (start.x.round() as i32, start.y.round() as i32);
+        let Some([middle, around]) = self.levels(plane, x, y) else { return start };
+        let level = 0.5 * (middle + around);
+        let mut at = start;
+        for _ in 0..CENTER_STEPS {
+            let (cx, cy) = (at.x.round() as i32, at.y.round() as i32);
+            let (mut sum, mut count) = (DVec2::ZERO, 0.0);
+            for y in cy - self.half..=cy + self.half {
+                for x in cx - self.half..=cx + self.half {
+                    let place = DVec2::new(f64::from(x), f64::from(y));
+                    let inside = (self.mm_by_px * (place - at)).length() <= 1.1 * self.radius_mm;
+                    if inside && f64::from(plane.at(x, y)) > level {
+                        sum += place;
+                        count += 1.0;
+                    }
+                }
+            }
+            if count == 0.0 {
+                return start;
+            }
+            let next = sum / count;
+            let moved = next.distance(at);
+            at = next;
+            if moved < 0.3 {
+                break;
+            }
+        }
+        at
     }
 
     /// The places within `reach_px` of `start` that look most like a marker, the best first, at least its own size
@@ -151,6 +190,10 @@ impl View {
             }
         }
         out[..count].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        // A disc is as bright all over: where in it the scan met it first says little.
+        for (_, at) in &mut out[..count] {
+            *at = self.center(plane, *at);
+        }
         count
     }
 
@@ -200,7 +243,7 @@ impl View {
         let rms = (left / (count - 5.0).max(1.0)).max(1.0 / 12.0).sqrt();
         // What is a disc, perhaps beside a dome brighter than it, leaves a small part of that unexplained.
         let contrast = rise.max(0.5 * levels[2].abs());
-        if !settled || !(rise > LEAST_RISE && rms < 0.25 * contrast) {
+        if !(settled && rise > LEAST_RISE && rms < 0.25 * contrast) {
             return None;
         }
         let inverse = with_floor(&normal).cholesky()?.inverse();

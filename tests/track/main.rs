@@ -1,4 +1,6 @@
 //! The runtime on frames: pictures drawn from the constants, and sequences of the simulator.
+// What a helper cannot do fails its test.
+#![allow(clippy::unwrap_used)]
 
 mod bad;
 mod program;
@@ -237,9 +239,8 @@ fn the_constants_give_the_wrench() {
         let (found, tangent) = springs.wrench(&d).expect("a pose that the springs have");
         let exact = suspension.tangent_at(&d).expect("the same");
         assert!((tangent - exact).norm() < 1e-9 * exact.norm());
-        for axis in 0..6 {
-            let miss = found[axis] - wrench.to_array()[axis];
-            assert!(miss.abs() < 1e-6, "{name} axis {axis}: {miss}");
+        for (axis, (found, wanted)) in found.iter().zip(wrench.to_array()).enumerate() {
+            assert!((found - wanted).abs() < 1e-6, "{name} axis {axis}: {found} for {wanted}");
         }
         tried += 1;
     }

@@ -124,7 +124,7 @@ impl Stencil {
 fn window_at(square: f32, reach_px: f32) -> f32 {
     let end = reach_px + 0.5;
     // Linear in the square: a root less, and no different over one pixel.
-    ((end * end - square) / (2.0 * reach_px)).max(0.0).min(1.0)
+    ((end * end - square) / (2.0 * reach_px)).clamp(0.0, 1.0)
 }
 
 /// Measures spots; keeps its stencils and its buffers.
@@ -271,7 +271,7 @@ impl Sums {
                 for k in 0..LANES {
                     let dx = columns[k] - cx;
                     let square = dx * dx + dy * dy;
-                    let weight = ((end - square) * per).max(0.0).min(1.0) * values[k];
+                    let weight = ((end - square) * per).clamp(0.0, 1.0) * values[k];
                     weights[k] += weight;
                     xs[k] += weight * dx;
                     ys[k] += weight * dy;

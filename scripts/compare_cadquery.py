@@ -23,7 +23,7 @@ import time
 CADQUERY = '''
 import json, math, sys
 import cadquery as cq
-d = json.load(open(sys.argv[1])); out = sys.argv[2]; want = sys.argv[3]; tol = d["mesh"]["chord_tolerance_mm"]
+d = json.load(open(sys.argv[1])); out = sys.argv[2]; want = sys.argv[3]; tol = d.get("mesh", {}).get("chord_tolerance_mm", 0.01)
 ring = d["springs"]["places"]["ring"]; m = d["magnets"]; p = d["magnet_pockets"]; leds = d["leds"]
 axes = [(ring["radius_mm"] * math.cos(math.radians(ring["first_azimuth_deg"]) + 2 * math.pi * i / ring["count"]),
          ring["radius_mm"] * math.sin(math.radians(ring["first_azimuth_deg"]) + 2 * math.pi * i / ring["count"]))

@@ -10,5 +10,7 @@ pub mod casting {}
 pub mod force {}
 #[doc = include_str!("guide/tracking.md")]
 pub mod tracking {}
+#[doc = include_str!("guide/accuracy.md")]
+pub mod accuracy {}
 #[doc = include_str!("guide/formats.md")]
 pub mod formats {}

@@ -22,9 +22,10 @@
 //! | find blobs in a camera's frames | [`frames`] |
 //! | write and read what the runtime needs | [`constants`] |
 //! | replace nominal numbers by measured ones | [`calibrate`] |
+//! | see what accuracy costs in time | [`accuracy`] |
 //! | do all of it | [`build`], and [`report`] for its page; [`compare`] two of them |
 //!
-//! Formulas and their sources stand with the functions; [`guide`] tells the six subjects in one page each.
+//! Formulas and their sources stand with the functions; [`guide`] tells the subjects in one page each.
 //!
 //! # In five lines
 //!
@@ -39,6 +40,7 @@
 //! ```
 pub use glam;
 
+pub mod accuracy;
 pub mod artwork;
 pub mod build;
 pub mod calibrate;

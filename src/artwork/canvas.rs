@@ -5,7 +5,7 @@ use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
 use crate::layout::outline::Outline;
 
-pub(super) fn color([r, g, b]: [u8; 3]) -> Color {
+pub(crate) fn color([r, g, b]: [u8; 3]) -> Color {
     Color::from_rgba8(r, g, b, 255)
 }
 
@@ -33,20 +33,20 @@ fn run(corners: &[DVec2], close: bool) -> Option<tiny_skia::Path> {
     builder.finish()
 }
 
-pub(super) fn fill(picture: &mut Pixmap, corners: &[DVec2], rgb: [u8; 3]) {
+pub(crate) fn fill(picture: &mut Pixmap, corners: &[DVec2], rgb: [u8; 3]) {
     if let Some(path) = run(corners, true) {
         picture.fill_path(&path, &paint(rgb), FillRule::Winding, Transform::identity(), None);
     }
 }
 
-pub(super) fn stroke(picture: &mut Pixmap, corners: &[DVec2], close: bool, width_px: f32, rgb: [u8; 3]) {
+pub(crate) fn stroke(picture: &mut Pixmap, corners: &[DVec2], close: bool, width_px: f32, rgb: [u8; 3]) {
     if let Some(path) = run(corners, close) {
         let stroke = Stroke { width: width_px, ..Stroke::default() };
         picture.stroke_path(&path, &paint(rgb), &stroke, Transform::identity(), None);
     }
 }
 
-pub(super) fn fill_outline(picture: &mut Pixmap, outline: &Outline, rgb: [u8; 3]) {
+pub(crate) fn fill_outline(picture: &mut Pixmap, outline: &Outline, rgb: [u8; 3]) {
     let mut builder = PathBuilder::new();
     let (x, y) = canvas(outline.start());
     builder.move_to(x, y);

@@ -4,13 +4,13 @@
 //! each writer spells it in its format without deciding anything.
 
 mod camera_view;
-mod canvas;
+pub(crate) mod canvas;
 pub mod drawing;
 mod dxf_file;
 mod film;
 mod outside_view;
 mod pdf_file;
-mod strokes;
+pub(crate) mod strokes;
 mod svg_file;
 #[cfg(test)]
 mod tests;
@@ -102,7 +102,7 @@ fn film_files(
     Ok([
         file("svg", to_svg(drawing)),
         file("pdf", to_pdf(drawing)?),
-        file("dxf", to_dxf(drawing, spec.print.outline_tolerance_mm)?),
+        file("dxf", to_dxf(drawing, spec.print.outline_mm())?),
         file("tif", to_tiff(drawing, spec.print.dpi)?),
     ])
 }

@@ -17,7 +17,7 @@ const PEN: f64 = 0.7;
 
 /// The strokes of a line of text, mm: base line at `at`, capitals `height_mm` high. A character that has no
 /// glyph is drawn as an empty box.
-pub(super) fn strokes(words: &str, at: DVec2, height_mm: f64) -> Vec<Vec<DVec2>> {
+pub(crate) fn strokes(words: &str, at: DVec2, height_mm: f64) -> Vec<Vec<DVec2>> {
     let scale = height_mm / HEIGHT;
     let mut lines = Vec::new();
     for (i, letter) in words.chars().enumerate() {
@@ -34,7 +34,7 @@ pub(super) fn strokes(words: &str, at: DVec2, height_mm: f64) -> Vec<Vec<DVec2>>
 }
 
 /// The strokes of a text where it stands in its drawing, mm.
-pub(super) fn of_text(text: &Text) -> Vec<Vec<DVec2>> {
+pub(crate) fn of_text(text: &Text) -> Vec<Vec<DVec2>> {
     let back = match text.anchor {
         Anchor::Start => 0.0,
         Anchor::Middle => 0.5 * width_mm(&text.words, text.height_mm),
@@ -43,7 +43,7 @@ pub(super) fn of_text(text: &Text) -> Vec<Vec<DVec2>> {
 }
 
 /// Width of the pen that draws letters of this height, mm.
-pub(super) fn pen_mm(height_mm: f64) -> f64 {
+pub(crate) fn pen_mm(height_mm: f64) -> f64 {
     PEN * height_mm / HEIGHT
 }
 

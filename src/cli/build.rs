@@ -43,10 +43,17 @@ fn once(output: &Output, design_file: &Path, out: Option<&Path>, watched: bool) 
     let began = Instant::now();
     output.step("reading the design");
     let design = design::load(design_file)?;
-    let mut result = build::build(&design, &mut |doing| output.step(doing)).map_err(|error| match error {
+    // what each step took, so that a person sees what their settings cost
+    let mut steps: Vec<(String, Instant)> = Vec::new();
+    let mut on_step = |doing: &str| {
+        steps.push((doing.to_owned(), Instant::now()));
+        output.step(doing);
+    };
+    let mut result = build::build(&design, &mut on_step).map_err(|error| match error {
         BuildError::Design(error) => Failure::from(error.in_file(design_file)),
         BuildError::Ours(what) => Failure::Internal(what),
     })?;
+    let built = Instant::now();
     if watched {
         result.keep_fresh();
     }
@@ -54,7 +61,18 @@ fn once(output: &Output, design_file: &Path, out: Option<&Path>, watched: bool) 
     output.step("writing");
     result.tree.write(&out).map_err(Failure::Write)?;
     output.steps_done();
-    tell(output, &result, &out, began.elapsed())
+    tell(output, &result, &out, began.elapsed())?;
+    if design.settings().any_chosen() {
+        output.say("exactness, as chosen from `accuracy`:")?;
+        for line in design.settings().lines() {
+            output.say(&format!("  {line}"))?;
+        }
+        let ends = steps.iter().skip(1).map(|(_, start)| *start).chain([built]);
+        for ((doing, start), end) in steps.iter().zip(ends) {
+            output.say(&format!("  {:.2} s {doing}", (end - *start).as_secs_f64()))?;
+        }
+    }
+    Ok(())
 }
 
 fn tell(output: &Output, result: &Build, out: &Path, took: Duration) -> Result<(), Failure> {

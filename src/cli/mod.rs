@@ -1,5 +1,6 @@
 //! Arguments, progress, messages and exit codes: the only place that prints.
 
+mod accuracy;
 mod build;
 mod calibrate_force;
 mod calibrate_optics;
@@ -48,6 +49,17 @@ enum Command {
         /// Build again whenever the design file is saved, and keep the open page fresh.
         #[arg(long)]
         watch: bool,
+    },
+    /// Show what accuracy costs in time: every dial of the design, measured on this machine.
+    Accuracy {
+        /// The design file.
+        design: PathBuf,
+        /// Where to write [default: output/<design name>-accuracy].
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// A first look in a few seconds: fewer runs, no rungs that take long.
+        #[arg(long)]
+        quick: bool,
     },
     /// Write a starting design in which every field has its reason, and the schema for editors beside it.
     New {
@@ -200,6 +212,7 @@ pub fn run() -> ExitCode {
 fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
     match command {
         Command::Build { design, out, watch } => build::run(output, design, out.as_deref(), *watch),
+        Command::Accuracy { design, out, quick } => accuracy::run(output, design, out.as_deref(), *quick),
         Command::New { name, from, out } => new::run(output, name, from.as_deref(), out.as_deref()),
         Command::Explain { field, design } => explain::run(output, field, design.as_deref()),
         Command::Compare { a, b } => compare::run(output, a, b),

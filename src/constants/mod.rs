@@ -26,6 +26,7 @@ pub use model::{
     OpticsConstants, PlainRuntime, SpringConstants, StiffnessAt, VERSION, WhiteMarker,
 };
 pub use plain::{Bias, PlainError, PlainFit, PlainInput};
+pub use plain_pnp::PlainRuntimeSolver;
 pub use resolution::{
     DesignChoice, POSE_AXES, Resolution, WRENCH_AXES, design_choices, resolution_at, spec_of,
 };

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::loads::PosedLoad;
 use super::model::StiffnessAt;
-use super::plain_pnp::{Frame, Plain, run, undistorted};
+use super::plain_pnp::{Frame, PlainRuntimeSolver, run, undistorted};
 use super::springs::{matrix_of, rows, stiffness_between};
 use crate::mechanics::Displacement;
 use crate::numeric::Rigid;
@@ -193,7 +193,7 @@ fn apparent(
 /// Moves all positions as one so that plain PnP is right at rest.
 fn settle_at_rest(input: &PlainInput, points: &mut [DVec3], rest: &Frame) -> Result<(), PlainError> {
     for _ in 0..4 {
-        let found = Plain::new(input, points)?.pose(&rest.sightings)?;
+        let found = PlainRuntimeSolver::new(input, points)?.pose(&rest.sightings)?;
         let off = input.optics.rest_from_camera().compose(&found);
         for point in points.iter_mut() {
             *point = off.point(*point);

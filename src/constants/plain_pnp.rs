@@ -19,11 +19,15 @@ pub(super) struct Frame {
 }
 
 /// A plain runtime: pinhole, no layers, markers at the positions it is given.
-pub(super) struct Plain {
+pub struct PlainRuntimeSolver {
     solver: PoseSolver,
 }
 
-impl Plain {
+impl PlainRuntimeSolver {
+    /// The runtime that is given these positions of the markers.
+    ///
+    /// # Errors
+    /// Markers or a matrix that no pose can be found with.
     pub fn new(input: &PlainInput, positions_mm: &[DVec3]) -> Result<Self, PlainError> {
         let lens = input.optics.lens().spec();
         let spec = OpticsSpec {
@@ -53,7 +57,21 @@ impl Plain {
         Ok(Self { solver: PoseSolver::new(&optics, &markers, options).map_err(PlainError::Pose)? })
     }
 
+    /// Centroids of the raw frame as the runtime's undistorted one shows them; `None` where the lens has no ray.
+    pub fn undistorted(&self, optics: &SensorOptics, raw: &[Sighting]) -> Option<Vec<Sighting>> {
+        let [[fx, _, cx], [_, fy, cy], _] = self.solver.optics().lens().spec().matrix;
+        let straight = |seen: &Sighting| {
+            let ray = optics.lens().unproject(seen.centroid_px).ok().filter(|ray| ray.z > 0.0)?;
+            let centroid_px = DVec2::new(fx * ray.x / ray.z + cx, fy * ray.y / ray.z + cy);
+            Some(Sighting { id: seen.id, centroid_px })
+        };
+        raw.iter().map(straight).collect()
+    }
+
     /// `camera_from_sensor` as solvePnP would say.
+    ///
+    /// # Errors
+    /// Fewer than four markers, or none that fit a plane.
     pub fn pose(&self, sightings: &[Sighting]) -> Result<Rigid, PlainError> {
         let found = self.solver.solve(sightings).map_err(PlainError::Pose)?;
         Ok(self.solver.optics().rest_from_camera().inverse().compose(&found.pose))
@@ -87,7 +105,7 @@ pub(super) fn run(
     seen: &[Frame],
     rest: &Frame,
 ) -> Result<(Rigid, Vec<Vector6<f64>>), PlainError> {
-    let plain = Plain::new(input, positions_mm)?;
+    let plain = PlainRuntimeSolver::new(input, positions_mm)?;
     let rest_pose = plain.pose(&rest.sightings)?;
     let from_rest = rest_pose.inverse();
     let displacement = |frame: &Frame| {

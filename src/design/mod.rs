@@ -11,6 +11,7 @@ mod resolve;
 mod rules;
 mod schema;
 pub mod sections;
+pub mod settings;
 mod source;
 mod suspicions;
 #[cfg(test)]

@@ -6,6 +6,7 @@ use serde_json::json;
 use super::error::DesignError;
 use super::rules;
 use super::sections::{CameraSection, DesignFile, DomeSection, ModelName, OpticsSection, SpringPlaces};
+use super::settings::Settings;
 use super::suspicions::suspicions;
 use crate::camera::{LensSpec, Model};
 use crate::numeric::Rigid;
@@ -31,10 +32,12 @@ pub struct Design {
     optics: SensorOptics,
     warnings: Vec<DesignWarning>,
     suspicions: Vec<DesignWarning>,
+    pub(super) settings: Settings,
 }
 
 impl Design {
-    /// The sections as written; every rule between them holds.
+    /// The sections as written, with the settings that the file leaves to its `accuracy`; every rule between them
+    /// holds.
     pub fn sections(&self) -> &DesignFile {
         &self.sections
     }
@@ -186,14 +189,19 @@ pub(super) fn optics(
 }
 
 /// Checks the rules between fields and computes what follows from them.
-pub(super) fn resolve(sections: DesignFile, text: &str) -> Result<Design, DesignError> {
+pub(super) fn resolve(mut sections: DesignFile, text: &str) -> Result<Design, DesignError> {
     check_name(&sections.name)?;
     let optics = optics(&sections.camera, &sections.optics, &sections.dome)
         .map_err(|fault| beside(fault, &suspicions(&sections, None)))?;
     let suspicions = suspicions(&sections, Some(&optics));
     let warnings =
         field_of_view_warning(&sections.camera, &optics).into_iter().chain(suspicions.clone()).collect();
-    let design = Design { sections, text: text.to_owned(), optics, warnings, suspicions };
+    let settings = Settings::of(&sections, &optics).map_err(|fault| beside(fault, &suspicions))?;
+    sections.print.outline_tolerance_mm = Some(settings.outline_tolerance_mm.value);
+    sections.mesh.chord_tolerance_mm = Some(settings.chord_tolerance_mm.value);
+    sections.mesh.optical_chord_tolerance_mm = Some(settings.optical_chord_tolerance_mm.value);
+    sections.tolerances.samples = Some(settings.samples.value);
+    let design = Design { sections, text: text.to_owned(), optics, warnings, suspicions, settings };
     rules::check(&design).map_err(|fault| design.beside_suspicions(fault))?;
     Ok(design)
 }

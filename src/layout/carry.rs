@@ -30,7 +30,7 @@ pub(super) fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
         frame,
         transfer: &transfer,
         size,
-        outline_tolerance_mm: spec.print.outline_tolerance_mm,
+        outline_tolerance_mm: spec.print.outline_mm(),
     };
     let center_px = center(spec, &frame)?;
     let mut warnings = Vec::new();

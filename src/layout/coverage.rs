@@ -154,7 +154,7 @@ impl Sight<'_> {
             frame: EvenFrame::new(self.spec.optics.lens(), self.spec.pattern.even_in, self.spec.undistorted),
             transfer: &layout.transfer,
             size: layout.size,
-            outline_tolerance_mm: self.spec.print.outline_tolerance_mm,
+            outline_tolerance_mm: self.spec.print.outline_mm(),
         };
         let looked_at: Vec<Result<f64, Reason>> =
             layout.dots.par_iter().map(|dot| self.dot(&carrier, dot)).collect();

@@ -138,6 +138,33 @@ impl DotCurve<'_> {
 }
 
 impl Carrier<'_> {
+    /// A dot's outline on the plate of a hit, as `hit_from_sensor` turns the dome under the pad, drawn as closely as
+    /// `tolerance_mm` asks.
+    ///
+    /// # Errors
+    /// Why the dot has none.
+    pub fn plate_outline(
+        &self,
+        dot: &Dot,
+        hit_from_sensor: DMat3,
+        tolerance_mm: f64,
+    ) -> Result<Outline, Reason> {
+        plate_outline(&self.curve(dot.even_px, dot.surface_mm), self.transfer, hit_from_sensor, tolerance_mm)
+    }
+
+    /// The exact curve that the outline follows, at an angle; mm and mm per rad.
+    ///
+    /// # Errors
+    /// Why there is no such point.
+    pub fn plate_point(
+        &self,
+        dot: &Dot,
+        hit_from_sensor: DMat3,
+        angle_rad: f64,
+    ) -> Result<CurvePoint, Reason> {
+        plate_point(&self.curve(dot.even_px, dot.surface_mm), self.transfer, hit_from_sensor, angle_rad)
+    }
+
     pub(super) fn curve(&self, even_px: DVec2, surface_mm: DVec3) -> DotCurve<'_> {
         match self.size {
             DotSize::Apparent(diameter) => {
@@ -182,19 +209,23 @@ pub(super) fn plate_outline(
     hit_from_sensor: DMat3,
     tolerance_mm: f64,
 ) -> Result<Outline, Reason> {
-    let (outline, fit) = Outline::of_curve(
-        |angle| {
-            let (point, slope) = curve.on_dome(angle)?;
-            let plate = transfer
-                .plate_from_dome_with_slope(hit_from_sensor * point)
-                .map_err(Reason::BeyondTransfer)?;
-            let slope = hit_from_sensor * slope;
-            let [x, y] = plate.plate_from_dome;
-            Ok(CurvePoint { at: plate.plate_mm, slope: DVec2::new(x.dot(slope), y.dot(slope)) })
-        },
-        tolerance_mm,
-    )?;
+    let (outline, fit) =
+        Outline::of_curve(|angle| plate_point(curve, transfer, hit_from_sensor, angle), tolerance_mm)?;
     if fit.reached { Ok(outline) } else { Err(Reason::NotSmooth { error_mm: fit.error }) }
+}
+
+fn plate_point(
+    curve: &DotCurve<'_>,
+    transfer: &TransferMap,
+    hit_from_sensor: DMat3,
+    angle_rad: f64,
+) -> Result<CurvePoint, Reason> {
+    let (point, slope) = curve.on_dome(angle_rad)?;
+    let plate =
+        transfer.plate_from_dome_with_slope(hit_from_sensor * point).map_err(Reason::BeyondTransfer)?;
+    let slope = hit_from_sensor * slope;
+    let [x, y] = plate.plate_from_dome;
+    Ok(CurvePoint { at: plate.plate_mm, slope: DVec2::new(x.dot(slope), y.dot(slope)) })
 }
 
 /// Two unit vectors across a unit axis, the first level and the second uphill; right-handed with the axis.

@@ -71,7 +71,7 @@ fn rings_of(
             let diameter_mm = if spoke == 0 && ring > 0 { BOLD * diameter_mm } else { diameter_mm };
             let curve = DotCurve::on_dome_of(radius_mm, surface_mm, diameter_mm);
             let placed = transfer.plate_from_dome(surface_mm);
-            let outline = plate_outline(&curve, transfer, DMat3::IDENTITY, print.outline_tolerance_mm);
+            let outline = plate_outline(&curve, transfer, DMat3::IDENTITY, print.outline_mm());
             // A mark that the map does not hold is no part of the target; the ids of the others stay.
             if let (Ok(plate_mm), Ok(outline)) = (placed, outline) {
                 let id = if ring == 0 { 0 } else { 3 * ring * (ring - 1) + 1 + spoke };
@@ -84,17 +84,13 @@ fn rings_of(
 
 /// Narrowest gap between two marks on the plate, mm, by the circles around their outlines.
 fn narrowest_gap_mm(marks: &[TargetMark]) -> f64 {
-    let half = |mark: &TargetMark| 0.5 * mark.outline.widths().1;
+    let half: Vec<f64> = marks.iter().map(|mark| 0.5 * mark.outline.widths().1).collect();
     let mut least = f64::INFINITY;
-    for (i, a) in marks.iter().enumerate() {
-        for b in &marks[..i] {
+    for (i, (a, half_a)) in marks.iter().zip(&half).enumerate() {
+        for (b, half_b) in marks[..i].iter().zip(&half) {
             // Only neighbours along a ring or from ring to ring can be near.
-            if a.ring - b.ring <= 1 {
-                let polygons = || super::zones::gap(&a.outline.polygon(4), &b.outline.polygon(4));
-                let apart = a.plate_mm.distance(b.plate_mm) - half(a) - half(b);
-                if apart < least {
-                    least = least.min(polygons());
-                }
+            if a.ring - b.ring <= 1 && a.plate_mm.distance(b.plate_mm) - half_a - half_b < least {
+                least = least.min(super::zones::gap(&a.outline.polygon(4), &b.outline.polygon(4)));
             }
         }
     }

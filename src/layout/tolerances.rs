@@ -74,17 +74,8 @@ pub fn under_tolerances(
     let image: Vec<_> = layout.dots.iter().map(|dot| Some(dot.image_px)).collect();
     let followed = Followed::new(layout);
     let own = evenness_of(layout, followed.chosen(), &image, in_plane, |_, _| true)?.nearest.variation;
-    let draw = |only: Option<usize>, count: u32| -> Vec<Option<(f64, f64)>> {
-        let stream = only.map_or(0, |index| index as u64 + 1) << 32;
-        (0..count)
-            .into_par_iter()
-            .map(|sample| {
-                let mut chance = Chance::new(tolerances.seed, stream + u64::from(sample));
-                sensor(spec, layout, &followed, tolerances, only, &mut chance)
-            })
-            .collect()
-    };
-    let drawn = draw(None, tolerances.samples);
+    let draw = |only: Option<usize>, count: u32| draw(spec, layout, &followed, tolerances, only, count);
+    let drawn = draw(None, tolerances.sensors());
     let mut variations: Vec<f64> = drawn.iter().flatten().map(|(variation, _)| *variation).collect();
     variations.sort_by(f64::total_cmp);
     let at = |share: f64| {
@@ -97,7 +88,7 @@ pub fn under_tolerances(
     };
     let mut ranking: Vec<ToleranceShare> = (0..TOLERANCES.len())
         .map(|index| {
-            let alone = draw(Some(index), tolerances.samples.min(RANKING_SAMPLES));
+            let alone = draw(Some(index), tolerances.sensors().min(RANKING_SAMPLES));
             let squares = mean(&mut alone.iter().flatten().map(|(variation, _)| variation * variation));
             ToleranceShare {
                 tolerance: TOLERANCES[index],
@@ -116,6 +107,37 @@ pub fn under_tolerances(
         mean_shift_px: mean(&mut drawn.iter().flatten().map(|(_, shift)| *shift)),
         ranking,
     })
+}
+
+/// Mean distance of a dot from its place in the image, px, in each of `count` sensors drawn within the tolerances;
+/// `None` for one that does not see all of its dots. The first are those of [`under_tolerances`].
+pub fn drawn_shifts_px(
+    spec: &LayoutSpec,
+    layout: &Layout,
+    tolerances: &TolerancesSection,
+    count: u32,
+) -> Vec<Option<f64>> {
+    let drawn = draw(spec, layout, &Followed::new(layout), tolerances, None, count);
+    drawn.into_iter().map(|sensor| sensor.map(|(_, shift_px)| shift_px)).collect()
+}
+
+/// Sensors with all tolerances, or `only` one of them.
+fn draw(
+    spec: &LayoutSpec,
+    layout: &Layout,
+    followed: &Followed,
+    tolerances: &TolerancesSection,
+    only: Option<usize>,
+    count: u32,
+) -> Vec<Option<(f64, f64)>> {
+    let stream = only.map_or(0, |index| index as u64 + 1) << 32;
+    (0..count)
+        .into_par_iter()
+        .map(|sample| {
+            let mut chance = Chance::new(tolerances.seed, stream + u64::from(sample));
+            sensor(spec, layout, followed, tolerances, only, &mut chance)
+        })
+        .collect()
 }
 
 /// The dots that are followed through the drawn sensors.

@@ -29,7 +29,7 @@ const OVERSAMPLING: usize = 2;
 const MARGIN: f64 = 0.06;
 
 /// Draws items in parallel projection on white, fitted to the picture; the
-/// rows of RGBA pixels from the top. Faces are lit by a lamp over the viewer's
+/// rows of RGB pixels from the top. Faces are lit by a lamp over the viewer's
 /// shoulder, and sharp edges are drawn as dark lines.
 pub fn shade(items: &[PictureItem<'_>], view: View, width: u32, height: u32) -> Vec<u8> {
     let (w, h) = (width as usize * OVERSAMPLING, height as usize * OVERSAMPLING);
@@ -155,7 +155,7 @@ fn resolved(
         f64::from((depth[at] - depth[next]).abs()) > 2.0 / scale * slant || one.normal.dot(two.normal) < 0.8
     };
     let share = 255.0 / (OVERSAMPLING * OVERSAMPLING) as f32;
-    let mut out = Vec::with_capacity(4 * width * height);
+    let mut out = Vec::with_capacity(3 * width * height);
     for y in 0..height {
         for x in 0..width {
             let mut sum = [0.0_f32; 3];
@@ -170,7 +170,6 @@ fn resolved(
                 }
             }
             out.extend(sum.map(|s| (s * share).round().clamp(0.0, 255.0) as u8));
-            out.push(255);
         }
     }
     out

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::TriMesh;
+use super::{BoundingBox, TriMesh};
 
 /// A mesh prepared for many rays: a tree of boxes over its triangles.
 #[derive(Debug, Clone)]
@@ -22,6 +22,9 @@ struct Node {
 }
 
 const LEAF: usize = 4;
+/// Deepest way down the tree: every level halves its triangles, whose number fits into 32 bits, and leaves one
+/// sibling waiting.
+const STACK: usize = 36;
 
 impl RayTarget {
     /// Prepares a mesh.
@@ -38,36 +41,106 @@ impl RayTarget {
     /// Where the segment from `from_mm` to `to_mm` first meets a triangle: the
     /// fraction along it, and the triangle's normal.
     pub fn first_hit(&self, from_mm: DVec3, to_mm: DVec3) -> Option<(f64, DVec3)> {
-        let along = to_mm - from_mm;
+        let mut best: Option<(f64, usize)> = None;
+        self.visit(from_mm, to_mm, |at, t| {
+            if best.is_none_or(|(least, _)| t < least) {
+                best = Some((t, at));
+            }
+            best.map(|(t, _)| t)
+        });
+        let (t, at) = best?;
+        let [a, b, c] = self.triangles.get(at)?;
+        Some((t, (b - a).cross(c - a).normalize_or_zero()))
+    }
+
+    /// Whether the segment meets any triangle: as [`Self::first_hit`], which
+    /// has to look further.
+    pub fn is_hit(&self, from_mm: DVec3, to_mm: DVec3) -> bool {
+        let mut hit = false;
+        self.visit(from_mm, to_mm, |_, _| {
+            hit = true;
+            // nothing nearer than the start is left to look for
+            Some(f64::NEG_INFINITY)
+        });
+        hit
+    }
+
+    /// Tells `met` of triangles that the segment meets, the nearer boxes
+    /// first; what it answers is how far along the segment is still of use.
+    fn visit(&self, from: DVec3, to: DVec3, mut met: impl FnMut(usize, f64) -> Option<f64>) {
+        let along = to - from;
         let inverse = along.recip();
-        let mut best: Option<(f64, DVec3)> = None;
-        let mut stack = Vec::with_capacity(64);
-        stack.push(0_u32);
-        while let Some(index) = stack.pop() {
-            let Some(node) = self.nodes.get(index as usize) else { continue };
-            let reach = best.map_or(1.0, |(t, _)| t);
-            let (a, b) = ((node.low - from_mm) * inverse, (node.high - from_mm) * inverse);
+        // Where the segment is in a box, if it is, up to `reach`.
+        let enters = |node: &Node, reach: f64| {
+            let (a, b) = ((node.low - from) * inverse, (node.high - from) * inverse);
             // `min` and `max` pass over the NaN of a ray within a box's face.
             let enter = a.min(b).max_element().max(0.0);
             let leave = a.max(b).min_element().min(reach);
-            if enter > leave * (1.0 + 1e-12) + 1e-12 {
+            (enter <= leave * (1.0 + 1e-12) + 1e-12).then_some(enter)
+        };
+        let mut reach = 1.0_f64;
+        let mut stack = [(0_u32, 0.0_f64); STACK];
+        let Some(mut depth) = self.nodes.first().and_then(|root| enters(root, reach)).map(|_| 1) else {
+            return;
+        };
+        while depth > 0 {
+            depth -= 1;
+            let (index, enter) = stack[depth];
+            if enter > reach * (1.0 + 1e-12) + 1e-12 {
                 continue;
             }
+            let Some(node) = self.nodes.get(index as usize) else { continue };
             if node.count == 0 {
-                stack.push(node.first);
-                stack.push(index + 1);
+                let child = |i: u32| Some((i, enters(self.nodes.get(i as usize)?, reach)?));
+                let (one, two) = (child(index + 1), child(node.first));
+                let nearer_first = match (one, two) {
+                    (Some(p), Some(q)) if p.1 <= q.1 => [two, one],
+                    _ => [one, two],
+                };
+                for next in nearer_first.into_iter().flatten() {
+                    stack[depth] = next;
+                    depth += 1;
+                }
                 continue;
             }
-            let range = node.first as usize..(node.first + node.count) as usize;
-            for triangle in self.triangles.get(range).unwrap_or_default() {
-                if let Some((t, normal)) = meet(triangle, from_mm, along)
-                    && best.is_none_or(|(least, _)| t < least)
+            let first = node.first as usize;
+            for at in first..first + node.count as usize {
+                if let Some(t) = self.triangles.get(at).and_then(|triangle| meet(triangle, from, along))
+                    && let Some(still) = met(at, t)
                 {
-                    best = Some((t, normal));
+                    reach = reach.min(still);
                 }
             }
         }
-        best
+    }
+
+    /// Whether a triangle's own box shares a point with this one: if not, the
+    /// mesh stays out of the box or holds all of it.
+    pub fn comes_near(&self, bounds: &BoundingBox) -> bool {
+        let apart =
+            |low: DVec3, high: DVec3| (low - bounds.max_mm).max(bounds.min_mm - high).max_element() > 0.0;
+        let mut stack = [0_u32; STACK];
+        let mut depth = usize::from(!self.nodes.is_empty());
+        while depth > 0 {
+            depth -= 1;
+            let index = stack[depth];
+            let Some(node) = self.nodes.get(index as usize) else { continue };
+            if apart(node.low, node.high) {
+                continue;
+            }
+            if node.count == 0 {
+                stack[depth] = node.first;
+                stack[depth + 1] = index + 1;
+                depth += 2;
+                continue;
+            }
+            let range = node.first as usize..(node.first + node.count) as usize;
+            let near = |[a, b, c]: &[DVec3; 3]| !apart(a.min(*b).min(*c), a.max(*b).max(*c));
+            if self.triangles.get(range).unwrap_or_default().iter().any(near) {
+                return true;
+            }
+        }
+        false
     }
 }
 
@@ -102,8 +175,9 @@ fn grow(triangles: &mut [[DVec3; 3]], start: usize, count: usize, nodes: &mut Ve
     }
 }
 
-/// Moller and Trumbore 1997; the triangle's edges belong to it.
-fn meet(&[a, b, c]: &[DVec3; 3], from: DVec3, along: DVec3) -> Option<(f64, DVec3)> {
+/// How far along the segment it meets the triangle. Moller and Trumbore 1997;
+/// the triangle's edges belong to it.
+fn meet(&[a, b, c]: &[DVec3; 3], from: DVec3, along: DVec3) -> Option<f64> {
     let (u, v) = (b - a, c - a);
     let p = along.cross(v);
     let det = u.dot(p);
@@ -112,11 +186,13 @@ fn meet(&[a, b, c]: &[DVec3; 3], from: DVec3, along: DVec3) -> Option<(f64, DVec
     }
     let q = from - a;
     let x = q.dot(p) / det;
+    // A ray through a shared edge must not slip between two triangles.
+    let slack = -1e-12;
+    if !(slack..=1.0 - slack).contains(&x) {
+        return None;
+    }
     let r = q.cross(u);
     let y = along.dot(r) / det;
     let t = v.dot(r) / det;
-    // A ray through a shared edge must not slip between two triangles.
-    let slack = -1e-12;
-    (x >= slack && y >= slack && x + y <= 1.0 - slack && (0.0..=1.0).contains(&t))
-        .then(|| (t, u.cross(v).normalize_or_zero()))
+    (y >= slack && x + y <= 1.0 - slack && (0.0..=1.0).contains(&t)).then_some(t)
 }

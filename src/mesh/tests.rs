@@ -214,3 +214,38 @@ proptest! {
         prop_assert!((both.volume_mm3() + shared - sum).abs() < 1e-9 * sum);
     }
 }
+
+/// Against every triangle in turn, without the tree.
+#[test]
+fn rays_and_boxes_find_what_a_look_at_every_triangle_finds() {
+    let mesh = dome(Fit::Area).triangulate("dome", chord(0.05)).unwrap();
+    let target = RayTarget::new(&mesh);
+    let alone: Vec<(RayTarget, BoundingBox)> = mesh
+        .iter_mm()
+        .map(|corners| {
+            let one = TriMesh { vertices_mm: corners.to_vec(), triangles: vec![[0, 1, 2]] };
+            (RayTarget::new(&one), BoundingBox::of(&corners).unwrap())
+        })
+        .collect();
+    let mut seed = 7_u32;
+    let mut random = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(seed >> 8) / f64::from(1_u32 << 24)
+    };
+    let mut point = || DVec3::new(random(), random(), random()) * 26.0 - DVec3::new(13.0, 13.0, 14.0);
+    let (mut hits, mut near) = (0, 0);
+    for _ in 0..300 {
+        let (from, to) = (point(), point());
+        let least = alone.iter().filter_map(|(one, _)| Some(one.first_hit(from, to)?.0)).reduce(f64::min);
+        assert_eq!(target.first_hit(from, to).map(|(t, _)| t), least, "{from} {to}");
+        assert_eq!(target.is_hit(from, to), least.is_some(), "{from} {to}");
+        hits += usize::from(least.is_some());
+        let bounds = BoundingBox::of(&[from, from.lerp(to, 0.1)]).unwrap();
+        let touched = alone.iter().any(|(_, own)| !own.is_apart_from(&bounds));
+        assert_eq!(target.comes_near(&bounds), touched, "{bounds:?}");
+        near += usize::from(touched);
+    }
+    assert!(hits > 50 && (30..270).contains(&near), "{hits} {near}");
+    let nothing = RayTarget::new(&TriMesh::default());
+    assert!(!nothing.is_hit(DVec3::ZERO, DVec3::ONE) && nothing.first_hit(DVec3::ZERO, DVec3::ONE).is_none());
+}

@@ -14,6 +14,15 @@ pub struct BoundingBox {
 }
 
 impl BoundingBox {
+    /// The smallest box round points; `None` round none.
+    pub fn of(points_mm: &[DVec3]) -> Option<Self> {
+        let first = *points_mm.first()?;
+        Some(points_mm.iter().fold(Self { min_mm: first, max_mm: first }, |b, &v| Self {
+            min_mm: b.min_mm.min(v),
+            max_mm: b.max_mm.max(v),
+        }))
+    }
+
     /// Side lengths, mm.
     pub fn size_mm(&self) -> DVec3 {
         self.max_mm - self.min_mm
@@ -83,10 +92,7 @@ impl TriMesh {
 
     /// `None` for a mesh without vertices.
     pub fn bounds(&self) -> Option<BoundingBox> {
-        let first = *self.vertices_mm.first()?;
-        Some(self.vertices_mm.iter().fold(BoundingBox { min_mm: first, max_mm: first }, |b, &v| {
-            BoundingBox { min_mm: b.min_mm.min(v), max_mm: b.max_mm.max(v) }
-        }))
+        BoundingBox::of(&self.vertices_mm)
     }
 
     /// The length below which two `f32` coordinates of this mesh cannot be

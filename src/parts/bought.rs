@@ -93,7 +93,7 @@ pub(super) fn spring_tube(
     i: usize,
     rest_from_platform: &Rigid,
     chord: Chord,
-) -> Result<TriMesh, MeshError> {
+) -> Result<(TriMesh, usize), MeshError> {
     const RINGS: u32 = 12;
     const SKIN: f64 = 0.02;
     let [low, high] = spring_ends_mm(m, i, rest_from_platform);
@@ -119,7 +119,7 @@ pub(super) fn spring_tube(
         mesh.vertices_mm.extend(ring.map(|p| at + turn * p.extend(0.0)));
     }
     mesh.close_tube(RINGS, around);
-    Ok(mesh)
+    Ok((mesh, around as usize))
 }
 
 /// A spring as its wire, between its ends at any length: a helix with one coil

@@ -3,7 +3,9 @@
 //! concerns one part alone is in [`super::process`], [`super::walls`] and
 //! [`super::undercut`].
 
-use glam::{DVec2, DVec3};
+use std::sync::OnceLock;
+
+use glam::{DAffine3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::assembly::{Body, affine};
@@ -110,12 +112,32 @@ struct Thing {
     name: String,
     solid: Solid,
     bounds: BoundingBox,
+    /// Its surface, for a first look; made when first looked at.
+    surface: OnceLock<RayTarget>,
 }
 
 impl Thing {
     fn new(name: &str, solid: Solid) -> Option<Self> {
         let bounds = solid.to_mesh().bounds()?;
-        Some(Self { name: name.to_owned(), solid, bounds })
+        Some(Self { name: name.to_owned(), solid, bounds, surface: OnceLock::new() })
+    }
+
+    /// Whether a spring surely shares no point with this: no triangle comes into a box round any stretch of it,
+    /// and it does not begin within.
+    fn is_clear_of(&self, spring: &Spring, thing_from_rest: &DAffine3) -> bool {
+        let bounds = spring.bounds.transformed(thing_from_rest);
+        if bounds.is_apart_from(&self.bounds) {
+            return true;
+        }
+        let surface = self.surface.get_or_init(|| RayTarget::new(&self.solid.to_mesh()));
+        let near = |stretch: &BoundingBox| surface.comes_near(&stretch.transformed(thing_from_rest));
+        if spring.stretches.iter().any(near) {
+            return false;
+        }
+        let inside = thing_from_rest.transform_point3(spring.start_mm);
+        let beyond = inside + DVec3::Z * (2.0 * self.bounds.size_mm().length());
+        // The first face on the way out of a solid is left through its back.
+        surface.first_hit(inside, beyond).is_none_or(|(_, normal)| normal.z <= 0.0)
     }
 
     /// Refuses a shared volume; says where its middle is.
@@ -137,6 +159,37 @@ impl Thing {
         let depth = shared.to_mesh().bounds().map_or(0.0, |b| b.size_mm().min_element());
         let field = format!("{} or {}", field_of(&self.name), field_of(&other.name));
         Err(PartError::Infeasible { part: self.name.clone(), place, value_mm: depth, limit_mm: 0.0, field })
+    }
+}
+
+/// A spring at a position of the platform, in the frame at rest.
+struct Spring {
+    name: String,
+    tube: TriMesh,
+    bounds: BoundingBox,
+    /// Boxes round it, ring to ring.
+    stretches: Vec<BoundingBox>,
+    /// A point within it, at its lower end.
+    start_mm: DVec3,
+}
+
+impl Spring {
+    fn new(m: &Measures, i: usize, rest_from_platform: &Rigid, chord: Chord) -> Result<Self, MeshError> {
+        let (tube, around) = bought::spring_tube(m, i, rest_from_platform, chord)?;
+        let rings: Vec<BoundingBox> = tube.vertices_mm.chunks(around).filter_map(BoundingBox::of).collect();
+        let stretches: Vec<BoundingBox> = rings.windows(2).map(|two| two[0].union(&two[1])).collect();
+        let first = tube.vertices_mm.get(..around).unwrap_or_default();
+        let start_mm = first.iter().sum::<DVec3>() / around.max(1) as f64;
+        let name = format!("spring {i}");
+        let bounds = rings
+            .into_iter()
+            .reduce(|a, b| a.union(&b))
+            .ok_or(MeshError::Empty { operation: "a spring's tube" })?;
+        Ok(Self { name, tube, bounds, stretches, start_mm })
+    }
+
+    fn thing(&self) -> Result<Option<Thing>, MeshError> {
+        Ok(Thing::new(&self.name, Solid::from_mesh(&self.tube)?))
     }
 }
 
@@ -194,22 +247,26 @@ impl Scene {
                 near.into_iter().try_for_each(|other| one.apart_from(other, when))?;
             }
         }
-        let springs: Vec<Thing> = (0..m.spring_axes_mm.len())
-            .filter_map(|i| {
-                let name = format!("spring {i}");
-                let tube = bought::spring_tube(m, i, pose, chord).and_then(|mesh| Solid::from_mesh(&mesh));
-                tube.map(|solid| Thing::new(&name, solid)).map_err(|e| mesh_error(&name, e)).transpose()
-            })
-            .collect::<Result<_, _>>()?;
+        let springs = (0..m.spring_axes_mm.len())
+            .map(|i| Spring::new(m, i, pose, chord))
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|e| mesh_error("spring", e))?;
+        let platform_from_rest = rest_from_platform.inverse();
+        let whole = |spring: &Spring| spring.thing().map_err(|e| mesh_error(&spring.name, e));
         for (i, spring) in springs.iter().enumerate() {
-            self.fixed
-                .iter()
-                .chain(&springs[i + 1..])
-                .try_for_each(|other| spring.apart_from(other, when))?;
-            for thing in &self.moving {
-                let bounds = thing.bounds.transformed(&rest_from_platform);
-                if let (false, Some(other)) = (bounds.is_apart_from(&spring.bounds), moved(thing)?) {
-                    spring.apart_from(&other, when)?;
+            for other in self.fixed.iter().filter(|t| !t.is_clear_of(spring, &DAffine3::IDENTITY)) {
+                if let Some(one) = whole(spring)? {
+                    one.apart_from(other, when)?;
+                }
+            }
+            for other in springs[i + 1..].iter().filter(|s| !s.bounds.is_apart_from(&spring.bounds)) {
+                if let (Some(one), Some(other)) = (whole(spring)?, whole(other)?) {
+                    one.apart_from(&other, when)?;
+                }
+            }
+            for thing in self.moving.iter().filter(|t| !t.is_clear_of(spring, &platform_from_rest)) {
+                if let (Some(one), Some(other)) = (whole(spring)?, moved(thing)?) {
+                    one.apart_from(&other, when)?;
                 }
             }
         }
@@ -260,7 +317,7 @@ impl Scene {
                 let from = led.transform_point3(DVec3::new(x, y, 1e-3 * h));
                 for &to in &lens_points {
                     let faces_away = (to - from).dot(led.matrix3.z_axis) <= 0.0;
-                    if faces_away || self.upper.first_hit(from, to).is_some() {
+                    if faces_away || self.upper.is_hit(from, to) {
                         continue;
                     }
                     let place = format!(

@@ -105,11 +105,14 @@ fn glb(assembly: &Assembly, writer: &mut Vec<u8>) -> io::Result<()> {
 
 fn png(path: String, items: &[PictureItem<'_>], view: View) -> Result<PartFile, PartError> {
     let (width, height) = PICTURE;
-    let refused = |problem: &str| PartError::Unwritable { path: path.clone(), problem: problem.to_owned() };
-    let size = tiny_skia::IntSize::from_wh(width, height).ok_or_else(|| refused("no such size"))?;
-    let bytes = tiny_skia::Pixmap::from_vec(shade(items, view, width, height), size)
-        .ok_or_else(|| refused("no such picture"))?
-        .encode_png()
-        .map_err(|error| refused(&error.to_string()))?;
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    encoder
+        .write_header()
+        .and_then(|mut writer| writer.write_image_data(&shade(items, view, width, height)))
+        .map_err(|error| PartError::Unwritable { path: path.clone(), problem: error.to_string() })?;
     Ok(PartFile { path, bytes })
 }

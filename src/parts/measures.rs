@@ -144,8 +144,8 @@ impl Measures {
             jig: sections.jig.clone(),
             stencil: sections.stencil.clone(),
             coupon: sections.coupon.clone(),
-            chord: chord(sections.mesh.chord_tolerance_mm)?,
-            optical_chord: chord(sections.mesh.optical_chord_tolerance_mm)?,
+            chord: chord(design.settings().chord_tolerance_mm.value)?,
+            optical_chord: chord(design.settings().optical_chord_tolerance_mm.value)?,
             // Any length will do that is not small against the part.
             overcut_mm: 0.05 * sections.platforms.outer_mm[0].max(sections.platforms.outer_mm[1]),
         })

@@ -237,7 +237,10 @@ impl ViewCone {
 /// towards the farthest point in shrinking steps (Badoiu and Clarkson 2003),
 /// its radius is then exact for that centre.
 fn enclosing_circle(points: &[DVec2]) -> (DVec2, f64) {
-    let farthest = |c: DVec2| points.iter().copied().max_by(|p, q| c.distance(*p).total_cmp(&c.distance(*q)));
+    let farthest = |c: DVec2| {
+        let squared = |p: DVec2| c.distance_squared(p);
+        points.iter().map(|&p| (squared(p), p)).reduce(|p, q| if q.0 >= p.0 { q } else { p }).map(|(_, p)| p)
+    };
     let mut center = points.iter().sum::<DVec2>() / points.len().max(1) as f64;
     for step in 1..200 {
         if let Some(p) = farthest(center) {

@@ -107,6 +107,29 @@ impl PoseSolver {
         }
     }
 
+    /// The closed-form pose that refinement starts from: a homography of four markers, with the layers' refraction
+    /// taken as near the axis. Of the two that a plane allows, the nearer to rest.
+    ///
+    /// # Errors
+    /// [`PoseError`] for markers that are missing, doubled, unseen or on a line.
+    pub fn start(&self, sightings: &[Sighting]) -> Result<Rigid, PoseError> {
+        let seen = self.matched(sightings)?;
+        let flat: Vec<DVec2> = seen.iter().map(|(m, _)| m.position_mm.truncate()).collect();
+        let four = widest_four(&flat).ok_or(PoseError::Collinear)?;
+        let mut rays = [DVec3::ZERO; 4];
+        for (ray, i) in rays.iter_mut().zip(four) {
+            let hidden = |limit: crate::camera::LensLimit| PoseError::NotVisible {
+                id: seen[i].0.id,
+                limit: limit.into(),
+            };
+            *ray = self.optics.lens().unproject(seen[i].1).map_err(hidden)?;
+        }
+        let starts = planar_poses(&four.map(|i| flat[i]), &rays).ok_or(PoseError::Collinear)?;
+        let [one, two] = starts.map(|start| self.start_pose(&start));
+        let turn = |pose: &Rigid| vector_from_rotation(&pose.rotation).length();
+        Ok(if turn(&two) < turn(&one) { two } else { one })
+    }
+
     fn matched(&self, sightings: &[Sighting]) -> Result<Vec<(Marker, DVec2)>, PoseError> {
         let mut seen: Vec<(Marker, DVec2)> = Vec::with_capacity(sightings.len());
         for sighting in sightings {

@@ -186,15 +186,17 @@ pub struct ProcessSection {
 }
 
 /// How exact the meshes are.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshSection {
-    /// Largest distance of a mesh from the exact surface, mm.
+    /// Largest distance of a mesh from the exact surface, mm; chosen from `accuracy` where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0001, max = 10.0))]
-    pub chord_tolerance_mm: f64,
+    pub chord_tolerance_mm: Option<f64>,
     /// The same for the mould's cavity, which shapes the dome, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0001, max = 10.0))]
-    pub optical_chord_tolerance_mm: f64,
+    pub optical_chord_tolerance_mm: Option<f64>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,

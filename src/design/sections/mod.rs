@@ -3,6 +3,7 @@
 //! Their doc comments are the descriptions in the JSON schema, and the bounds given here are the
 //! bounds of a single field; rules between fields are checked when the design is resolved.
 
+mod accuracy;
 mod camera;
 mod loads;
 mod making;
@@ -18,6 +19,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use accuracy::AccuracySection;
 pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
 pub use loads::{LoadClaim, LoadsSection, NoiseSection, WhiteMarkersSection};
 pub use making::{
@@ -121,8 +123,12 @@ pub struct DesignFile {
     pub coupon: CouponSection,
     /// What the printing process can make.
     pub process: ProcessSection,
-    /// How exact the meshes are.
+    /// How exact the meshes are; may be left out where `accuracy` says it.
+    #[serde(default)]
     pub mesh: MeshSection,
+    /// How exact the results shall be; left out where every setting is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<AccuracySection>,
 }
 
 /// What tracing and projecting need of a design file.

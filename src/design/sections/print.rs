@@ -103,12 +103,21 @@ pub struct PrintSection {
     /// Resolution of the raster film, dots per inch.
     #[schemars(range(min = 72, max = 20000))]
     pub dpi: u32,
-    /// How far a drawn outline may lie from the exact one, mm.
+    /// How far a drawn outline may lie from the exact one, mm; chosen from `accuracy` where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.00001, max = 1.0))]
-    pub outline_tolerance_mm: f64,
+    pub outline_tolerance_mm: Option<f64>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
+}
+
+impl PrintSection {
+    /// How far a drawn outline may lie from the exact one, mm. A resolved design states it; before that it is as
+    /// close as the file could ask.
+    pub fn outline_mm(&self) -> f64 {
+        self.outline_tolerance_mm.unwrap_or(1e-5)
+    }
 }
 
 fn default_max_tilt_deg() -> f64 {

@@ -43,12 +43,20 @@ pub struct TolerancesSection {
     /// The springs' outer diameter, mm.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub spring_diameter_mm: f64,
-    /// Sensors drawn in a Monte Carlo.
+    /// Sensors drawn in a Monte Carlo; chosen from `accuracy` where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 100000))]
-    pub samples: u32,
+    pub samples: Option<u32>,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
+}
+
+impl TolerancesSection {
+    /// Sensors drawn in a Monte Carlo. A resolved design states it; before that a usual number.
+    pub fn sensors(&self) -> u32 {
+        self.samples.unwrap_or(256)
+    }
 }

@@ -35,8 +35,8 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
         Form::Sphere { .. } => 0.0,
         _ => 0.15,
     };
-    // Nodes in a contact of Hertz' size, as a paraboloid's overlap.
-    let nodes = |h: f64| 4.0 + 3.0 * std::f64::consts::TAU * radius * depth / (h * h);
+    // Nodes that touch a plane, which touches most of all that is not hollow (Hertz: a^2 = R d), and half as many beside.
+    let nodes = |h: f64| 4.0 + 1.5 * std::f64::consts::PI * radius * depth / (h * h);
     let large = 0.8 * deep * depth;
     match level {
         Level::Geometric => Estimate {
@@ -60,7 +60,8 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
             Estimate {
                 displacement_mm: (0.1 + sharp) * h.min(4.0 * depth) + large,
                 force_part: 0.1 + 0.1 * h / radius.min(h + depth) + 2.0 * deep,
-                work: 900.0 * n * n + 2e4 * elements,
+                // Some 300 sweeps over 3 n forces in all trials of a balance with friction.
+                work: 2500.0 * n * n + 2e4 * elements,
                 // Harmonics, times unknowns and their fill, times right-hand sides.
                 setup_work: 4.0 * elements * 55.0 * elements * 120.0 * 3.0 * elements,
                 applies: true,

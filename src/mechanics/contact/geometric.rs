@@ -108,6 +108,8 @@ const FIRST_LOOK: usize = 400;
 const RINGS: usize = 24;
 const SPOKES: usize = 48;
 const STARTS: usize = 3;
+/// Distances that one search may ask for; a search takes some two hundred.
+const MOST_QUERIES: usize = 20_000;
 
 /// Two directions that complete a unit vector to a right-handed frame.
 pub(super) fn frame_of(normal: DVec3) -> (DVec3, DVec3) {
@@ -140,28 +142,47 @@ pub(super) fn deepest(placed: &Placed, radius: f64) -> (DVec3, f64, usize) {
         }
     }
     let mut best = (f64::INFINITY, DVec3::Z);
-    for (mut value, mut direction) in starts {
-        let mut step = 0.08;
-        while step > 1e-7 {
-            let (u, v) = frame_of(direction);
-            let tries = [u, v, -u, -v].map(|way| {
-                let mut d = direction + way * step;
-                d.z = d.z.max(0.0);
-                let d = d.normalize_or(direction);
-                (placed.distance(d * radius).0, d)
-            });
-            queries += 4;
-            let found = tries.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-            match found {
-                Some((lower, d)) if lower < value => (value, direction) = (lower, d),
-                _ => step *= 0.5,
-            }
-        }
+    for start in starts {
+        let (value, direction, asked) = descend(placed, radius, start, 0.08);
+        queries += asked;
         if value < best.0 {
             best = (value, direction);
         }
     }
     (best.1 * radius, best.0, queries)
+}
+
+/// The deepest point near another one.
+pub(super) fn deepest_from(placed: &Placed, radius: f64, near_mm: DVec3) -> (DVec3, f64, usize) {
+    let start = (placed.distance(near_mm).0, near_mm / radius);
+    let (value, direction, queries) = descend(placed, radius, start, 0.02);
+    (direction * radius, value, queries + 1)
+}
+
+/// Pattern search on the dome: distance, direction, distances asked for.
+fn descend(
+    placed: &Placed,
+    radius: f64,
+    (mut value, mut direction): (f64, DVec3),
+    mut step: f64,
+) -> (f64, DVec3, usize) {
+    let mut queries = 0;
+    while step > 1e-7 && queries < MOST_QUERIES {
+        let (u, v) = frame_of(direction);
+        let tries = [u, v, -u, -v].map(|way| {
+            let mut d = direction + way * step;
+            d.z = d.z.max(0.0);
+            let d = d.normalize_or(direction);
+            (placed.distance(d * radius).0, d)
+        });
+        queries += 4;
+        let found = tries.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        match found {
+            Some((lower, d)) if lower < value => (value, direction) = (lower, d),
+            _ => step *= 0.5,
+        }
+    }
+    (value, direction, queries)
 }
 
 /// Samples the part of the dome that lies inside the object.

@@ -1,66 +1,163 @@
 //! The linear level: the elastic dome's own compliance under unilateral contact with Coulomb friction.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 
 use super::elastomer::{Elastomer, Indenter};
 use super::error::ContactError;
 use super::fem::{Compliance, SurfaceField};
 use super::field::Field;
-use super::geometric::{Placed, deepest};
+use super::geometric::{Placed, deepest, deepest_from};
 use super::local::DEEPEST;
-use super::state::ContactState;
-use super::touch::{Candidate, PENETRATION, Touch, Way};
+use super::state::{ContactState, Status};
+use super::touch::{Candidate, PENETRATION, Rounds, Touch, Way};
 use crate::numeric::Rigid;
 
-/// One frame of the linear level.
-pub(super) fn linear(
-    elastomer: &Elastomer,
-    compliance: &Compliance,
-    indenter: &Indenter,
-    sensor_from_object: &Rigid,
-    before: Option<&ContactState>,
-) -> Result<ContactState, ContactError> {
-    let radius = elastomer.dome_radius_mm;
-    let placed = Placed { solid: indenter.solid.clone(), sensor_from_object: *sensor_from_object };
-    let (deepest_mm, distance_mm, queries) = deepest(&placed, radius);
-    let mut state = ContactState::free(sensor_from_object);
-    state.work = 30.0 * queries as f64;
-    if distance_mm >= 0.0 {
-        return Ok(state);
-    }
-    if -distance_mm > DEEPEST * radius {
-        return Err(ContactError::TooDeep { depth_mm: -distance_mm, limit_mm: DEEPEST * radius });
-    }
-    let way = Way::new(&placed, before, deepest_mm, distance_mm);
-    let sharing = 1.0 + indenter.yield_ratio(elastomer);
-    let spacing = radius * std::f64::consts::FRAC_PI_2 / compliance.grid.elements as f64;
-    let margin = spacing.max(0.15 * -distance_mm);
-    let mut solver = Solver { compliance, touch: Touch::new(elastomer, &placed, sharing) };
-    solver.look(&way, margin)?;
-    let mut ended = solver.touch.run();
-    // Nodes beyond the first choice that were pressed into the object join it.
-    for _ in 0..4 {
-        if !solver.widen(&way, margin)? {
-            break;
-        }
-        ended = solver.touch.run();
-    }
-    let field = solver.field();
-    solver.touch.finish(&mut state, ended);
-    state.field = Field::Elastic(field);
-    Ok(state)
-}
+/// Looks for nodes that no plane held back.
+const MOST_LOOKS: u32 = 8;
 
-struct Solver<'a> {
-    compliance: &'a Compliance,
+/// One frame of the linear level, for one pose or for the many poses of a balance: nodes, their compliance and their
+/// forces stay from pose to pose.
+pub(super) struct Solver<'a> {
+    elastomer: &'a Elastomer,
+    compliance: &'a Arc<Compliance>,
+    before: Option<&'a ContactState>,
     touch: Touch<'a>,
+    /// Object, place of the deepest node, and the margin that the candidates were chosen for.
+    looked: Option<(Rigid, DVec3, f64)>,
 }
 
-impl Solver<'_> {
-    /// Candidates: nodes in the object or nearer than the margin.
-    fn look(&mut self, way: &Way<'_>, margin: f64) -> Result<(), ContactError> {
+impl<'a> Solver<'a> {
+    /// A solver for an object; `before` is the state of the frame before.
+    pub fn new(
+        elastomer: &'a Elastomer,
+        compliance: &'a Arc<Compliance>,
+        indenter: &Indenter,
+        before: Option<&'a ContactState>,
+    ) -> Self {
+        let placed = Placed { solid: indenter.solid.clone(), sensor_from_object: Rigid::identity() };
+        let touch = Touch::new(elastomer, placed, 1.0 + indenter.yield_ratio(elastomer));
+        Self { elastomer, compliance, before, touch, looked: None }
+    }
+
+    /// The contact at a pose, until nothing moves by more than `settled_mm`. Only with `whole` are nodes looked for
+    /// that were pressed in beside the candidates.
+    pub fn solve(
+        &mut self,
+        sensor_from_object: &Rigid,
+        settled_mm: f64,
+        whole: bool,
+    ) -> Result<ContactState, ContactError> {
+        self.touch.placed.sensor_from_object = *sensor_from_object;
+        let mut state = ContactState::free(sensor_from_object);
+        let near = self.is_near(sensor_from_object);
+        if !near && !self.look_anew()? {
+            state.work = self.touch.work;
+            return Ok(state);
+        }
+        let way = self.way(near);
+        if near {
+            for candidate in &mut self.touch.candidates {
+                candidate.carried_mm = way.carried(&self.touch.placed, candidate);
+            }
+        } else {
+            let chosen = self.choose();
+            self.add(&chosen, &way)?;
+        }
+        let mut ended = self.touch.run(settled_mm);
+        if near && self.touch.candidates.iter().all(|c| c.force_n == DVec3::ZERO) {
+            // Lost, or met elsewhere.
+            self.looked = None;
+            return self.solve(sensor_from_object, settled_mm, whole);
+        }
+        let mut field = self.field();
+        for look in 0..if whole { MOST_LOOKS } else { 0 } {
+            let missed = self.missed(&field);
+            if missed.is_empty() {
+                break;
+            }
+            self.add(&missed, &way)?;
+            ended = self.touch.run(settled_mm);
+            field = self.field();
+            // The last ones were not looked at again.
+            ended.settled &= look + 1 < MOST_LOOKS;
+        }
+        Ok(self.state(state, ended, field))
+    }
+
+    fn state(&self, mut state: ContactState, ended: Rounds, field: SurfaceField) -> ContactState {
+        self.touch.finish(&mut state, ended);
+        state.work += field.work();
+        state.field = if state.status == Status::Free { Field::Still } else { Field::Elastic(field) };
+        state
+    }
+
+    /// Whether the candidates chosen for another pose serve this one.
+    fn is_near(&self, sensor_from_object: &Rigid) -> bool {
+        let Some((looked, at_mm, margin_mm)) = &self.looked else { return false };
+        let moved = sensor_from_object.compose(&looked.inverse());
+        let turn = crate::numeric::vector_from_rotation(&moved.rotation).length();
+        let way = moved.point(*at_mm).distance(*at_mm) + turn * 0.5 * self.elastomer.dome_radius_mm;
+        !self.touch.candidates.is_empty() && way < 0.5 * margin_mm
+    }
+
+    /// Looks for the deepest point; false if nothing touches.
+    fn look_anew(&mut self) -> Result<bool, ContactError> {
+        let radius = self.elastomer.dome_radius_mm;
+        let placed = &self.touch.placed;
+        let (deepest_mm, distance_mm, queries) = deepest(placed, radius);
+        self.touch.work += 30.0 * queries as f64;
+        if -distance_mm > DEEPEST * radius {
+            return Err(ContactError::TooDeep { depth_mm: -distance_mm, limit_mm: DEEPEST * radius });
+        }
+        let spacing = radius * std::f64::consts::FRAC_PI_2 / self.compliance.grid.elements as f64;
+        self.looked = Some((placed.sensor_from_object, deepest_mm, spacing));
+        if distance_mm >= 0.0 {
+            self.looked = None;
+            self.touch.candidates.clear();
+        }
+        Ok(distance_mm < 0.0)
+    }
+
+    /// How the object came. Without a frame before, along the normal where it is deepest.
+    fn way(&mut self, near: bool) -> Way<'a> {
+        let radius = self.elastomer.dome_radius_mm;
+        let placed = &self.touch.placed;
+        let mut at_mm = self.looked.map_or(DVec3::Z * radius, |looked| looked.1);
+        let mut distance_mm = placed.distance(at_mm).0;
+        if near && self.before.is_none() {
+            let queries;
+            (at_mm, distance_mm, queries) = deepest_from(placed, radius, at_mm);
+            self.touch.work += 30.0 * queries as f64;
+        }
+        Way::new(placed, self.before, at_mm, distance_mm)
+    }
+
+    /// Candidates: nodes that touched before, and those that are likely to. Under an object that lies d deep, the
+    /// dome gives way as far as about half of d (Hertz' edge lies there); what is wrongly left out is found later.
+    fn choose(&mut self) -> Vec<usize> {
         let grid = &self.compliance.grid;
-        let mut chosen = Vec::new();
+        let Some((_, deepest_mm, spacing)) = self.looked else { return Vec::new() };
+        let depth_mm = -self.touch.placed.distance(deepest_mm).0;
+        let most_mm = 0.25 * spacing - 0.45 * depth_mm;
+        let mut chosen = self.nearer_than(most_mm);
+        if let Some(before) = self.before {
+            chosen.extend(before.history.nodes.iter().map(|memory| memory.node as usize));
+        }
+        // From another pose of this frame: those that bear a force now.
+        chosen.extend(self.touch.candidates.iter().filter(|c| c.force_n != DVec3::ZERO).map(|c| c.node));
+        chosen.sort_unstable();
+        chosen.dedup();
+        chosen.retain(|number| *number < grid.len());
+        self.touch.candidates.retain(|c| chosen.binary_search(&c.node).is_ok());
+        chosen
+    }
+
+    /// Nodes of the undeformed dome nearer to the object than a distance.
+    fn nearer_than(&mut self, most_mm: f64) -> Vec<usize> {
+        let grid = &self.compliance.grid;
+        let mut near = Vec::new();
         for ring in 0..grid.elements {
             let count = grid.counts[ring];
             let step_mm = grid.polar(ring).sin() * grid.radius_mm * std::f64::consts::TAU / count as f64;
@@ -69,25 +166,30 @@ impl Solver<'_> {
                 let number = grid.first[ring] + k;
                 let (distance, _) = self.touch.placed.distance(grid.place(grid.node(number)));
                 self.touch.work += 30.0;
-                if distance < margin {
-                    chosen.push(number);
+                if distance < most_mm {
+                    near.push(number);
                     k += 1;
                 } else {
                     // No node nearer than the distance's excess can be closer to the object.
-                    k += if step_mm > 0.0 { (((distance - margin) / step_mm) as usize).max(1) } else { 1 };
+                    k += if step_mm > 0.0 { (((distance - most_mm) / step_mm) as usize).max(1) } else { 1 };
                 }
             }
         }
-        self.add(&chosen, way)
+        near
     }
 
+    /// Adds nodes to the candidates, and lays out their compliance.
     fn add(&mut self, numbers: &[usize], way: &Way<'_>) -> Result<(), ContactError> {
         let grid = &self.compliance.grid;
         let touch = &mut self.touch;
-        for &number in numbers {
+        for candidate in &mut touch.candidates {
+            candidate.carried_mm = way.carried(&touch.placed, candidate);
+        }
+        let known: Vec<usize> = touch.candidates.iter().map(|c| c.node).collect();
+        for &number in numbers.iter().filter(|number| known.binary_search(number).is_err()) {
             let node = grid.node(number);
             let place = (number, grid.place(node), grid.areas_mm2[node.ring], grid.spread(node));
-            touch.candidates.push(Candidate::new(place, touch.placed, way, touch.sharing)?);
+            touch.candidates.push(Candidate::new(place, &touch.placed, way, touch.sharing)?);
         }
         touch.candidates.sort_by_key(|candidate| candidate.node);
         self.fill_blocks();
@@ -95,76 +197,66 @@ impl Solver<'_> {
     }
 
     fn fill_blocks(&mut self) {
-        let n = self.touch.candidates.len();
+        let touch = &mut self.touch;
+        let n = touch.candidates.len();
         let width = 3 * n;
         let grid = &self.compliance.grid;
-        let frames: Vec<DMat3> =
-            self.touch.candidates.iter().map(|candidate| grid.frame(grid.node(candidate.node))).collect();
-        self.touch.blocks = vec![0.0; width * width];
+        let nodes: Vec<_> = touch.candidates.iter().map(|candidate| grid.node(candidate.node)).collect();
+        let frames: Vec<DMat3> = nodes.iter().map(|node| grid.frame(*node)).collect();
+        touch.blocks.clear();
+        touch.blocks.resize(width * width, 0.0);
         for i in 0..n {
-            let at = grid.node(self.touch.candidates[i].node);
             for j in 0..=i {
-                let by = grid.node(self.touch.candidates[j].node);
-                let local = self.compliance.between(at, by);
-                let block = frames[i] * local * frames[j].transpose() * self.touch.sharing;
+                let local = self.compliance.between(nodes[i], nodes[j]);
+                let block = (frames[i] * local * frames[j].transpose() * touch.sharing).to_cols_array();
                 for row in 0..3 {
                     for column in 0..3 {
-                        let value = block.col(column)[row];
-                        self.touch.blocks[(3 * i + row) * width + 3 * j + column] = value;
-                        self.touch.blocks[(3 * j + column) * width + 3 * i + row] = value;
+                        let value = block[3 * column + row];
+                        touch.blocks[(3 * i + row) * width + 3 * j + column] = value;
+                        touch.blocks[(3 * j + column) * width + 3 * i + row] = value;
                     }
                 }
             }
         }
-        self.touch.work += 60.0 * (n * n) as f64;
+        touch.work += 60.0 * (n * n) as f64;
     }
 
-    fn field(&mut self) -> SurfaceField {
+    fn field(&self) -> SurfaceField {
         let grid = &self.compliance.grid;
-        let forces: Vec<(usize, DVec3)> = self
+        let forces = self
             .touch
             .candidates
             .iter()
             .filter(|c| c.force_n != DVec3::ZERO)
             .map(|c| (c.node, grid.frame(grid.node(c.node)).transpose() * c.force_n))
             .collect();
-        let field = SurfaceField::new(self.compliance, &forces);
-        self.touch.work += field.work;
-        field
+        SurfaceField::new(Arc::clone(self.compliance), forces)
     }
 
-    /// Looks for nodes that no plane held back; adds them.
-    fn widen(&mut self, way: &Way<'_>, margin: f64) -> Result<bool, ContactError> {
-        let grid = &self.compliance.grid;
-        let known: Vec<usize> = self.touch.candidates.iter().map(|c| c.node).collect();
-        let mut near = Vec::new();
-        let mut field = None;
-        for number in 0..grid.len() {
-            if known.binary_search(&number).is_ok() {
-                continue;
-            }
-            let at = grid.place(grid.node(number));
-            // Only what lies within a few margins can have been pressed in by the bulge.
-            let (distance, _) = self.touch.placed.distance(at);
-            if distance < 4.0 * margin {
-                near.push((number, at));
-            }
-        }
-        let mut found = Vec::new();
-        for (number, at) in near {
-            if field.is_none() {
-                field = Some(self.field());
-            }
-            let Some(field) = &field else { continue };
-            let moved = at + field.at(at) * self.touch.sharing;
-            if self.touch.placed.distance(moved).0 < -PENETRATION * self.touch.elastomer.dome_radius_mm {
-                found.push(number);
-            }
-        }
-        if found.is_empty() {
-            return Ok(false);
-        }
-        self.add(&found, way)?;
-        Ok(true)
+    /// Nodes beside the candidates that were pressed into the object.
+    fn missed(&mut self, field: &SurfaceField) -> Vec<usize> {
+        let most = PENETRATION * self.elastomer.dome_radius_mm;
+        // A node beside moves less than the most moved candidate.
+        let reach_mm = self.touch.candidates.iter().map(|c| c.u_mm.length()).fold(0.0, f64::max);
+        let mut near = self.nearer_than(reach_mm);
+        let (grid, touch) = (&self.compliance.grid, &mut self.touch);
+        near.retain(|number| touch.candidates.binary_search_by_key(number, |c| c.node).is_err());
+        touch.work += 60.0 * near.len() as f64;
+        near.retain(|number| {
+            let at = grid.place(grid.node(*number));
+            touch.placed.distance(at + field.at(at) * touch.sharing).0 < -most
+        });
+        near
     }
+}
+
+/// One frame of the linear level.
+pub(super) fn linear(
+    elastomer: &Elastomer,
+    compliance: &Arc<Compliance>,
+    indenter: &Indenter,
+    sensor_from_object: &Rigid,
+    before: Option<&ContactState>,
+) -> Result<ContactState, ContactError> {
+    Solver::new(elastomer, compliance, indenter, before).solve(sensor_from_object, 0.0, true)
 }

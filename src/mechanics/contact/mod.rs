@@ -26,9 +26,9 @@ mod neo;
 mod press;
 mod solid;
 mod state;
+mod sweeps;
 mod tangential;
 mod touch;
-mod unilateral;
 
 pub use elastomer::{Elastomer, Indenter};
 pub use error::ContactError;
@@ -65,7 +65,8 @@ pub enum Level {
 }
 
 impl Level {
-    /// The linear level at the element size that resolves a fingertip contact in a few milliseconds: R/20.
+    /// The linear level at the element size that resolves a fingertip contact in some ten milliseconds: R/20. At R/10 a
+    /// balance takes one.
     pub fn default_linear(elastomer: &Elastomer) -> Self {
         Self::Linear { element_mm: 0.05 * elastomer.dome_radius_mm }
     }
@@ -184,12 +185,9 @@ impl Contact {
         sensor_from_object: &Rigid,
         before: Option<&ContactState>,
     ) -> Result<ContactState, ContactError> {
-        indenter.check()?;
-        sensor_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
-        self.above_sheet(indenter, sensor_from_object)?;
         let history = before.map(|state| &state.history);
         let elastomer = &self.elastomer;
-        let state = match &self.prepared {
+        self.checked(indenter, sensor_from_object, || match &self.prepared {
             Prepared::Compliance(compliance) => {
                 linear::linear(elastomer, compliance, indenter, sensor_from_object, before)
             }
@@ -200,12 +198,25 @@ impl Contact {
                 local::geometric(elastomer, indenter, sensor_from_object, history)
             }
             Prepared::Nothing => local::closed_form(elastomer, indenter, sensor_from_object, history),
-        }?;
+        })
+    }
+
+    /// Solves between the checks of the input and of the answer.
+    fn checked(
+        &self,
+        indenter: &Indenter,
+        sensor_from_object: &Rigid,
+        solve: impl FnOnce() -> Result<ContactState, ContactError>,
+    ) -> Result<ContactState, ContactError> {
+        indenter.check()?;
+        sensor_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
+        self.above_sheet(indenter, sensor_from_object)?;
+        let state = solve()?;
         // Nothing touches the surface: then the object is outside, or all of it within.
         let any = sensor_from_object.point(indenter.solid.support(glam::DVec3::Z));
-        let inside_mm = elastomer.dome_radius_mm - any.length();
-        if state.status == Status::Free && inside_mm > 1e-9 * elastomer.dome_radius_mm {
-            let limit_mm = local::DEEPEST * elastomer.dome_radius_mm;
+        let inside_mm = self.elastomer.dome_radius_mm - any.length();
+        if state.status == Status::Free && inside_mm > 1e-9 * self.elastomer.dome_radius_mm {
+            let limit_mm = local::DEEPEST * self.elastomer.dome_radius_mm;
             return Err(ContactError::TooDeep { depth_mm: inside_mm, limit_mm });
         }
         Ok(state)

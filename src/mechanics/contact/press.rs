@@ -8,7 +8,8 @@
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector};
 
-use super::{Contact, ContactError, ContactState, Indenter};
+use super::linear::Solver;
+use super::{Contact, ContactError, ContactState, Indenter, Prepared};
 use crate::mechanics::{Displacement, MechanicsError, Suspension, Wrench};
 use crate::numeric::{Rigid, cross_matrix};
 
@@ -46,6 +47,8 @@ pub struct Pressed {
     pub iterations: u32,
     /// How the balance ended.
     pub status: PressStatus,
+    /// Derivative of the residual, as the search knew it at last: a start for the next frame's.
+    learnt: Option<DMatrix<f64>>,
 }
 
 /// Contact solves that a balance may take.
@@ -56,6 +59,13 @@ const TOLERANCE: f64 = 1e-7;
 /// Loads below this one are balanced as closely as it is, N.
 const LEAST_SCALE_N: f64 = 0.05;
 
+/// How much closer than the balance a trial's contact is solved.
+const CLOSER: f64 = 1e-2;
+/// Starts that are tried where the models refuse the first.
+const MOST_STARTS: u32 = 6;
+/// Times that a balance is looked for again after the contact was solved to its end.
+const MOST_ENDS: u32 = 4;
+
 /// One trial of the unknowns.
 struct Trial {
     state: ContactState,
@@ -65,6 +75,14 @@ struct Trial {
     /// Springs' wrench less the contact's, moments over the reach; then the force's miss.
     residual: DVector<f64>,
     size: f64,
+}
+
+/// Where a search is.
+struct Search {
+    x: DVector<f64>,
+    /// Contact solves so far.
+    count: u32,
+    jacobian: Option<DMatrix<f64>>,
 }
 
 /// What is to be balanced.
@@ -78,12 +96,47 @@ struct Task<'a> {
     force: Option<(DVec3, f64)>,
 }
 
+/// Contact solves of one balance.
+enum Solves<'a> {
+    /// The linear level goes on from trial to trial.
+    Linear(Box<Solver<'a>>),
+    /// The others start anew.
+    Each,
+}
+
+impl Solves<'_> {
+    /// The contact at a pose. `off_n` is what the balance was off by; only the last trial is solved to its end.
+    fn solve(
+        &mut self,
+        task: &Task<'_>,
+        sensor_from_object: &Rigid,
+        off_n: Option<f64>,
+    ) -> Result<ContactState, ContactError> {
+        match self {
+            Self::Each => task.contact.solve(task.indenter, sensor_from_object, task.before),
+            Self::Linear(solver) => task.contact.checked(task.indenter, sensor_from_object, || {
+                let elastomer = task.contact.elastomer();
+                // Displacements, by the stiffness of a contact of a tenth of the dome.
+                let stiffness = 0.2 * elastomer.dome_radius_mm * elastomer.plane_strain_mpa();
+                let settled_mm = off_n.map_or(0.0, |off_n| CLOSER * off_n / stiffness);
+                solver.solve(sensor_from_object, settled_mm, off_n.is_none())
+            }),
+        }
+    }
+}
+
 impl Task<'_> {
     fn unknowns(&self) -> usize {
         6 + usize::from(self.force.is_some())
     }
 
-    fn try_at(&self, x: &DVector<f64>) -> Result<Trial, ContactError> {
+    /// One trial; `off_n` is what the last one was off by, `None` for one solved to its end.
+    fn try_at(
+        &self,
+        solves: &mut Solves<'_>,
+        x: &DVector<f64>,
+        off_n: Option<f64>,
+    ) -> Result<Trial, ContactError> {
         let reach = self.suspension.reach_mm();
         let displacement = Displacement::from_array(std::array::from_fn(|i| x[i]));
         let platform = displacement.to_pose(self.suspension.at_mm());
@@ -92,7 +145,7 @@ impl Task<'_> {
             object.translation_mm += way * x[6];
         }
         let sensor_from_object = platform.inverse().compose(&object);
-        let state = self.contact.solve(self.indenter, &sensor_from_object, self.before)?;
+        let state = solves.solve(self, &sensor_from_object, off_n)?;
         let wrench = Wrench::of_load(
             platform.vector(state.wrench.force_n),
             platform.vector(state.wrench.moment_nmm),
@@ -168,37 +221,92 @@ impl Task<'_> {
         Ok(jacobian)
     }
 
-    fn run(&self, start: DVector<f64>) -> Result<Pressed, ContactError> {
-        let mut x = start;
-        let mut solves = 1;
-        let mut trial = match self.try_at(&x) {
-            Ok(trial) => trial,
-            // A start that the models refuse is no answer to the task: from rest, then.
-            Err(_) => {
-                x.fill(0.0);
-                solves += 1;
-                self.try_at(&x)?
+    fn run(&self, start: DVector<f64>, learnt: Option<&DMatrix<f64>>) -> Result<Pressed, ContactError> {
+        let mut solves = match &self.contact.prepared {
+            Prepared::Compliance(compliance) => Solves::Linear(Box::new(Solver::new(
+                self.contact.elastomer(),
+                compliance,
+                self.indenter,
+                self.before,
+            ))),
+            _ => Solves::Each,
+        };
+        let mut search = Search { x: start, count: 1, jacobian: None };
+        let first_off = Some(self.scale(0.0));
+        let mut trial = loop {
+            match self.try_at(&mut solves, &search.x, first_off) {
+                Ok(trial) => break trial,
+                Err(error) if search.count >= MOST_STARTS => return Err(error),
+                // A start that the models refuse is no answer to the task: from rest, then, and the object back to where
+                // it hardly touches.
+                Err(_) => {
+                    search.x.rows_mut(0, 6).fill(0.0);
+                    if let Some((way, _)) = self.force {
+                        let rest = Rigid::identity();
+                        let touch_mm =
+                            self.contact.touch_mm(self.indenter, &rest, &self.rest_from_object, way)?;
+                        search.x[6] = touch_mm + (search.x[6] - touch_mm) * 0.3;
+                    }
+                    search.count += 1;
+                }
             }
         };
-        let mut jacobian = self.jacobian(&x, &trial)?;
-        let mut fresh = true;
+        // What the frame before learnt of the stiffness serves this one.
+        search.jacobian =
+            learnt.filter(|j| j.nrows() == self.unknowns() && !trial.state.nodes.is_empty()).cloned();
+        for _ in 0..MOST_ENDS {
+            trial = self.search(&mut solves, &mut search, trial)?;
+            if matches!(solves, Solves::Each) {
+                break;
+            }
+            // The contact to its end; the balance may not notice.
+            search.count += 1;
+            let last = self.try_at(&mut solves, &search.x, None);
+            trial = last?;
+            if trial.size <= TOLERANCE * self.scale(trial.wrench.force_n.length())
+                || search.count >= MOST_SOLVES
+            {
+                break;
+            }
+        }
+        self.finish(trial, search)
+    }
+
+    /// The load that residuals are measured by, N.
+    fn scale(&self, force_n: f64) -> f64 {
+        force_n.max(self.force.map_or(0.0, |f| f.1.abs())).max(LEAST_SCALE_N)
+    }
+
+    /// Broyden's method from a trial on, until it balances or nothing helps.
+    fn search(
+        &self,
+        solves: &mut Solves<'_>,
+        search: &mut Search,
+        mut trial: Trial,
+    ) -> Result<Trial, ContactError> {
+        let mut fresh = search.jacobian.is_none();
+        let mut jacobian = match search.jacobian.take() {
+            Some(jacobian) => jacobian,
+            None => self.jacobian(&search.x, &trial)?,
+        };
         let mut best_size = trial.size;
-        while solves < MOST_SOLVES {
-            let scale =
-                trial.wrench.force_n.length().max(self.force.map_or(0.0, |f| f.1.abs())).max(LEAST_SCALE_N);
-            if trial.size <= TOLERANCE * scale {
+        while search.count < MOST_SOLVES {
+            if trial.size <= 0.3 * TOLERANCE * self.scale(trial.wrench.force_n.length()) {
                 break;
             }
             let Some(step) = jacobian.clone().lu().solve(&-&trial.residual) else { break };
             let mut part = self.step_part(&step);
             let mut next = None;
-            while part > 1e-4 && solves < MOST_SOLVES {
-                solves += 1;
-                let there = &x + &step * part;
-                if let Ok(found) = self.try_at(&there)
+            while part > 1e-4 && search.count < MOST_SOLVES {
+                search.count += 1;
+                let there = &search.x + &step * part;
+                if let Ok(found) = self.try_at(solves, &there, Some(trial.size))
                     && found.size < 1.5 * best_size.max(0.3 * trial.size)
                 {
                     next = Some((there, found));
+                    break;
+                }
+                if !fresh {
                     break;
                 }
                 part *= 0.4;
@@ -207,18 +315,19 @@ impl Task<'_> {
                 if fresh {
                     break;
                 }
-                jacobian = self.jacobian(&x, &trial)?;
+                jacobian = self.jacobian(&search.x, &trial)?;
                 fresh = true;
                 continue;
             };
-            let moved = &there - &x;
+            let moved = &there - &search.x;
             let miss = &found.residual - &trial.residual - &jacobian * &moved;
             jacobian += &miss * moved.transpose() / moved.norm_squared().max(f64::MIN_POSITIVE);
             fresh = false;
             best_size = best_size.min(found.size);
-            (x, trial) = (there, found);
+            (search.x, trial) = (there, found);
         }
-        self.finish(trial, &x, solves)
+        search.jacobian = Some(jacobian);
+        Ok(trial)
     }
 
     /// Long steps are cut: no more than a tenth of the dome, or of a radian, at once.
@@ -229,7 +338,8 @@ impl Task<'_> {
         (0.15 * radius / shift.max(f64::MIN_POSITIVE)).min(0.15 / turn.max(f64::MIN_POSITIVE)).min(1.0)
     }
 
-    fn finish(&self, trial: Trial, x: &DVector<f64>, iterations: u32) -> Result<Pressed, ContactError> {
+    fn finish(&self, trial: Trial, search: Search) -> Result<Pressed, ContactError> {
+        let (x, iterations) = (&search.x, search.count);
         let scale = trial.wrench.force_n.length().max(LEAST_SCALE_N);
         let displacement = Displacement::from_array(std::array::from_fn(|i| x[i]));
         let solid = self.suspension.spec().spring.solid_compression_mm();
@@ -254,6 +364,7 @@ impl Task<'_> {
             iterations,
             status,
             state: trial.state,
+            learnt: search.jacobian,
         })
     }
 }
@@ -298,7 +409,7 @@ impl Contact {
             before: before.map(|pressed| &pressed.state),
             force: None,
         };
-        task.run(start(suspension, before, 6))
+        task.run(start(suspension, before, 6), before.and_then(|pressed| pressed.learnt.as_ref()))
     }
 
     /// The object moved along `approach` (rest frame) from a start pose until the contact's force along it is
@@ -342,14 +453,14 @@ impl Contact {
             }
         };
         // Loading in steps where the whole force is not found at once.
-        let whole = task.run(x.clone())?;
+        let whole = task.run(x.clone(), before.and_then(|pressed| pressed.learnt.as_ref()))?;
         if !matches!(whole.status, PressStatus::NotBalanced { .. }) {
             return Ok(whole);
         }
         let (mut best, mut iterations) = (whole, 0);
         for part in [0.1, 0.25, 0.45, 0.7, 1.0] {
             task.force = Some((way, force_n * part));
-            let found = task.run(x.clone())?;
+            let found = task.run(x.clone(), None)?;
             iterations += found.iterations;
             let then = Displacement::of_pose(&found.rest_from_platform, suspension.at_mm());
             for (i, value) in then.to_array().into_iter().enumerate() {

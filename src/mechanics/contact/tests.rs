@@ -77,13 +77,16 @@ fn hertz(elastomer: &Elastomer, radius_mm: f64, force_n: f64) -> (f64, f64) {
 fn hertz_holds_between_force_radius_and_pressure() {
     let smooth = Elastomer { friction: 0.0, ..silicone() };
     let contact = Contact::new(smooth, Level::Linear { element_mm: 0.5 }).unwrap();
-    for (polar, depth) in [(0.0, 0.5), (0.4, 0.5), (0.8, 0.5)] {
-        let pose = ball_at(40.0, polar, depth);
-        let state = solved_anywhere(&contact, &ball(40.0), &pose);
-        let (a, p) = hertz(&smooth, 40.0, state.wrench.force_n.length());
-        assert!((state.contact_radius_mm / a - 1.0).abs() < 0.035, "{} {a}", state.contact_radius_mm);
-        assert!((state.peak_pressure_mpa / p - 1.0).abs() < 0.03, "{} {p}", state.peak_pressure_mpa);
-        assert!(state.penetration_mm <= 1e-5);
+    // Elements a quarter of the contact's radius and less.
+    for polar in [0.0, 0.2, 0.4, 0.6, 0.8] {
+        for depth in [0.35, 0.5, 0.6] {
+            let pose = ball_at(40.0, polar, depth);
+            let state = solved_anywhere(&contact, &ball(40.0), &pose);
+            let (a, p) = hertz(&smooth, 40.0, state.wrench.force_n.length());
+            let (radius, peak) = (state.contact_radius_mm / a - 1.0, state.peak_pressure_mpa / p - 1.0);
+            assert!(radius.abs() < 0.03 && peak.abs() < 0.03, "{polar} {depth}: {radius} {peak}");
+            assert!(state.penetration_mm <= 1e-5);
+        }
     }
 }
 
@@ -201,6 +204,50 @@ fn a_press_balances_at_every_level() {
                 before = Some(pressed);
             }
         }
+    }
+}
+
+#[test]
+fn a_balance_that_goes_on_from_the_last_frame_is_the_one_found_afresh() {
+    let smooth = Elastomer { friction: 0.0, ..silicone() };
+    let contact = Contact::new(smooth, Level::Linear { element_mm: 1.0 }).unwrap();
+    let suspension = suspension();
+    for solid in [Solid::sphere(5.0).unwrap(), Solid::mesh(&box_mesh(DVec3::splat(9.0))).unwrap()] {
+        let object = Indenter::rigid(solid);
+        let mut before: Option<Pressed> = None;
+        for x in [0.0, 0.2, 0.4, 1.5] {
+            let mut pose = above(25.0);
+            pose.translation_mm.x = x;
+            let press = |before| {
+                contact.press_with_force(&object, &suspension, &pose, -DVec3::Z, 2.0, before).unwrap()
+            };
+            let (afresh, onwards) = (press(None), press(before.as_ref()));
+            assert_eq!((afresh.status, onwards.status), (PressStatus::Balanced, PressStatus::Balanced));
+            assert!((afresh.wrench.moment_nmm - onwards.wrench.moment_nmm).length() < 1e-4);
+            for point in dome_points(40) {
+                let apart = afresh.state.displacement_mm(point) - onwards.state.displacement_mm(point);
+                assert!(apart.length() < 2e-6, "{x}: {apart}");
+            }
+            before = Some(onwards);
+        }
+    }
+}
+
+#[test]
+fn edges_with_much_friction_come_to_rest() {
+    let rough = Elastomer { friction: 2.0, ..silicone() };
+    let contact = Contact::new(rough, Level::Linear { element_mm: 1.0 }).unwrap();
+    let object = Indenter::rigid(Solid::cuboid(DVec3::new(5.0, 7.0, 6.0)).unwrap());
+    let mut before: Option<ContactState> = None;
+    for step in 0..12 {
+        let turn = DVec3::new(0.9 + 0.03 * f64::from(step), 0.5, 0.1 * f64::from(step));
+        let rotation = crate::numeric::rotation_from_vector(turn);
+        let down = object.solid.support(rotation.transpose() * -DVec3::Z);
+        let pose = Rigid { rotation, translation_mm: DVec3::Z * (9.3 - (rotation * down).z) };
+        let state = contact.solve(&object, &pose, before.as_ref()).unwrap();
+        assert!(state.penetration_mm <= 1e-5, "{step}: {}", state.penetration_mm);
+        assert!(state.residual_mm <= 1e-6, "{step}: {} {:?}", state.residual_mm, state.status);
+        before = Some(state);
     }
 }
 

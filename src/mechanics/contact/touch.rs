@@ -1,9 +1,8 @@
 //! Candidates, their planes, pressures and friction: the part of a solve that every elastic level shares.
 //!
-//! Every candidate node sees the object as the plane that touches it where the node is now; the pressures follow
-//! from a quadratic program on these planes (gap >= 0, pressure >= 0), the friction from another with the pressures
-//! held (Panagiotopoulos' alternation), and the planes are laid anew until nothing moves. What is left at the end
-//! is the true distance of the moved nodes from the object.
+//! Every candidate node sees the object as the plane that touches it where the node is now; pressures and friction
+//! follow from sweeps over the nodes on these planes ([`super::sweeps`]), and the planes are laid anew until nothing
+//! moves. What is left at the end is the true distance of the moved nodes from the object.
 
 use std::collections::BTreeMap;
 
@@ -14,21 +13,26 @@ use super::error::ContactError;
 use super::geometric::{Placed, frame_of};
 use super::local::{DEEPEST, sum};
 use super::state::{ContactState, History, NodeMemory, Status, TouchedNode};
-use super::unilateral::{Bounds, Dense, dot, solve};
+use super::sweeps::{Node, Settled, displacement, sweeps};
 use crate::numeric::Rigid;
 
-/// Rounds of planes, pressures and friction.
-const MOST_ROUNDS: u32 = 60;
+/// Rounds of planes and sweeps.
+const MOST_ROUNDS: u32 = 160;
 /// Rounds are over when no node moves by more than this part of the radius.
 pub(super) const SETTLED: f64 = 1e-8;
 /// A node may be left this part of the radius inside the object.
 pub(super) const PENETRATION: f64 = 1e-6;
 /// What the first planes are taken to move by, as a part of the radius.
 const FIRST_ROUND: f64 = 1e-3;
-/// A round's own error over what the last one moved.
-const CLOSENESS: f64 = 0.01;
-/// Iterations of one quadratic program.
-const MOST_STEPS: u32 = 2000;
+/// A round's own error over what the last one moved: planes laid anew gain about as much.
+const CLOSENESS: f64 = 0.2;
+/// Rounds that move less and less do so at least by this factor, and after this many others are damped.
+const SHRINKS: f64 = 0.7;
+const STALLED: u32 = 3;
+/// A plane turns by this part of its way at least.
+const LEAST_PART: f64 = 1e-6;
+/// Sweeps of one round.
+const MOST_SWEEPS: u32 = 400;
 
 /// A node that may touch.
 #[derive(Debug, Clone)]
@@ -46,8 +50,13 @@ pub(super) struct Candidate {
     /// The plane that it may not pass: outward normal of the object, signed distance of the resting node.
     pub normal: DVec3,
     pub rest_gap_mm: f64,
+    /// Distance to the object where it is now.
+    pub gap_mm: f64,
     /// Where it would be carried if it stuck: displacement before, and the object's since they met.
     pub carried_mm: DVec3,
+    /// Displacement in the frame before, and whether it touched the object then.
+    was_mm: DVec3,
+    touched: bool,
 }
 
 /// How the object came: from the pose of the frame before, or along the normal from the first touch.
@@ -81,16 +90,16 @@ impl<'a> Way<'a> {
 
     /// What a sticking node is carried to: its displacement then, and the object's motion since they met. A node
     /// that was free then met the object on the way, where a straight way would have closed its gap.
-    pub fn carried(&self, placed: &Placed, node: usize, at_mm: DVec3, sharing: f64) -> DVec3 {
-        let motion = |p: DVec3| self.moved.point(p) - p;
-        if let Some(memory) = self.memory.get(&(node as u32)) {
-            return memory.displacement_mm + motion(at_mm + memory.displacement_mm);
+    pub fn carried(&self, placed: &Placed, candidate: &Candidate) -> DVec3 {
+        let was = candidate.was_mm;
+        let p = candidate.at_mm + was;
+        let motion = self.moved.point(p) - p;
+        if candidate.touched {
+            return was + motion;
         }
-        let was = self.before.map_or(DVec3::ZERO, |state| state.displacement_mm(at_mm) * sharing);
-        let p = at_mm + was;
         let (gap_then, gap_now) = (self.then.distance(p).0.max(0.0), placed.distance(p).0);
         let part = if gap_now < 0.0 { -gap_now / (gap_then - gap_now) } else { 0.0 };
-        was + motion(p) * part
+        was + motion * part
     }
 }
 
@@ -115,8 +124,16 @@ impl Candidate {
             force_n: memory.map_or(DVec3::ZERO, |memory| way.moved.vector(memory.force_n)),
             normal: DVec3::Z,
             rest_gap_mm: 0.0,
-            carried_mm: way.carried(placed, node, at_mm, sharing),
+            gap_mm: 0.0,
+            carried_mm: DVec3::ZERO,
+            was_mm: match (memory, way.before) {
+                (Some(memory), _) => memory.displacement_mm,
+                (None, Some(state)) => state.displacement_mm(at_mm) * sharing,
+                (None, None) => DVec3::ZERO,
+            },
+            touched: memory.is_some(),
         };
+        candidate.carried_mm = way.carried(placed, &candidate);
         let inward = -at_mm / radius;
         let (walked, outward) = placed
             .walk_out(at_mm, inward, radius)
@@ -156,7 +173,7 @@ impl Candidate {
 /// The candidates of one frame.
 pub(super) struct Touch<'a> {
     pub elastomer: &'a Elastomer,
-    pub placed: &'a Placed,
+    pub placed: Placed,
     /// 1 + the object's yield for the dome's 1: the gap closes by this times the dome's displacement.
     pub sharing: f64,
     pub candidates: Vec<Candidate>,
@@ -174,152 +191,96 @@ pub(super) struct Rounds {
 }
 
 impl<'a> Touch<'a> {
-    pub fn new(elastomer: &'a Elastomer, placed: &'a Placed, sharing: f64) -> Self {
+    pub fn new(elastomer: &'a Elastomer, placed: Placed, sharing: f64) -> Self {
         Self { elastomer, placed, sharing, candidates: Vec::new(), blocks: Vec::new(), work: 0.0 }
     }
 
-    /// Displacements of the candidates from their forces.
-    pub fn displace(&mut self) -> f64 {
-        let forces: Vec<f64> = self.candidates.iter().flat_map(|c| c.force_n.to_array()).collect();
+    /// Displacements of the candidates from their forces; the most that one moved, mm.
+    fn displace(&mut self) -> f64 {
+        let forces = self.forces();
         let width = forces.len();
         self.work += (width * width) as f64;
         let mut moved = 0.0_f64;
-        for (i, candidate) in self.candidates.iter_mut().enumerate() {
-            let rows = &self.blocks[3 * i * width..3 * (i + 1) * width];
-            let u = DVec3::new(
-                dot(&rows[..width], &forces),
-                dot(&rows[width..2 * width], &forces),
-                dot(&rows[2 * width..], &forces),
-            ) + candidate.offset_mm;
+        for (rows, candidate) in self.blocks.chunks_exact(3 * width.max(1)).zip(&mut self.candidates) {
+            let u = displacement(rows, &forces) + candidate.offset_mm;
             moved = moved.max(u.distance(candidate.u_mm));
             candidate.u_mm = u;
         }
         moved
     }
 
-    /// Planes where the nodes are now.
-    pub fn lay_planes(&mut self) {
+    fn forces(&self) -> Vec<f64> {
+        self.candidates.iter().flat_map(|c| c.force_n.to_array()).collect()
+    }
+
+    /// Distances where the nodes are now, and planes there, turned from the last ones by a part of the way.
+    fn lay_planes(&mut self, part: f64) {
         for candidate in &mut self.candidates {
-            let (distance, outward) = candidate.gap(self.placed);
-            candidate.normal = outward;
-            candidate.rest_gap_mm = distance - outward.dot(candidate.u_mm);
+            let (distance, outward) = candidate.gap(&self.placed);
+            candidate.gap_mm = distance;
+            candidate.normal = candidate.normal.lerp(outward, part).normalize_or(outward);
+            candidate.rest_gap_mm = distance - candidate.normal.dot(candidate.u_mm);
         }
         self.work += 160.0 * self.candidates.len() as f64;
     }
 
-    pub fn run(&mut self) -> Rounds {
+    /// Solves until no node moves by more than `settled_mm`, from the forces that the candidates have.
+    pub fn run(&mut self, settled_mm: f64) -> Rounds {
         let radius = self.elastomer.dome_radius_mm;
+        let settled_mm = settled_mm.max(SETTLED * radius);
+        if self.candidates.iter().any(|c| c.force_n != DVec3::ZERO) {
+            self.displace();
+            self.lay_planes(1.0);
+        }
         let mut moved_mm = FIRST_ROUND * radius;
+        // Planes on an edge may flip between its faces; turned in part, they come to rest between.
+        let (mut part, mut least_mm, mut stalled) = (1.0, f64::INFINITY, 0);
         for count in 1..=MOST_ROUNDS {
-            // A round is solved as closely as the planes deserve: well within what they still move.
-            let wanted = (CLOSENESS * moved_mm).max(0.02 * SETTLED * radius);
-            let pressures = self.press(wanted);
-            self.rub(&pressures, wanted);
+            // A round is solved as closely as the planes deserve: within what they still move.
+            let swept = self.sweep((CLOSENESS * moved_mm).max(0.1 * settled_mm));
             moved_mm = self.displace();
-            if moved_mm <= SETTLED * radius {
+            let settled = moved_mm <= settled_mm && swept.change_mm <= settled_mm;
+            // Planes that the final forces were found on stay theirs.
+            self.lay_planes(if settled { 0.0 } else { part });
+            if settled {
                 return Rounds { count, moved_mm, settled: true };
             }
-            self.lay_planes();
+            stalled += 1;
+            if moved_mm < SHRINKS * least_mm {
+                (least_mm, stalled) = (moved_mm, 0);
+            } else if stalled == STALLED {
+                (part, stalled) = (f64::max(0.6 * part, LEAST_PART), 0);
+            }
         }
         Rounds { count: MOST_ROUNDS, moved_mm, settled: false }
     }
 
-    /// Pressures for the planes, friction held; returns them.
-    fn press(&mut self, wanted_mm: f64) -> Vec<f64> {
-        let n = self.candidates.len();
-        let width = 3 * n;
-        let mut a = Dense { n, values: vec![0.0; n * n] };
-        let mut c = Vec::with_capacity(n);
-        let mut x = Vec::with_capacity(n);
-        let tangential: Vec<f64> = self
+    /// Pressures and friction for the planes.
+    fn sweep(&mut self, wanted_mm: f64) -> Settled {
+        let mut forces = self.forces();
+        let nodes: Vec<Node> = self
             .candidates
             .iter()
-            .flat_map(|c| (c.force_n - c.normal * c.force_n.dot(c.normal)).to_array())
-            .collect();
-        for i in 0..n {
-            let ni = self.candidates[i].normal;
-            let rows = &self.blocks[3 * i * width..3 * (i + 1) * width];
-            let combined: Vec<f64> = (0..width)
-                .map(|k| ni.x * rows[k] + ni.y * rows[width + k] + ni.z * rows[2 * width + k])
-                .collect();
-            for (j, other) in self.candidates.iter().enumerate() {
-                let nj = other.normal;
-                a.values[i * n + j] =
-                    combined[3 * j] * nj.x + combined[3 * j + 1] * nj.y + combined[3 * j + 2] * nj.z;
-            }
-            c.push(
-                self.candidates[i].rest_gap_mm
-                    + ni.dot(self.candidates[i].offset_mm)
-                    + dot(&combined, &tangential),
-            );
-            x.push(self.candidates[i].force_n.dot(ni).max(0.0));
-        }
-        let ended = solve(&a, &c, Bounds::Positive, &mut x, wanted_mm, MOST_STEPS);
-        self.work += (6 * n * n) as f64 + f64::from(ended.iterations + 12) * (n * n) as f64;
-        for (i, candidate) in self.candidates.iter_mut().enumerate() {
-            let t = DVec3::new(tangential[3 * i], tangential[3 * i + 1], tangential[3 * i + 2]);
-            candidate.force_n = candidate.normal * x[i] + t;
-        }
-        x
-    }
-
-    /// Friction for the pressures.
-    fn rub(&mut self, pressures: &[f64], wanted_mm: f64) {
-        let touched: Vec<usize> = (0..pressures.len()).filter(|i| pressures[*i] > 0.0).collect();
-        for (i, candidate) in self.candidates.iter_mut().enumerate() {
-            if pressures[i] <= 0.0 || self.elastomer.friction == 0.0 {
-                candidate.force_n = candidate.normal * pressures[i];
-            }
-        }
-        if self.elastomer.friction == 0.0 || touched.is_empty() {
-            return;
-        }
-        let n = touched.len();
-        let width = 3 * self.candidates.len();
-        let normal_forces: Vec<f64> =
-            self.candidates.iter().zip(pressures).flat_map(|(c, p)| (c.normal * *p).to_array()).collect();
-        let axes: Vec<[DVec3; 2]> = touched
-            .iter()
-            .map(|i| {
-                let (u, v) = frame_of(self.candidates[*i].normal);
-                [u, v]
+            .map(|c| Node {
+                normal: c.normal,
+                rest_gap_mm: c.rest_gap_mm + c.normal.dot(c.offset_mm),
+                carried_mm: c.carried_mm - c.offset_mm,
             })
             .collect();
-        let mut a = Dense { n: 2 * n, values: vec![0.0; 4 * n * n] };
-        let (mut c, mut x, mut radii) = (Vec::new(), Vec::new(), Vec::new());
-        for (row, &i) in touched.iter().enumerate() {
-            let rows = &self.blocks[3 * i * width..3 * (i + 1) * width];
-            let candidate = &self.candidates[i];
-            for (k, t) in axes[row].iter().enumerate() {
-                let combined: Vec<f64> = (0..width)
-                    .map(|q| t.x * rows[q] + t.y * rows[width + q] + t.z * rows[2 * width + q])
-                    .collect();
-                let out = &mut a.values[(2 * row + k) * 2 * n..(2 * row + k + 1) * 2 * n];
-                for (column, &j) in touched.iter().enumerate() {
-                    let block = DVec3::new(combined[3 * j], combined[3 * j + 1], combined[3 * j + 2]);
-                    out[2 * column] = block.dot(axes[column][0]);
-                    out[2 * column + 1] = block.dot(axes[column][1]);
-                }
-                c.push(dot(&combined, &normal_forces) + t.dot(candidate.offset_mm - candidate.carried_mm));
-                x.push(candidate.force_n.dot(*t));
-            }
-            radii.push(self.elastomer.friction * pressures[i]);
+        let ended =
+            sweeps(&self.blocks, &nodes, self.elastomer.friction, &mut forces, wanted_mm, MOST_SWEEPS);
+        self.work += f64::from(ended.sweeps) * (forces.len() * forces.len()) as f64;
+        for (candidate, force) in self.candidates.iter_mut().zip(forces.chunks_exact(3)) {
+            candidate.force_n = DVec3::from_slice(force);
         }
-        let ended = solve(&a, &c, Bounds::Discs(&radii), &mut x, wanted_mm, MOST_STEPS);
-        self.work += (24 * n * n) as f64 + f64::from(ended.iterations + 12) * (4 * n * n) as f64;
-        for (row, &i) in touched.iter().enumerate() {
-            let [u, v] = axes[row];
-            let candidate = &mut self.candidates[i];
-            candidate.force_n = candidate.normal * pressures[i] + u * x[2 * row] + v * x[2 * row + 1];
-        }
+        ended
     }
 
     /// Writes what was found into a state, all but the field.
     pub fn finish(&self, state: &mut ContactState, ended: Rounds) {
         let radius = self.elastomer.dome_radius_mm;
-        let (mut load, mut square) = (0.0, 0.0);
         for candidate in &self.candidates {
-            state.penetration_mm = state.penetration_mm.max(-candidate.gap(self.placed).0);
+            state.penetration_mm = state.penetration_mm.max(-candidate.gap_mm);
             let pressure_n = candidate.force_n.dot(candidate.normal);
             if pressure_n <= 0.0 {
                 continue;
@@ -333,8 +294,6 @@ impl<'a> Touch<'a> {
                 pressure_mpa: pressure_n / candidate.area_mm2,
                 sticks: friction_n < most_n * (1.0 - 1e-9),
             });
-            load += pressure_n;
-            square += pressure_n * pressure_n / candidate.area_mm2;
             state.history.nodes.push(NodeMemory {
                 node: candidate.node as u32,
                 force_n: candidate.force_n,
@@ -342,9 +301,7 @@ impl<'a> Touch<'a> {
             });
         }
         state.wrench = sum(&state.nodes);
-        // 9/8 of the squared force over the sum of the squared pressure is the area of a half ellipsoid's base.
-        state.contact_radius_mm =
-            if square > 0.0 { load * (1.125 / (std::f64::consts::PI * square)).sqrt() } else { 0.0 };
+        state.contact_radius_mm = self.radius_mm();
         state.peak_pressure_mpa = state.nodes.iter().map(|n| n.pressure_mpa).fold(0.0, f64::max);
         state.iterations = ended.count;
         state.residual_mm = ended.moved_mm;
@@ -355,5 +312,38 @@ impl<'a> Touch<'a> {
             (false, true) => Status::Solved,
         };
         state.work += self.work;
+    }
+
+    /// Radius of the disc whose half ellipsoid of pressure has the second moments of this one, mm.
+    ///
+    /// A node's force lies spread about it, and the moments of hats are exact; the squared pressure is not, nor the
+    /// count of nodes. A half ellipsoid has a fifth of each half axis squared.
+    fn radius_mm(&self) -> f64 {
+        let loads = || {
+            self.candidates
+                .iter()
+                .map(|c| (c, c.force_n.dot(c.normal)))
+                .filter(|(_, pressure)| *pressure > 0.0)
+        };
+        let load: f64 = loads().map(|(_, pressure)| pressure).sum();
+        if load <= 0.0 {
+            return 0.0;
+        }
+        let middle = loads().map(|(c, pressure)| c.at_mm * (pressure / load)).sum::<DVec3>();
+        let (u, v) = frame_of(middle.normalize_or(DVec3::Z));
+        let (mut uu, mut vv, mut uv) = (0.0, 0.0, 0.0);
+        for (candidate, pressure) in loads() {
+            // A node without a hat of its own stands for a square.
+            let side = (candidate.area_mm2 / 12.0).sqrt();
+            let spread = candidate.spread_mm;
+            let own = if spread[0] == DVec3::ZERO { [u * side, v * side] } else { spread };
+            for arm in [candidate.at_mm - middle, own[0], own[1]] {
+                let (x, y) = (arm.dot(u), arm.dot(v));
+                uu += pressure / load * x * x;
+                vv += pressure / load * y * y;
+                uv += pressure / load * x * y;
+            }
+        }
+        5.0_f64.sqrt() * (uu * vv - uv * uv).max(0.0).powf(0.25)
     }
 }

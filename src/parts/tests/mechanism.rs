@@ -57,7 +57,7 @@ fn bent_springs_stand_flat_on_both_seats() {
     let chord = Chord::new(0.01).unwrap();
     let tilt = Rigid::new(glam::DMat3::from_rotation_y(0.08), DVec3::new(0.5, -0.3, -0.9));
     for i in 0..m.spring_axes_mm.len() {
-        let tube = bought::spring_tube(&m, i, &tilt, chord).unwrap();
+        let (tube, _) = bought::spring_tube(&m, i, &tilt, chord).unwrap();
         assert!(crate::mesh::inspect(&tube).is_one_solid());
         let [low, high] = bought::spring_ends_mm(&m, i, &tilt);
         let up = tilt.vector(DVec3::Z);

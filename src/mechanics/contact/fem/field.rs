@@ -9,17 +9,21 @@ use super::compliance::Compliance;
 use super::element::quadratic;
 use crate::mechanics::contact::Extent;
 
-/// Amplitudes of the displacement by harmonic and surface node.
+/// The displacement under given forces; worked out when it is first asked for.
 #[derive(Debug, Clone)]
 pub(crate) struct SurfaceField {
-    radius_mm: f64,
-    elements: usize,
-    azimuths: usize,
+    compliance: Arc<Compliance>,
+    /// Forces on grid nodes, in their frames (r, z, phi), N.
+    forces: Vec<(usize, DVec3)>,
+    lazy: Arc<Lazy>,
+}
+
+#[derive(Debug, Default)]
+struct Lazy {
     /// By harmonic, then surface node: r, z, phi of the even family, then of the odd one.
-    amplitudes: Vec<Vec<[f64; 6]>>,
+    amplitudes: OnceLock<Vec<Vec<[f64; 6]>>>,
     /// The same summed on a raster of surface nodes and azimuths, once many points are asked for.
-    raster: Arc<OnceLock<Vec<DVec3>>>,
-    pub work: f64,
+    raster: OnceLock<Vec<DVec3>>,
 }
 
 /// From this many points on, the raster pays.
@@ -27,20 +31,44 @@ const RASTER_FROM: usize = 400;
 
 impl PartialEq for SurfaceField {
     fn eq(&self, other: &Self) -> bool {
-        self.radius_mm == other.radius_mm && self.amplitudes == other.amplitudes
+        self.compliance.grid.radius_mm == other.compliance.grid.radius_mm && self.forces == other.forces
     }
 }
 
 impl SurfaceField {
-    /// From forces on grid nodes, in their frames (r, z, phi), N.
-    pub fn new(compliance: &Compliance, forces: &[(usize, DVec3)]) -> Self {
-        let grid = &compliance.grid;
-        let harmonics = compliance.spectrum().len();
-        let surface = 2 * grid.elements + 1;
+    /// From forces on grid nodes in order, in their frames (r, z, phi), N.
+    pub fn new(compliance: Arc<Compliance>, forces: Vec<(usize, DVec3)>) -> Self {
+        Self { compliance, forces, lazy: Arc::default() }
+    }
+
+    fn surface(&self) -> usize {
+        2 * self.compliance.grid.elements + 1
+    }
+
+    /// Azimuths of the raster.
+    fn azimuths(&self) -> usize {
+        2 * self.compliance.grid.azimuths
+    }
+
+    /// Multiplications of the amplitudes.
+    pub fn work(&self) -> f64 {
+        let grid = &self.compliance.grid;
+        let mut rings: Vec<usize> = self.forces.iter().map(|(number, _)| grid.node(*number).ring).collect();
+        rings.dedup();
+        let sums: usize = rings.iter().map(|ring| grid.harmonics(*ring)).sum();
+        (18 * self.surface() * sums) as f64
+    }
+
+    fn amplitudes(&self) -> &[Vec<[f64; 6]>] {
+        self.lazy.amplitudes.get_or_init(|| self.sum_forces())
+    }
+
+    fn sum_forces(&self) -> Vec<Vec<[f64; 6]>> {
+        let grid = &self.compliance.grid;
+        let harmonics = self.compliance.spectrum().len();
         // Forces of each ring by harmonic: cos and sin sums.
         let mut rings: Vec<(usize, Vec<[f64; 6]>)> = Vec::new();
-        let mut work = 0.0;
-        for &(number, force) in forces {
+        for &(number, force) in &self.forces {
             let node = grid.node(number);
             if rings.last().is_none_or(|(ring, _)| *ring != node.ring) {
                 rings.push((node.ring, vec![[0.0; 6]; grid.harmonics(node.ring).min(harmonics)]));
@@ -64,11 +92,10 @@ impl SurfaceField {
                 (cosine, sine) =
                     (cosine * step_cosine - sine * step_sine, sine * step_cosine + cosine * step_sine);
             }
-            work += 12.0 * sums.len() as f64;
         }
         let mut amplitudes = Vec::with_capacity(harmonics);
-        for (m, spectrum) in compliance.spectrum().iter().enumerate() {
-            let mut nodes = vec![[0.0; 6]; surface];
+        for (m, spectrum) in self.compliance.spectrum().iter().enumerate() {
+            let mut nodes = vec![[0.0; 6]; self.surface()];
             for (ring, sums) in &rings {
                 let (Some(sums), Some(first)) = (sums.get(m), ring.checked_sub(spectrum.first_ring)) else {
                     continue;
@@ -82,36 +109,28 @@ impl SurfaceField {
                             node[3 + k] += values[k] * odd;
                         }
                     }
-                    work += 6.0 * surface as f64;
                 }
             }
             amplitudes.push(nodes);
         }
-        Self {
-            radius_mm: grid.radius_mm,
-            elements: grid.elements,
-            azimuths: 2 * grid.azimuths,
-            amplitudes,
-            raster: Arc::default(),
-            work,
-        }
+        amplitudes
     }
 
     /// The whole dome moves: the bound is the sum of all amplitudes, which no point can pass, over the whole dome.
     pub fn extent(&self) -> Extent {
-        let surface = 2 * self.elements + 1;
+        let amplitudes = self.amplitudes();
         let at_most = |p: usize| {
             let size = |a: &[f64; 6]| a.iter().map(|v| v * v).sum::<f64>().sqrt();
-            self.amplitudes.iter().map(|nodes| size(&nodes[p])).sum::<f64>()
+            amplitudes.iter().map(|nodes| size(&nodes[p])).sum::<f64>()
         };
-        let beyond_mm = (0..surface).map(at_most).fold(0.0, f64::max);
+        let beyond_mm = (0..self.surface()).map(at_most).fold(0.0, f64::max);
         Extent { direction: DVec3::Z, angle_rad: FRAC_PI_2, beyond_mm }
     }
 
     /// Makes the raster where many points will be asked for.
     pub fn prepare(&self, points: usize) {
         if points >= RASTER_FROM {
-            self.raster.get_or_init(|| self.sum_raster());
+            self.lazy.raster.get_or_init(|| self.sum_raster());
         }
     }
 
@@ -120,16 +139,17 @@ impl SurfaceField {
         let flat = at_mm.truncate().length();
         let polar = flat.atan2(at_mm.z).clamp(0.0, FRAC_PI_2);
         let azimuth = if flat > 0.0 { at_mm.y.atan2(at_mm.x) } else { 0.0 };
-        let s = polar / FRAC_PI_2 * self.elements as f64;
-        let element = (s as usize).min(self.elements - 1);
+        let elements = self.compliance.grid.elements;
+        let s = polar / FRAC_PI_2 * elements as f64;
+        let element = (s as usize).min(elements - 1);
         let (n, _) = quadratic(2.0 * (s - element as f64) - 1.0);
-        if let Some(raster) = self.raster.get() {
+        if let Some(raster) = self.lazy.raster.get() {
             return self.interpolate(raster, element, n, azimuth);
         }
         let (step_sine, step_cosine) = azimuth.sin_cos();
         let (mut cosine, mut sine) = (1.0, 0.0);
         let mut u = DVec3::ZERO;
-        for nodes in &self.amplitudes {
+        for nodes in self.amplitudes() {
             for (k, n) in n.into_iter().enumerate() {
                 let a = &nodes[2 * element + k];
                 u += DVec3::new(
@@ -150,14 +170,15 @@ impl SurfaceField {
 
     /// Sensor-frame displacements, surface node by surface node, azimuth by azimuth.
     fn sum_raster(&self) -> Vec<DVec3> {
-        let surface = 2 * self.elements + 1;
-        let n = self.azimuths;
+        let surface = self.surface();
+        let n = self.azimuths();
+        let amplitudes = self.amplitudes();
         let waves: Vec<(f64, f64)> = (0..n).map(|k| (TAU * k as f64 / n as f64).sin_cos()).collect();
         let mut out = Vec::with_capacity(surface * n);
         let mut ring = vec![DVec3::ZERO; n];
         for p in 0..surface {
             ring.fill(DVec3::ZERO);
-            for (m, nodes) in self.amplitudes.iter().enumerate() {
+            for (m, nodes) in amplitudes.iter().enumerate() {
                 let a = &nodes[p];
                 if a.iter().all(|v| *v == 0.0) {
                     continue;
@@ -183,7 +204,7 @@ impl SurfaceField {
 
     /// The elements' own quadratic along the meridian, a cubic (Catmull-Rom) along the ring.
     fn interpolate(&self, raster: &[DVec3], element: usize, n: [f64; 3], azimuth: f64) -> DVec3 {
-        let count = self.azimuths;
+        let count = self.azimuths();
         let s = azimuth.rem_euclid(TAU) / TAU * count as f64;
         let (base, t) = (s.floor() as usize % count, s - s.floor());
         let (t2, t3) = (t * t, t * t * t);

@@ -1,5 +1,7 @@
 //! The swept elements against exact solutions.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 use nalgebra::SVector;
 
@@ -93,7 +95,7 @@ fn the_compliance_is_symmetric_positive_and_turns_with_the_dome() {
 
 /// The dome under a smooth pressure about the pole, 0.05 MPa cos^4 of what takes the cap of 0.8 rad to a quarter turn.
 fn pressed(elements: usize) -> SurfaceField {
-    let compliance = Compliance::new(&silicone(0.49), elements).unwrap();
+    let compliance = Arc::new(Compliance::new(&silicone(0.49), elements).unwrap());
     let grid = &compliance.grid;
     let forces: Vec<(usize, DVec3)> = (0..grid.len())
         .filter_map(|number| {
@@ -104,7 +106,7 @@ fn pressed(elements: usize) -> SurfaceField {
             (polar < 0.8).then(|| (number, inward * (0.05 * wave.powi(4) * grid.areas_mm2[node.ring])))
         })
         .collect();
-    SurfaceField::new(&compliance, &forces)
+    SurfaceField::new(Arc::clone(&compliance), forces)
 }
 
 fn at(polar: f64) -> DVec3 {

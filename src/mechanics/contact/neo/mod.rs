@@ -81,7 +81,7 @@ pub(super) fn neo_hookean(
     }
     let way = Way::new(&placed, before, deepest_mm, distance_mm);
     let sharing = 1.0 + indenter.yield_ratio(elastomer);
-    let mut touch = Touch::new(elastomer, &placed, sharing);
+    let mut touch = Touch::new(elastomer, placed.clone(), sharing);
     // All that can come to touch: the elements are large beside what an outer node bulges.
     let margin = 0.6 * largest_edge(body) + 0.15 * -distance_mm;
     for (number, (_, node, area_mm2)) in body.mesh.surface.iter().enumerate() {
@@ -145,7 +145,7 @@ fn newton(
         Body::solve(&factors, &mut rhs);
         state.work += (columns * body.entries()) as f64;
         condense(touch, &rhs, &u, body);
-        ended = touch.run();
+        ended = touch.run(0.0);
         let wanted: Vec<DVec3> = touch.candidates.iter().map(|c| c.force_n).collect();
         let direction: Vec<DVec3> = (0..nodes)
             .map(|node| {

@@ -60,4 +60,5 @@ pub mod parts;
 pub mod pose;
 pub mod report;
 pub mod sim;
+pub mod track;
 pub mod transfer;

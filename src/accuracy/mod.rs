@@ -11,6 +11,7 @@ pub mod chart;
 pub mod clock;
 mod contact;
 mod files;
+mod frames;
 pub mod ladder;
 mod lens;
 mod meshes;
@@ -20,6 +21,8 @@ mod placement;
 mod pose;
 #[cfg(test)]
 mod tests;
+mod touch_scene;
+mod tracking;
 
 use std::fmt;
 
@@ -35,6 +38,7 @@ use crate::design::{Design, DesignError};
 use crate::layout::report::LayoutReport;
 use crate::layout::{Layout, LayoutSpec};
 use crate::parts::{self, PartError};
+use crate::sim::Scene;
 
 /// What the measurement was made on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -129,14 +133,16 @@ impl fmt::Display for AccuracyError {
 impl std::error::Error for AccuracyError {}
 
 /// Steps of [`measure`], for a progress bar.
-pub const STEPS: u32 = 9;
+pub const STEPS: u32 = 11;
 
-/// Measures a design; `step` is told how many of [`STEPS`] are done and what comes next.
+/// Measures a design, and frames and runtime on a scene of it: the one that is given, or a ball pressed onto it;
+/// `step` is told how many of [`STEPS`] are done and what comes next.
 ///
 /// # Errors
 /// What a build of the design would say.
 pub fn measure(
     design: &Design,
+    scene: Option<&Scene>,
     quick: bool,
     step: &mut dyn FnMut(u32, &str),
 ) -> Result<Accuracy, AccuracyError> {
@@ -203,7 +209,25 @@ pub fn measure(
         Ok(ladder) => keep(Some(ladder), ""),
         Err(error) => keep(None, &format!("a touch: {error}")),
     }
-    step(8, "what it comes to");
+    step(8, "frames");
+    let own;
+    let scene = match scene {
+        Some(scene) => Ok(scene),
+        None => {
+            own = touch_scene::of(design);
+            own.as_ref().map_err(ToString::to_string)
+        }
+    };
+    match scene.and_then(|scene| frames::ladder(scene, patience, quick).map_err(|error| error.to_string())) {
+        Ok((ladder, sequence)) => {
+            keep(Some(ladder), "");
+            step(9, "the runtime");
+            let tracker = tracking::ladder(&constants, &sequence, patience);
+            keep(tracker, "the runtime: the scene draws no frames, or the constants fit no tracker");
+        }
+        Err(error) => keep(None, &format!("frames and the runtime: {error}")),
+    }
+    step(10, "what it comes to");
     let budgets: Vec<Budget> =
         [budget::of_dots(design, &layout, &judged, &ladders), budget::of_force(design, &constants, &ladders)]
             .into_iter()

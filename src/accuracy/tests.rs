@@ -127,7 +127,7 @@ fn long_ladders_of_the_twins_fall_at_their_orders() {
 fn ladders_of(name: &str, text: &str, left_out: usize) {
     let design = crate::design::from_text(text).unwrap();
     let mut steps = Vec::new();
-    let measured = measure(&design, true, &mut |done, _| steps.push(done)).unwrap();
+    let measured = measure(&design, None, true, &mut |done, _| steps.push(done)).unwrap();
     assert_eq!(steps, (0..STEPS).collect::<Vec<_>>(), "{name}");
     let mut faults = Vec::new();
     for ladder in &measured.ladders {

@@ -9,21 +9,38 @@ use super::output::{Failure, Output};
 use crate::accuracy::{self, AccuracyError};
 use crate::build::{DESIGN_NAME, DesignRecord, MANIFEST_NAME, Manifest, Tree, sha256_hex};
 use crate::design::{self, DesignError};
+use crate::sim::{Scene, SimError};
 
 /// Measures, then writes the result whole.
-pub fn run(output: &Output, design_file: &Path, out: Option<&Path>, quick: bool) -> Result<(), Failure> {
+pub fn run(
+    output: &Output,
+    design_file: &Path,
+    scene_file: Option<&Path>,
+    out: Option<&Path>,
+    quick: bool,
+) -> Result<(), Failure> {
     let began = Instant::now();
     let design = design::load(design_file)?;
+    let scene = scene_file
+        .map(|path| {
+            Scene::load(path).map_err(|error| match error {
+                SimError::Input(error) if error.file.is_none() => Failure::from(error.in_file(path)),
+                SimError::Input(error) => Failure::Input(error),
+                other => DesignError::at("", "", other.to_string(), "a scene that can be drawn")
+                    .in_file(path)
+                    .into(),
+            })
+        })
+        .transpose()?;
     let done = |done: u32, doing: &str| {
         let filled = (20 * done / accuracy::STEPS) as usize;
         output.step(&format!("[{}{}] {doing}", "=".repeat(filled), " ".repeat(20 - filled)));
     };
-    let measured = accuracy::measure(&design, quick, &mut |count, doing| done(count, doing)).map_err(
-        |error| match error {
+    let measured = accuracy::measure(&design, scene.as_ref(), quick, &mut |count, doing| done(count, doing))
+        .map_err(|error| match error {
             AccuracyError::Design(error) => Failure::from(error.in_file(design_file)),
             AccuracyError::Part(error) => Failure::from(DesignError::from(error).in_file(design_file)),
-        },
-    )?;
+        })?;
     let mut tree = Tree::default();
     for file in measured.files() {
         tree.add(file.name, file.bytes);

@@ -14,6 +14,7 @@ mod points;
 mod schema;
 mod shell;
 mod simulate;
+mod track;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -56,6 +57,9 @@ enum Command {
         /// Where to write [default: output/<design name>-accuracy].
         #[arg(long)]
         out: Option<PathBuf>,
+        /// The scene that frames and runtime are measured on [default: a ball pressed onto the dome].
+        #[arg(long)]
+        scene: Option<PathBuf>,
         /// A first look in a few seconds: fewer runs, no rungs that take long.
         #[arg(long)]
         quick: bool,
@@ -155,6 +159,8 @@ enum Command {
         #[arg(long)]
         scene: bool,
     },
+    /// From frames to markers, pose, wrench and local displacement.
+    Track(Box<track::TrackArguments>),
     /// Print the completions for a shell.
     Completions {
         /// Which shell.
@@ -209,7 +215,9 @@ pub fn run() -> ExitCode {
 fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
     match command {
         Command::Build { design, out, watch } => build::run(output, design, out.as_deref(), *watch),
-        Command::Accuracy { design, out, quick } => accuracy::run(output, design, out.as_deref(), *quick),
+        Command::Accuracy { design, scene, out, quick } => {
+            accuracy::run(output, design, scene.as_deref(), out.as_deref(), *quick)
+        }
         Command::New { name, from, out } => new::run(output, name, from.as_deref(), out.as_deref()),
         Command::Explain { field, design } => explain::run(output, field, design.as_deref()),
         Command::Compare { a, b } => compare::run(output, a, b),
@@ -227,6 +235,7 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         }
         Command::Simulate { scene, options } => simulate::run(output, scene, options),
         Command::Schema { scene } => schema::run(output, *scene),
+        Command::Track(arguments) => track::run(output, arguments),
         Command::CalibratePrint { measured, design, out, marks } => {
             calibrate_print::run(output, measured, design, out.as_deref(), *marks)
         }

@@ -39,13 +39,14 @@ pub fn ladder(
         Some(sum.normalize() * optics.dome_radius_mm())
     };
     let truth: Vec<Option<DVec3>> = pixels.iter().map(|&pixel| balanced(&channels, optics, pixel)).collect();
-    let places: [(&'static str, &str, &dyn Fn(DVec2) -> Option<DVec3>); 3] = [
-        ("pinhole", "lens and pinhole alone", &|pixel| trace(&clear, pixel)),
-        ("refraction", "with the layers' refraction", &|pixel| trace(optics, pixel)),
-        ("dispersion", "mean of the three channels", &mean_trace),
+    type Place<'a> = &'a dyn Fn(DVec2) -> Option<DVec3>;
+    let places: [(&str, Place<'_>); 3] = [
+        ("lens and pinhole alone", &|pixel| trace(&clear, pixel)),
+        ("with the layers' refraction", &|pixel| trace(optics, pixel)),
+        ("mean of the three channels", &mean_trace),
     ];
     let mut rungs = Vec::new();
-    for (index, (_, label, place)) in places.iter().enumerate() {
+    for (index, (label, place)) in places.iter().enumerate() {
         let off = pixels.iter().zip(&truth).map(|(&pixel, truth)| match (place(pixel), truth) {
             (Some(at), Some(truth)) => at.distance(*truth),
             _ => f64::NAN,

@@ -22,11 +22,13 @@ mod limit;
 mod sensor;
 mod spec;
 mod stack;
+mod tube;
 
 pub use jacobian::PixelMotion;
 pub use limit::Limit;
 pub use sensor::{SensorOptics, SolvedPixel, SurfacePoint};
 pub use spec::{Channel, Layer, OpticsError, OpticsSpec};
+pub use tube::LightTube;
 
 #[cfg(test)]
 mod tests;

@@ -37,6 +37,19 @@ pub(super) struct Path<'a> {
     pub fill: Plate,
 }
 
+/// Where a climb ended.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Climbed {
+    /// The lowest index in the way, whose layer the tangent is for.
+    pub index: f64,
+    /// Tangent there.
+    pub tangent: f64,
+    /// Reach over tangent.
+    pub reach_per_tangent: f64,
+    /// Derivative of the reach by the tangent.
+    pub slope: f64,
+}
+
 /// A ray in air towards a point, and how it changes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AirRay {
@@ -115,7 +128,11 @@ impl Path<'_> {
     fn climb_counted(&self, n0: f64, reach_mm: f64) -> Result<(f64, u32), Limit> {
         let (at_axis, _) = self.reach(n0, 0.0);
         // X(t) <= t X'(0): a lower bound of the solution.
-        let mut t = reach_mm / at_axis;
+        self.climb_above(n0, reach_mm, reach_mm / at_axis)
+    }
+
+    /// The climb from `t`, which must not lie above the solution, and its steps.
+    fn climb_above(&self, n0: f64, reach_mm: f64, mut t: f64) -> Result<(f64, u32), Limit> {
         if t == 0.0 {
             return Ok((0.0, 0));
         }
@@ -138,6 +155,24 @@ impl Path<'_> {
         let n0 = self.lowest_index()?;
         let t = self.climb(n0, reach_mm)?;
         finite(in_air(n0, t)?.0 / self.reach_by(n0, t, reach_mm))
+    }
+
+    /// The climb from a neighbour's tangent, with what a tube of light needs of its end.
+    ///
+    /// The tangent line of a concave function lies above it, so one Newton step from anywhere, be it above the
+    /// solution, ends below; from there the climb is the usual one.
+    pub fn climb_from(&self, reach_mm: f64, near_tangent: f64) -> Result<Climbed, Limit> {
+        let index = self.lowest_index()?;
+        let (at_axis, _) = self.reach(index, 0.0);
+        let lowest = reach_mm / at_axis;
+        let mut start = lowest;
+        if near_tangent > lowest {
+            let (by_t, slope) = self.reach(index, near_tangent);
+            start = (near_tangent + (reach_mm - by_t * near_tangent) / slope).max(lowest);
+        }
+        let (tangent, _) = self.climb_above(index, reach_mm, start)?;
+        let (reach_per_tangent, slope) = self.reach(index, tangent);
+        Ok(Climbed { index, tangent, reach_per_tangent, slope })
     }
 
     /// Steps of the climb to this reach, and by how much the reach is missed, in

@@ -198,7 +198,7 @@ impl Measures {
     /// Pose of LED `i`: origin at the centre of its emitting face, x across
     /// the board, y up the board, z out of the emitting face.
     pub fn platform_from_led(&self, i: usize) -> DAffine3 {
-        upper::platform_from_led(self, i)
+        upper::platform_from_led(&self.leds, i)
     }
 
     /// Cuts a pocket for a magnet at every spring into the face at

@@ -35,6 +35,7 @@ mod tests;
 
 use std::io::{self, Write};
 
+use glam::DAffine3;
 use rayon::prelude::*;
 
 pub use assembly::{Assembly, Item};
@@ -47,6 +48,7 @@ pub use poses::Pose;
 pub use sight::{EdgeRay, MarkerView, markers_of};
 pub use view::ViewCone;
 
+use crate::design::sections::LedsSection;
 use crate::layout::Hit;
 use crate::mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, write_stl};
 
@@ -141,6 +143,20 @@ impl Part {
     pub fn write_stl(&self, writer: &mut impl Write) -> io::Result<()> {
         write_stl(&self.mesh, writer)
     }
+}
+
+/// The upper platform as exact shapes in the sensor frame, before any mesh: what stands in the way of the lights.
+///
+/// # Errors
+/// A platform that the design cannot have.
+pub fn upper_platform(measures: &Measures) -> Result<Construction, PartError> {
+    Ok(upper::blueprint(measures)?.construction())
+}
+
+/// Pose of LED `i`: origin at the centre of its emitting face, x across the board, y up the board, z out of the
+/// emitting face; sensor frame.
+pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
+    upper::platform_from_led(leds, i)
 }
 
 /// Makes all parts, in a fixed order, and checks each against the process. One

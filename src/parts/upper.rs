@@ -4,6 +4,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::measures::{Measures, polar};
 use super::{Blueprint, Feature, PartError};
+use crate::design::sections::LedsSection;
 use crate::mesh::{Fit, Profile, Shape};
 
 /// The light channel is wider than the pit by this share on each side: their
@@ -188,8 +189,7 @@ fn rim_notch(
 
 /// Pose of LED `i`: origin at the centre of its emitting face, x across the
 /// board, y up the board, z out of the emitting face.
-pub(super) fn platform_from_led(m: &Measures, i: usize) -> DAffine3 {
-    let leds = &m.leds;
+pub(super) fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
     let azimuth_deg = leds.list.get(i).map_or(0.0, |led| led.azimuth_deg);
     let (sin, cos) = leds.tilt_deg.to_radians().sin_cos();
     let outward = polar(1.0, azimuth_deg).extend(0.0);

@@ -15,6 +15,9 @@ pub struct WhiteMarkersSection {
     /// Diameter of a disc, mm.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 100.0))]
     pub diameter_mm: f64,
+    /// Share of the light that their paint gives back, by Lambert's law.
+    #[schemars(range(min = 0.0, max = 0.99))]
+    pub reflectance: f64,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,

@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod camera;
+mod light;
 mod loads;
 mod making;
 mod optics;
@@ -21,6 +22,7 @@ use serde::{Deserialize, Serialize};
 
 pub use accuracy::AccuracySection;
 pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
+pub use light::{DiffuserSection, PowerRgb, ReflectanceRgb};
 pub use loads::{LoadClaim, LoadsSection, NoiseSection, WhiteMarkersSection};
 pub use making::{
     CouponSection, FillSection, JigSection, MeshSection, MouldSection, PinsSection, ProcessSection,
@@ -167,6 +169,8 @@ pub struct ElastomerSection {
     /// Thickness of the reflective membrane outside the dome, mm.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub membrane_thickness_mm: f64,
+    /// Share of the light that the membrane gives back into the dome, by Lambert's law.
+    pub membrane_reflectance: ReflectanceRgb,
     /// Linear shrinkage on curing, percent of the length.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub shrinkage_percent: f64,

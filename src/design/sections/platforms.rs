@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Why;
+use super::{DiffuserSection, PowerRgb, Why};
 
 /// The two printed platforms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -181,6 +181,18 @@ pub struct LedsSection {
     /// The lights.
     #[schemars(length(max = 24))]
     pub list: Vec<LedSection>,
+    /// Radiant flux of one light of each colour as it is driven, mW; a white light sends all three.
+    pub radiant_flux_mw: PowerRgb,
+    /// Exponent m of the bare light's lobe: intensity as cos^m of the angle to its axis; 1 is Lambert's law, with
+    /// half of the intensity at 60 degrees.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub lobe_exponent: f64,
+    /// What the diffuser tape does to the light; left out: no tape, or a clear one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub diffuser: Option<DiffuserSection>,
+    /// Share of the light that gets straight through the platform where it stands in the way; 0 for an opaque one.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub through_platform: f64,
     /// Angle between board and base plane, degrees: 90 faces the axis squarely, less looks up towards the dome.
     #[schemars(range(min = 30.0, max = 90.0))]
     pub tilt_deg: f64,

@@ -1,12 +1,28 @@
 //! The effects, one file each.
 
+mod bayer;
+mod compression;
+mod defocus;
+mod diffuser;
+mod direct_light;
 mod dispersion;
 mod dots;
+mod falloff;
+mod fresnel;
 mod gap_change;
+mod interreflection;
 mod lens_distortion;
+mod motion_blur;
+mod noise;
+mod platform_shadow;
 mod pupil_shift;
 mod refraction;
+mod rolling_shutter;
 mod sheet_motion;
+mod speed;
+#[cfg(test)]
+mod tests;
+mod vignetting;
 
 use super::effect::Effect;
 
@@ -20,5 +36,18 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &sheet_motion::SheetMotion,
         &gap_change::GapChange,
         &dots::Dots,
+        &direct_light::DirectLight,
+        &falloff::Falloff,
+        &diffuser::Diffuser,
+        &fresnel::Fresnel,
+        &platform_shadow::PlatformShadow,
+        &interreflection::Interreflection,
+        &vignetting::Vignetting,
+        &defocus::Defocus,
+        &motion_blur::MotionBlur,
+        &rolling_shutter::RollingShutter,
+        &bayer::Bayer,
+        &noise::Noise,
+        &compression::Compression,
     ]
 }

@@ -33,6 +33,8 @@ pub struct ElectronicsSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 100))]
     pub jpeg_quality: Option<u8>,
+    /// How finely that code keeps colour.
+    pub jpeg_chroma: JpegChroma,
     /// Reasons and sources, by field.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
@@ -48,6 +50,7 @@ impl Default for ElectronicsSection {
             bayer: None,
             noise: None,
             jpeg_quality: None,
+            jpeg_chroma: JpegChroma::HalfWidth,
             why: None,
         }
     }
@@ -84,6 +87,31 @@ pub struct ShutterSection {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub readout_s: f64,
+}
+
+/// How finely a JPEG keeps colour, of how finely it keeps light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum JpegChroma {
+    /// For every pixel.
+    #[serde(rename = "444")]
+    Full,
+    /// For every second pixel of a row, as UVC cameras do.
+    #[serde(rename = "422")]
+    HalfWidth,
+    /// For every second pixel of every second row.
+    #[serde(rename = "420")]
+    Quarter,
+}
+
+impl JpegChroma {
+    /// The name that files carry.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Full => "444",
+            Self::HalfWidth => "422",
+            Self::Quarter => "420",
+        }
+    }
 }
 
 /// Order of the colour filters from the top-left pixel.

@@ -12,7 +12,7 @@ pub struct LightSection {
     /// Level of an evenly lit membrane; used where `leds` is left out.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub membrane_level: f64,
-    /// Level of the white markers.
+    /// Level of the white markers; used where `leds` is left out.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub marker_level: f64,
     /// Level of what lies beside the dome: sheet and platform.
@@ -29,29 +29,48 @@ impl Default for LightSection {
     }
 }
 
+impl LightSection {
+    /// No level of the picture is above this: full scale under the design's lights, which may saturate.
+    pub fn brightest_level(&self) -> f64 {
+        let even = [self.membrane_level, self.marker_level, self.surround_level];
+        let start = if self.leds.is_some() { 1.0 } else { 0.0 };
+        even.into_iter().fold(start, f64::max)
+    }
+}
+
 /// The design's lights at work.
+///
+/// Their flux, lobes, diffuser and the reflectances of what they light are the design's (`leds`, `elastomer`,
+/// `white_markers`); here stands how they are driven and how long the camera looks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LedLight {
-    /// Brightness of all lights: 1 lets the brightest point of the undeformed membrane reach `membrane_level`.
+    /// Brightness of all lights, of the design's `radiant_flux_mw`.
+    #[serde(default = "one")]
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub power: f64,
-    /// Exponent m of the bare light's lobe cos^m.
-    #[schemars(range(min = 0.0, max = 1000.0))]
-    pub lobe_exponent: f64,
-    /// Part of the diffuser's light that leaves by Lambert's law, 0 to 1; the rest keeps a Gaussian lobe.
+    /// Brightness of each light beside `power`, in the design's order; left out: 1 for each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 24), inner(range(min = 0.0, max = 1000.0)))]
+    pub each: Vec<f64>,
+    /// Exposure and gain in one number: level that the image of a white surface in air gets for each mW/mm^2 of
+    /// light on it.
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1e9))]
+    pub level_per_mw_mm2: f64,
+    /// Level that light from outside, leaking through the membrane, gives it besides.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub diffuser_lambert: f64,
-    /// Standard deviation of the Gaussian lobe, degrees; 0 for no diffuser.
+    pub stray_level: f64,
+    /// What a channel of the camera takes of the neighbouring colour of light (red of green, green of red and blue,
+    /// blue of green), of what it takes of its own.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 90.0))]
-    pub diffuser_sigma_deg: f64,
-    /// Reflectance of the membrane, for light that is thrown from one part of the dome to another; 0 for none.
-    #[serde(default)]
-    #[schemars(range(min = 0.0, max = 0.999))]
-    pub membrane_reflectance: f64,
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub crosstalk: f64,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
+}
+
+fn one() -> f64 {
+    1.0
 }

@@ -1,0 +1,151 @@
+//! Thin tubes of light from a source in the air below the sheet to a point of the dome, and from the dome
+//! back to the dome by way of the sheet's underside.
+//!
+//! A tube keeps its flux, so what a source of intensity `I` (per steradian) gives a surface at the far end is
+//! `I * sr_per_mm2 * cos` per square millimetre: the solid angle that a square millimetre across the ray takes
+//! up at the source. Without layers that is `1 / distance^2`. Through flat layers the ray of angle `theta`
+//! reaches `X(theta)` sideways, a ring of solid angle `2 pi sin(theta) d theta` lands on a level ring of area
+//! `2 pi X dX`, and across the ray, which arrives at the angle `beta`, the area is smaller by `cos(beta)`:
+//!
+//! ```text
+//! sr_per_mm2 = (sin(theta) / X) (d theta / d X) / cos(beta)
+//! ```
+
+use glam::{DVec2, DVec3};
+
+use super::stack::{Path, Plate};
+use super::{Limit, SensorOptics};
+
+/// A thin tube of light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightTube {
+    /// Unit direction in which it leaves, sensor frame.
+    pub leaving: DVec3,
+    /// Unit direction in which it arrives, in the medium of its end, sensor frame.
+    pub arriving: DVec3,
+    /// Solid angle at the source for an area across the ray at the end, sr/mm^2.
+    pub sr_per_mm2: f64,
+    /// What every layer along it has in common: index times sine of the angle to the layers' normal.
+    pub momentum: f64,
+    /// Tangent of its angle to the normal in the layer of lowest index: where the search for the tube of a
+    /// neighbouring point may start.
+    pub tangent: f64,
+    /// Where it meets the sheet's underside, sensor frame, mm.
+    pub underside_mm: DVec3,
+}
+
+impl SensorOptics {
+    /// The tube from a source in the air below the sheet to a point: in or on the dome, or on the sheet's top.
+    ///
+    /// `near_tangent` is the [`LightTube::tangent`] of a neighbour, or 0; it changes the time, not the answer.
+    ///
+    /// # Errors
+    /// [`Limit::Unreachable`] if the source is not below the sheet; else as [`SensorOptics::project`].
+    pub fn light_tube(
+        &self,
+        source_mm: DVec3,
+        point_mm: DVec3,
+        near_tangent: f64,
+    ) -> Result<LightTube, Limit> {
+        let air_mm = self.bottom_mm - source_mm.z;
+        if !(source_mm.is_finite() && point_mm.is_finite() && near_tangent.is_finite()) {
+            return Err(Limit::NotFinite);
+        }
+        if air_mm <= 0.0 || point_mm.z < 0.0 {
+            return Err(Limit::Unreachable);
+        }
+        let fill = Plate { thickness_mm: point_mm.z, ..self.fill };
+        let path = Path { air_mm, plates: &self.plates, spared_mm: 0.0, fill };
+        let sideways = (point_mm - source_mm).truncate();
+        let end = self.medium_at(point_mm.z);
+        let way = tube(&path, sideways, near_tangent, 1.0, end)?;
+        let under = source_mm.truncate() + way.aside * (way.tangent * air_mm);
+        Ok(LightTube {
+            leaving: direction(way.aside, way.momentum, 1.0),
+            arriving: direction(way.aside, way.momentum / end, 1.0),
+            sr_per_mm2: way.sr_per_mm2,
+            momentum: way.momentum,
+            tangent: way.tangent,
+            underside_mm: under.extend(self.bottom_mm),
+        })
+    }
+
+    /// The tube from a point of the dome down to the sheet's underside and, reflected there, up to another
+    /// point of the dome or of the sheet's top. How much is reflected is not its matter.
+    ///
+    /// # Errors
+    /// [`Limit::Unreachable`] for points below the sheet's top, and where nothing lies between the two.
+    pub fn mirrored_tube(&self, from_mm: DVec3, to_mm: DVec3, near_tangent: f64) -> Result<LightTube, Limit> {
+        if !(from_mm.is_finite() && to_mm.is_finite() && near_tangent.is_finite()) {
+            return Err(Limit::NotFinite);
+        }
+        if from_mm.z < 0.0 || to_mm.z < 0.0 {
+            return Err(Limit::Unreachable);
+        }
+        // Down and up through the same sheet is once through a sheet twice as thick.
+        let twice = |plate: &Plate| Plate { thickness_mm: 2.0 * plate.thickness_mm, ..*plate };
+        let plates: Vec<Plate> = self.plates.iter().map(twice).collect();
+        let fill = Plate { thickness_mm: from_mm.z + to_mm.z, ..self.fill };
+        let path = Path { air_mm: 0.0, plates: &plates, spared_mm: 0.0, fill };
+        let (start, end) = (self.medium_at(from_mm.z), self.medium_at(to_mm.z));
+        let way = tube(&path, (to_mm - from_mm).truncate(), near_tangent, start, end)?;
+        let down = from_mm.z * slope_in(self.fill.index, way.momentum)
+            + self.plates.iter().map(|p| p.thickness_mm * slope_in(p.index, way.momentum)).sum::<f64>();
+        Ok(LightTube {
+            leaving: direction(way.aside, way.momentum / start, -1.0),
+            arriving: direction(way.aside, way.momentum / end, 1.0),
+            sr_per_mm2: way.sr_per_mm2,
+            momentum: way.momentum,
+            tangent: way.tangent,
+            underside_mm: (from_mm.truncate() + way.aside * down).extend(self.bottom_mm),
+        })
+    }
+
+    /// Index of the medium in which a point at this height is seen: the dome's above the sheet's top, the
+    /// top layer's on it.
+    fn medium_at(&self, z_mm: f64) -> f64 {
+        match self.plates.last() {
+            Some(plate) if z_mm == 0.0 => plate.index,
+            _ => self.fill.index,
+        }
+    }
+}
+
+/// What [`tube`] finds.
+struct Way {
+    aside: DVec2,
+    tangent: f64,
+    momentum: f64,
+    sr_per_mm2: f64,
+}
+
+/// The tube through a path between media of the given indices.
+fn tube(path: &Path<'_>, sideways: DVec2, near: f64, start: f64, end: f64) -> Result<Way, Limit> {
+    let reach_mm = sideways.length();
+    let found = path.climb_from(reach_mm, near)?;
+    let momentum = found.index * found.tangent / (1.0 + found.tangent * found.tangent).sqrt();
+    let aside = if reach_mm > 0.0 { sideways / reach_mm } else { DVec2::X };
+    // In the start's medium: sin = momentum / start and d(sin)/dX = cos d(theta)/dX, so with
+    // momentum = n0 t / sqrt(1 + t^2), d(momentum)/dX = n0 (1 + t^2)^(-3/2) / X'(t).
+    let square = 1.0 + found.tangent * found.tangent;
+    let momentum_by_reach = found.index / (square * square.sqrt() * found.slope);
+    let momentum_per_reach = found.index / (square.sqrt() * found.reach_per_tangent);
+    let cos = |index: f64| (1.0 - (momentum / index).powi(2)).max(0.0).sqrt();
+    let sr_per_mm2 = momentum_per_reach * momentum_by_reach / (start * start * cos(start) * cos(end));
+    if sr_per_mm2.is_finite() {
+        Ok(Way { aside, tangent: found.tangent, momentum, sr_per_mm2 })
+    } else {
+        Err(Limit::Unreachable)
+    }
+}
+
+fn direction(aside: DVec2, sin: f64, up: f64) -> DVec3 {
+    let sin = sin.min(1.0);
+    (aside * sin).extend(up * (1.0 - sin * sin).sqrt())
+}
+
+/// Tangent of the angle in a medium.
+fn slope_in(index: f64, momentum: f64) -> f64 {
+    let sin = momentum / index;
+    sin / (1.0 - sin * sin).max(f64::MIN_POSITIVE).sqrt()
+}

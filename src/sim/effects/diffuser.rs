@@ -1,0 +1,40 @@
+//! The tape before the lights: it spreads their lobes and takes its share.
+
+use crate::sim::effect::{Bound, Cost, Effect, EffectName};
+use crate::sim::light::bounds::{self, LightBounds};
+use crate::sim::light::{lit_by_leds, shade};
+use crate::sim::{Pipeline, Scene, SimError};
+
+/// See the module.
+pub struct Diffuser;
+
+impl Effect for Diffuser {
+    fn name(&self) -> EffectName {
+        EffectName::Diffuser
+    }
+
+    fn calls_for(&self, scene: &Scene) -> Option<String> {
+        let tape = scene.design().sections().leds.diffuser.filter(|_| lit_by_leds(scene))?;
+        Some(format!(
+            "tape that lets {} through, {} of it by Lambert's law and the rest in a lobe of {} degrees",
+            tape.transmittance, tape.lambert_fraction, tape.lobe_width_deg
+        ))
+    }
+
+    fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
+        Ok(bounds::grey(scene, LightBounds::of(scene)?.diffuser))
+    }
+
+    fn cost(&self, _scene: &Scene) -> Cost {
+        Cost { once: shade::DIFFUSER_UNITS, per_frame: 0 }
+    }
+
+    fn needs(&self) -> &'static [EffectName] {
+        &[EffectName::DirectLight]
+    }
+
+    fn apply(&self, _scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
+        pipeline.light.diffuser = true;
+        Ok(())
+    }
+}

@@ -1,0 +1,40 @@
+//! Falloff with distance and the cosine at the membrane: without it every point is lit like the pole.
+
+use crate::sim::effect::{Bound, Cost, Effect, EffectName};
+use crate::sim::light::bounds::{self, LightBounds};
+use crate::sim::light::{lit_by_leds, shade};
+use crate::sim::{Pipeline, Scene, SimError};
+
+/// See the module.
+pub struct Falloff;
+
+impl Effect for Falloff {
+    fn name(&self) -> EffectName {
+        EffectName::Falloff
+    }
+
+    fn calls_for(&self, scene: &Scene) -> Option<String> {
+        let radius = scene.optics().dome_radius_mm();
+        let distance = scene.design().sections().leds.center_radius_mm;
+        lit_by_leds(scene).then(|| {
+            format!("lights {distance} mm from the axis of a dome of radius {radius} mm: near, and aslant")
+        })
+    }
+
+    fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
+        Ok(bounds::grey(scene, LightBounds::of(scene)?.falloff))
+    }
+
+    fn cost(&self, scene: &Scene) -> Cost {
+        Cost { once: shade::EXACT_UNITS * shade::predicted_evaluations(scene), per_frame: 0 }
+    }
+
+    fn needs(&self) -> &'static [EffectName] {
+        &[EffectName::DirectLight]
+    }
+
+    fn apply(&self, _scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
+        pipeline.light.falloff = true;
+        Ok(())
+    }
+}

@@ -1,0 +1,42 @@
+//! The platform stands in the light's way: the lip before the lights, the pits' walls, the window's edge.
+
+use crate::sim::effect::{Bound, Cost, Effect, EffectName};
+use crate::sim::light::bounds::{self, LightBounds};
+use crate::sim::light::{lit_by_leds, shade};
+use crate::sim::{Pipeline, Scene, SimError};
+
+/// See the module.
+pub struct PlatformShadow;
+
+impl Effect for PlatformShadow {
+    fn name(&self) -> EffectName {
+        EffectName::PlatformShadow
+    }
+
+    fn calls_for(&self, scene: &Scene) -> Option<String> {
+        let leds = &scene.design().sections().leds;
+        (lit_by_leds(scene) && leds.through_platform < 1.0).then(|| {
+            format!(
+                "lights in pits, behind a lip that ends {:.2} mm above their middle",
+                leds.lip_top_z_mm - leds.center_z_mm
+            )
+        })
+    }
+
+    fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
+        Ok(bounds::grey(scene, LightBounds::of(scene)?.platform_shadow))
+    }
+
+    fn cost(&self, scene: &Scene) -> Cost {
+        Cost { once: shade::SHADOW_UNITS * shade::predicted_evaluations(scene), per_frame: 0 }
+    }
+
+    fn needs(&self) -> &'static [EffectName] {
+        &[EffectName::DirectLight]
+    }
+
+    fn apply(&self, _scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
+        pipeline.light.platform_shadow = true;
+        Ok(())
+    }
+}

@@ -1,0 +1,247 @@
+//! The room that the upper platform leaves to the light: a union of convex hollows.
+//!
+//! The platform is made by cutting boxes, cones and cylinders; a straight ray between two points in air meets
+//! each of them in one interval at most. It is free if the intervals together cover it. So the shadow is that
+//! of the very shapes that are printed, to rounding, without a mesh.
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use crate::mesh::{Construction, Piece, ProfileEdge, Shape};
+
+/// Gap between two intervals, as a share of the ray, that is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Hollows that one ray may meet ahead of its free part; no platform comes near it, and more count as material.
+const WAITING: usize = 64;
+
+/// Chords that stand for an arc in a turned hollow.
+const ARC_CHORDS: usize = 16;
+
+#[derive(Debug, Clone, PartialEq)]
+enum Convex {
+    /// Upright planes, inside where `normal . x <= offset`, between two heights; no corner lies further from the
+    /// axes than `reach`.
+    Faces { sides: Vec<(DVec2, f64)>, bottom: f64, top: f64, reach: DVec2 },
+    /// A frustum about z: radius `radius + slope (z - bottom)`.
+    Frustum { bottom: f64, top: f64, radius: f64, slope: f64 },
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Hollow {
+    shape: Convex,
+    own_from_part: DAffine3,
+}
+
+/// All hollows of a part.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Cavities {
+    hollows: Vec<Hollow>,
+}
+
+impl Cavities {
+    /// What is cut out of a part.
+    pub fn of(part: &Construction) -> Self {
+        let mut hollows = Vec::new();
+        for Piece { shape, part_from_shape, .. } in &part.cut {
+            let own_from_part = part_from_shape.inverse();
+            hollows.extend(convex_parts(shape).into_iter().map(|shape| Hollow { shape, own_from_part }));
+        }
+        Self { hollows }
+    }
+
+    /// How many convex hollows there are.
+    pub fn count(&self) -> usize {
+        self.hollows.len()
+    }
+
+    /// Those of the hollows that reach into a range of heights: a ray that stays in it meets no others.
+    pub fn between(mut self, low_z_mm: f64, high_z_mm: f64) -> Self {
+        self.hollows.retain(|hollow| {
+            let (bottom, top) = hollow.heights();
+            bottom <= high_z_mm && top >= low_z_mm
+        });
+        self
+    }
+
+    /// Whether the straight way between two points is free of the part's material.
+    ///
+    /// For a ray that stays within the part's outer faces; outside them everything counts as material.
+    pub fn is_free(&self, from_mm: DVec3, to_mm: DVec3) -> bool {
+        // Each hollow that the front lies in carries it on to its far side; when no hollow does, it is blocked.
+        // Hollows that lie further on wait for it.
+        let mut waiting = [(0.0_f64, 0.0_f64); WAITING];
+        let mut count = 0;
+        let mut front = 0.0;
+        for hollow in &self.hollows {
+            let Some((enter, leave)) = hollow.interval(from_mm, to_mm) else { continue };
+            if enter <= front + ROUNDING {
+                front = leave.max(front);
+                if front >= 1.0 - ROUNDING {
+                    return true;
+                }
+            } else if count < WAITING {
+                waiting[count] = (enter, leave);
+                count += 1;
+            }
+        }
+        loop {
+            let before = front;
+            for &(enter, leave) in &waiting[..count] {
+                if enter <= front + ROUNDING {
+                    front = leave.max(front);
+                }
+            }
+            if front >= 1.0 - ROUNDING {
+                return true;
+            }
+            if front <= before {
+                return false;
+            }
+        }
+    }
+}
+
+impl Hollow {
+    /// Lowest and highest point of its bounding box.
+    fn heights(&self) -> (f64, f64) {
+        let part_from_own = self.own_from_part.inverse();
+        let (reach, bottom, top) = match &self.shape {
+            Convex::Frustum { bottom, top, radius, slope } => {
+                let widest = radius.max(radius + slope * (top - bottom));
+                (DVec2::splat(widest), *bottom, *top)
+            }
+            Convex::Faces { reach, bottom, top, .. } => (*reach, *bottom, *top),
+        };
+        let corner = |k: u32| {
+            let side = |bit: u32, size: f64| if k & bit == 0 { -size } else { size };
+            let z = if k & 4 == 0 { bottom } else { top };
+            part_from_own.transform_point3(DVec3::new(side(1, reach.x), side(2, reach.y), z)).z
+        };
+        (0..8)
+            .map(corner)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)))
+    }
+
+    /// The part of the ray from `from` (0) to `to` (1) that lies inside.
+    fn interval(&self, from: DVec3, to: DVec3) -> Option<(f64, f64)> {
+        let origin = self.own_from_part.transform_point3(from);
+        let way = self.own_from_part.transform_vector3(to - from);
+        let mut span = (0.0_f64, 1.0_f64);
+        // inside where value + s * slope <= 0
+        let mut keep = |value: f64, slope: f64| {
+            if slope > 0.0 {
+                span.1 = span.1.min(-value / slope);
+            } else if slope < 0.0 {
+                span.0 = span.0.max(-value / slope);
+            } else if value > 0.0 {
+                span.1 = f64::NEG_INFINITY;
+            }
+        };
+        match &self.shape {
+            Convex::Faces { sides, bottom, top, .. } => {
+                keep(origin.z - top, way.z);
+                keep(bottom - origin.z, -way.z);
+                for (normal, offset) in sides {
+                    keep(normal.dot(origin.truncate()) - offset, normal.dot(way.truncate()));
+                }
+            }
+            Convex::Frustum { bottom, top, radius, slope } => {
+                keep(origin.z - top, way.z);
+                keep(bottom - origin.z, -way.z);
+                let r0 = radius + slope * (origin.z - bottom);
+                let r1 = slope * way.z;
+                let (p, d) = (origin.truncate(), way.truncate());
+                let a = d.length_squared() - r1 * r1;
+                let b = p.dot(d) - r0 * r1;
+                let c = p.length_squared() - r0 * r0;
+                let inside = quadratic_span(a, b, c, |s| r0 + r1 * s >= 0.0, span)?;
+                span = inside;
+            }
+        }
+        (span.0 < span.1).then_some(span)
+    }
+}
+
+/// Where `a s^2 + 2 b s + c <= 0` and the radius is not negative, within a span. The frustum is convex, so it
+/// is one interval; the other nappe of its cone is told by the radius.
+fn quadratic_span(
+    a: f64,
+    b: f64,
+    c: f64,
+    on_this_nappe: impl Fn(f64) -> bool,
+    span: (f64, f64),
+) -> Option<(f64, f64)> {
+    if span.0 >= span.1 {
+        return None;
+    }
+    let inside = |s: f64| (a * s + 2.0 * b) * s + c <= 0.0 && on_this_nappe(s);
+    // Roots inside the span cut it; the piece whose middle is inside is the one.
+    let mut cuts = [span.0, span.1, span.1, span.1];
+    let mut count = 1;
+    let root = b * b - a * c;
+    if root >= 0.0 {
+        let q = -(b + root.sqrt().copysign(b));
+        let mut found = [if a == 0.0 { f64::NAN } else { q / a }, if q == 0.0 { f64::NAN } else { c / q }];
+        if found[0] > found[1] {
+            found.swap(0, 1);
+        }
+        for s in found {
+            if s > span.0 && s < span.1 {
+                cuts[count] = s;
+                count += 1;
+            }
+        }
+    }
+    cuts[count] = span.1;
+    let mut result: Option<(f64, f64)> = None;
+    for pair in cuts[..=count].windows(2) {
+        if inside(0.5 * (pair[0] + pair[1])) {
+            result = Some(result.map_or((pair[0], pair[1]), |(low, _)| (low, pair[1])));
+        }
+    }
+    result
+}
+
+fn convex_parts(shape: &Shape) -> Vec<Convex> {
+    match shape {
+        Shape::Prism { outline_mm, bottom_z_mm, top_z_mm, .. } => {
+            // Rounded corners are taken as sharp: no hollow near the lights has them.
+            let n = outline_mm.len();
+            let side = |(i, &corner): (usize, &DVec2)| {
+                let along = outline_mm[(i + 1) % n] - corner;
+                // Counter-clockwise: outside is to the right.
+                let normal = DVec2::new(along.y, -along.x).normalize_or_zero();
+                (normal, normal.dot(corner))
+            };
+            let sides = outline_mm.iter().enumerate().map(side).collect();
+            let reach = outline_mm.iter().fold(DVec2::ZERO, |most, corner| most.max(corner.abs()));
+            vec![Convex::Faces { sides, bottom: *bottom_z_mm, top: *top_z_mm, reach }]
+        }
+        Shape::Turned { profile, .. } => {
+            let mut points: Vec<DVec2> = Vec::new();
+            for (ends, edge) in profile.points_mm.windows(2).zip(&profile.edges) {
+                points.push(ends[0]);
+                if let ProfileEdge::Arc { center_z_mm } = edge {
+                    let angle = |p: DVec2| (p.y - center_z_mm).atan2(p.x);
+                    let radius = (ends[0] - DVec2::new(0.0, *center_z_mm)).length();
+                    let (first, last) = (angle(ends[0]), angle(ends[1]));
+                    points.extend((1..ARC_CHORDS).map(|k| {
+                        let at = first + (last - first) * k as f64 / ARC_CHORDS as f64;
+                        DVec2::new(radius * at.cos(), center_z_mm + radius * at.sin())
+                    }));
+                }
+            }
+            points.extend(profile.points_mm.last());
+            points
+                .windows(2)
+                .filter(|ends| ends[1].y > ends[0].y)
+                .map(|ends| Convex::Frustum {
+                    bottom: ends[0].y,
+                    top: ends[1].y,
+                    radius: ends[0].x,
+                    slope: (ends[1].x - ends[0].x) / (ends[1].y - ends[0].y),
+                })
+                .collect()
+        }
+    }
+}

@@ -1,0 +1,308 @@
+//! The light on the membrane as tables: looked up in every frame.
+//!
+//! The lights ride on the platform, so in the sensor frame the light on the undeformed membrane never changes:
+//! one table of it serves every frame. Where an object has moved the membrane, its place and its normal differ;
+//! for those points there are tables of the *vector* irradiance on three shells inside the dome, whose product
+//! with the normal is the irradiance.
+
+use glam::{DVec3, Vec3A, Vec4};
+use rayon::prelude::*;
+
+use super::direct::EmitterRule;
+use super::dome_map::{DomeGrid, bicubic, direction_from_disc, disc_from_direction};
+use super::radiosity::Rings;
+use super::tables::{Prepared, SHELLS, Tables, Ways};
+
+/// Fine cells in a coarse one: the look-up is linear in the fine table, which is cubic in the coarse one. Fine enough
+/// that near the rim, where the lights are close, less than a thousandth is lost.
+const FINE: usize = 6;
+/// The same on the shells.
+const FINE_SHELL: usize = 2;
+
+/// Which parts of the light a field has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldParts {
+    /// Whether light falls off with the way and the slant; else every point is lit like the pole.
+    pub falloff: bool,
+    /// The membrane's mean reflectance for each channel, if it lights itself.
+    pub albedo: Option<[f64; 3]>,
+    /// Whether moved points are asked for.
+    pub moved: bool,
+    /// Largest error of the tables, as a part of each light's largest value.
+    pub tolerance: f64,
+}
+
+/// Light on the membrane for the three channels of the camera, mW/mm^2 weighted by their responses.
+#[derive(Debug, Clone)]
+pub struct LightField {
+    radius_mm: f64,
+    grid: DomeGrid,
+    still: Vec<Vec4>,
+    shell_grid: DomeGrid,
+    shells: Vec<Vec<ShellNode>>,
+    brightest: [f64; 3],
+    error: f64,
+    evaluations: u64,
+    own: Option<OwnLight>,
+}
+
+/// Three vectors, one for each channel, and the membrane's own light.
+#[derive(Debug, Clone, Copy, Default)]
+struct ShellNode {
+    flux: [Vec3A; 3],
+    own: Vec3A,
+}
+
+/// The membrane's own light at the patches of a room.
+#[derive(Debug, Clone)]
+struct OwnLight {
+    indirect: Vec<[f64; 3]>,
+    exitance: [Vec<f64>; 3],
+}
+
+impl LightField {
+    /// Puts the tables of all lights together.
+    pub fn new(ways: &Ways, prepared: &Prepared, parts: &FieldParts) -> Self {
+        let mut field = Self {
+            radius_mm: ways.radius_mm(),
+            grid: DomeGrid::with_cells(8),
+            still: Vec::new(),
+            shell_grid: DomeGrid::with_cells(8),
+            shells: Vec::new(),
+            brightest: [0.0; 3],
+            error: 0.0,
+            evaluations: 0,
+            own: None,
+        };
+        let rule = EmitterRule::default();
+        let (grid, table) = if parts.falloff {
+            let tables = prepared.still(ways, parts.tolerance);
+            field.error = tables.error;
+            field.evaluations += tables.evaluations;
+            (tables.grid, channels(ways, tables))
+        } else {
+            let mut pole = [0.0; 3];
+            for source in &ways.sources {
+                let light = ways.still(source, DVec3::Z, &rule);
+                pole = std::array::from_fn(|c| pole[c] + light * source.seen_mw[c]);
+            }
+            field.evaluations += 1;
+            let grid = DomeGrid::with_cells(8);
+            (grid, vec![pole; grid.nodes * grid.nodes])
+        };
+        let own = parts.albedo.map(|albedo| OwnLight::new(ways, prepared, albedo, &grid, &table));
+        field.set_still(&grid, &table, own.as_ref());
+        if parts.moved && parts.falloff {
+            field.set_shells(ways, prepared.shells(ways), own.as_ref());
+        }
+        field.own = own;
+        field
+    }
+
+    fn set_still(&mut self, grid: &DomeGrid, table: &[[f64; 3]], own: Option<&OwnLight>) {
+        let fine = DomeGrid::with_cells(grid.cells() * FINE);
+        let node = |i: usize| {
+            let place = fine.place(i % fine.nodes, i / fine.nodes);
+            let direct = bicubic(grid, table, grid.coordinates_of_disc(place));
+            let onto = direction_from_disc(place / place.length().max(1.0));
+            let more = own.map_or([0.0; 3], |own| own.at(onto));
+            let [r, g, b]: [f32; 3] = std::array::from_fn(|c| (direct[c].max(0.0) + more[c]) as f32);
+            Vec4::new(r, g, b, 0.0)
+        };
+        self.still = (0..fine.nodes * fine.nodes).into_par_iter().map(node).collect();
+        self.grid = fine;
+        for (i, node) in self.still.iter().enumerate() {
+            if fine.place(i % fine.nodes, i / fine.nodes).length() <= 1.0 {
+                self.brightest = std::array::from_fn(|c| self.brightest[c].max(f64::from(node[c])));
+            }
+        }
+    }
+
+    fn set_shells(&mut self, ways: &Ways, tables: &[Tables<3>], own: Option<&OwnLight>) {
+        let Some(first) = tables.first() else { return };
+        let grid = first.grid;
+        let fine = DomeGrid::with_cells(grid.cells() * FINE_SHELL);
+        self.shells = tables
+            .iter()
+            .map(|tables| {
+                self.evaluations += tables.evaluations;
+                let mut flux = vec![[0.0; 9]; grid.nodes * grid.nodes];
+                for (source, table) in ways.sources.iter().zip(&tables.sources) {
+                    for (sum, vector) in flux.iter_mut().zip(table) {
+                        for (k, total) in sum.iter_mut().enumerate() {
+                            *total += vector[k % 3] * source.seen_mw[k / 3];
+                        }
+                    }
+                }
+                let node = |i: usize| {
+                    let place = fine.place(i % fine.nodes, i / fine.nodes);
+                    let v = bicubic(&grid, &flux, grid.coordinates_of_disc(place)).map(|v| v as f32);
+                    let onto = direction_from_disc(place / place.length().max(1.0));
+                    let more = own.map_or([0.0; 3], |own| own.at(onto)).map(|v| v as f32);
+                    ShellNode {
+                        flux: std::array::from_fn(|c| Vec3A::new(v[3 * c], v[3 * c + 1], v[3 * c + 2])),
+                        own: Vec3A::from_array(more),
+                    }
+                };
+                (0..fine.nodes * fine.nodes).into_par_iter().map(node).collect()
+            })
+            .collect();
+        self.shell_grid = fine;
+    }
+
+    /// Irradiance of an undeformed point in this direction, for the channels red, green, blue.
+    #[inline]
+    pub fn still(&self, direction: DVec3) -> [f32; 3] {
+        let (at, x, y) = cell_of(&self.grid, direction);
+        let nodes = self.grid.nodes;
+        let Some(corner) = self.still.get(at..at + nodes + 2) else { return [0.0; 3] };
+        let low = corner[0] + (corner[1] - corner[0]) * x;
+        let high = corner[nodes] + (corner[nodes + 1] - corner[nodes]) * x;
+        let value = low + (high - low) * y;
+        [value.x, value.y, value.z]
+    }
+
+    /// Irradiance of a point that was moved to `point_mm` (sensor frame), with the unit normal out of the
+    /// elastomer that it has there. Without shells it answers as for a point that was not moved.
+    pub fn moved(&self, point_mm: DVec3, normal: DVec3) -> [f32; 3] {
+        let distance = point_mm.length();
+        if self.shells.is_empty() || distance.is_nan() || distance <= 0.0 {
+            return self.still(if distance > 0.0 { point_mm / distance } else { DVec3::Z });
+        }
+        let (at, x, y) = cell_of(&self.shell_grid, point_mm / distance);
+        let nodes = self.shell_grid.nodes;
+        let weights = shell_weights(distance / self.radius_mm);
+        let normal = normal.as_vec3a();
+        let mut light = Vec3A::ZERO;
+        for (shell, weight) in self.shells.iter().zip(weights) {
+            let Some(corner) = shell.get(at..at + nodes + 2) else { return [0.0; 3] };
+            let mix = |a: &ShellNode| {
+                Vec3A::new(a.flux[0].dot(normal), a.flux[1].dot(normal), a.flux[2].dot(normal)) + a.own
+            };
+            let low = mix(&corner[0]) * (1.0 - x) + mix(&corner[1]) * x;
+            let high = mix(&corner[nodes]) * (1.0 - x) + mix(&corner[nodes + 1]) * x;
+            light += (low * (1.0 - y) + high * y) * weight;
+        }
+        light.max(Vec3A::ZERO).to_array()
+    }
+
+    /// Irradiance of the sheet's top beside the dome, from below: a white marker's.
+    pub fn beside(&self, ways: &Ways, prepared: &Prepared, position_mm: DVec3) -> [f64; 3] {
+        let rule = EmitterRule::default();
+        let mut light = [0.0; 3];
+        for source in &ways.sources {
+            let one = ways.flux(source, position_mm, &rule).z.max(0.0);
+            light = std::array::from_fn(|c| light[c] + one * source.seen_mw[c]);
+        }
+        if let Some(own) = self.own.as_ref().filter(|_| ways.fresnel) {
+            for (c, room) in prepared.rooms(ways).iter().enumerate() {
+                light[c] += room.beside(&ways.optics[c], &own.exitance[c], position_mm);
+            }
+        }
+        light
+    }
+
+    /// Largest irradiance of each channel on the undeformed membrane.
+    pub fn brightest(&self) -> [f64; 3] {
+        self.brightest
+    }
+
+    /// Largest error of a light's table seen in the probes, as a part of its largest value.
+    pub fn error(&self) -> f64 {
+        self.error
+    }
+
+    /// Points at which every light was worked out exactly to make the tables.
+    pub fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    /// Largest difference between neighbouring nodes over their distance on the dome, 1/mm.
+    pub fn steepest_per_mm(&self) -> f64 {
+        let grid = self.grid;
+        // The map's scale is at most sqrt(2) (at the rim, along it), so a cell is at least this long.
+        let cell_mm = grid.cell() * self.radius_mm / std::f64::consts::SQRT_2;
+        let inside = |i: usize| grid.place(i % grid.nodes, i / grid.nodes).length() <= 1.0;
+        let mut steepest = 0.0_f32;
+        for (i, here) in self.still.iter().enumerate().filter(|(i, _)| inside(*i)) {
+            for next in [i + 1, i + grid.nodes] {
+                if let Some(there) = self.still.get(next).filter(|_| inside(next)) {
+                    steepest = steepest.max((*there - *here).abs().max_element());
+                }
+            }
+        }
+        std::f64::consts::SQRT_2 * f64::from(steepest) / cell_mm
+    }
+}
+
+/// The lights' tables as the channels see them together.
+fn channels(ways: &Ways, tables: &Tables<1>) -> Vec<[f64; 3]> {
+    let mut sum = vec![[0.0; 3]; tables.grid.nodes * tables.grid.nodes];
+    for (source, table) in ways.sources.iter().zip(&tables.sources) {
+        for (total, [light]) in sum.iter_mut().zip(table) {
+            for (channel, seen) in total.iter_mut().zip(source.seen_mw) {
+                *channel += light * seen;
+            }
+        }
+    }
+    sum
+}
+
+impl OwnLight {
+    fn new(ways: &Ways, prepared: &Prepared, albedo: [f64; 3], grid: &DomeGrid, table: &[[f64; 3]]) -> Self {
+        let rings = Rings::USUAL;
+        let patch = |i: usize| rings.direction(i / rings.patches, i % rings.patches);
+        let lit = |i: usize| bicubic(grid, table, grid.coordinates(patch(i)));
+        let light: Vec<[f64; 3]> = (0..rings.count()).map(lit).collect();
+        let mut indirect = vec![[0.0; 3]; rings.count()];
+        let mut exitance = [const { Vec::new() }; 3];
+        for (c, room) in prepared.rooms(ways).iter().enumerate().take(3) {
+            let own: Vec<f64> = light.iter().map(|e| e[c].max(0.0)).collect();
+            let balance = room.solve(&own, albedo[c]);
+            for (sum, value) in indirect.iter_mut().zip(&balance.indirect) {
+                sum[c] = *value;
+            }
+            exitance[c] = balance.exitance;
+        }
+        Self { indirect, exitance }
+    }
+
+    /// Linear between rings and patches; level beyond the first and last ring.
+    fn at(&self, direction: DVec3) -> [f64; 3] {
+        let Rings { rings, patches } = Rings::USUAL;
+        let ring = (direction.z * rings as f64 - 0.5).clamp(0.0, rings as f64 - 1.0);
+        let turn = direction.y.atan2(direction.x) / std::f64::consts::TAU;
+        let patch = (turn * patches as f64 - 0.5).rem_euclid(patches as f64);
+        let low = (ring as usize).min(rings - 2);
+        let (up, along) = (ring - low as f64, patch - patch.floor());
+        let first = (patch as usize) % patches;
+        let at = |ring: usize, patch: usize| self.indirect[ring * patches + patch % patches];
+        let corners = [at(low, first), at(low, first + 1), at(low + 1, first), at(low + 1, first + 1)];
+        std::array::from_fn(|c| {
+            let mix = |a: f64, b: f64, part: f64| a + (b - a) * part;
+            mix(mix(corners[0][c], corners[1][c], along), mix(corners[2][c], corners[3][c], along), up)
+        })
+    }
+}
+
+/// Lagrange's weights of the three shells for a radius, part of the dome's.
+#[inline]
+fn shell_weights(part: f64) -> [f32; 3] {
+    let [a, b, c] = SHELLS;
+    let p = part.clamp(0.5, 1.1);
+    [
+        ((p - b) * (p - c) / ((a - b) * (a - c))) as f32,
+        ((p - a) * (p - c) / ((b - a) * (b - c))) as f32,
+        ((p - a) * (p - b) / ((c - a) * (c - b))) as f32,
+    ]
+}
+
+/// Index of the lower corner of the cell of a direction, and the place in it.
+#[inline]
+fn cell_of(grid: &DomeGrid, direction: DVec3) -> (usize, f32, f32) {
+    let at = grid.coordinates_of_disc(disc_from_direction(direction));
+    let last = (grid.nodes - 2) as f64;
+    let (x, y) = (at.x.clamp(0.0, last), at.y.clamp(0.0, last));
+    let (column, row) = (x as usize, y as usize);
+    (row * grid.nodes + column, (x - column as f64) as f32, (y - row as f64) as f32)
+}

@@ -1,0 +1,222 @@
+//! Light that the membrane throws on itself.
+//!
+//! The membrane is Lambertian, so its exitance `B` (mW/mm^2) tells all. Two ways lead from one point of the
+//! dome to another:
+//!
+//! * straight through the silicone. In a sphere of radius `R` a Lambertian patch gives every other point the
+//!   same irradiance, `B dA / (4 pi R^2)`: the cosines at both ends cancel the distance. So all of it together
+//!   is one number, the dome's flux over `4 pi R^2`;
+//! * down to the sheet's underside and back up, by Fresnel's reflection or, beyond the critical angle, total
+//!   reflection: the underside is a mirror whose strength depends on the angle. What comes back outside the
+//!   dome's foot is guided away in the sheet and lost.
+//!
+//! The balance `B = albedo (E + K B)` is solved on rings of patches; the mirror's part depends on the azimuth
+//! between two patches only, so one ring of it serves all. Its series falls at least as fast as the albedo.
+
+use glam::{DVec2, DVec3};
+
+use super::fresnel;
+use crate::optics::SensorOptics;
+
+/// Rings of equal area from rim to pole, and patches in each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rings {
+    /// Rings.
+    pub rings: usize,
+    /// Patches in a ring.
+    pub patches: usize,
+}
+
+impl Rings {
+    /// Enough for 0.3 % of the light that comes back from the sheet (tested against twice as many).
+    pub const USUAL: Self = Self { rings: 16, patches: 40 };
+
+    fn cos(&self, ring: usize) -> f64 {
+        (ring as f64 + 0.5) / self.rings as f64
+    }
+
+    /// Unit direction of a patch's middle.
+    pub fn direction(&self, ring: usize, patch: usize) -> DVec3 {
+        let z = self.cos(ring);
+        let azimuth = std::f64::consts::TAU * (patch as f64 + 0.5) / self.patches as f64;
+        (DVec2::from_angle(azimuth) * (1.0 - z * z).sqrt()).extend(z)
+    }
+
+    /// How many patches in all; patch `p` of ring `r` is number `r * patches + p`.
+    pub fn count(&self) -> usize {
+        self.rings * self.patches
+    }
+}
+
+/// The dome as a room that lights itself, for one colour.
+#[derive(Debug, Clone)]
+pub struct DomeRoom {
+    rings: Rings,
+    radius_mm: f64,
+    /// `mirror[(to * rings + from) * patches + shift]`: irradiance at ring `to` for an exitance of one of the
+    /// patch of ring `from` that is `shift` patches further round.
+    mirror: Vec<f64>,
+}
+
+/// The balance of light in the dome.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Balance {
+    /// Irradiance of every patch by the membrane's own light, mW/mm^2.
+    pub indirect: Vec<f64>,
+    /// Exitance of every patch, mW/mm^2.
+    pub exitance: Vec<f64>,
+    /// Rounds of the series that were summed.
+    pub rounds: u32,
+    /// Largest change of an irradiance in the last round, mW/mm^2.
+    pub residual: f64,
+}
+
+/// Bound on the rounds: at the largest albedo, 0.99, the series falls to 1e-9 in 2100.
+const MAX_ROUNDS: u32 = 4000;
+
+/// Change at which the series ends, of the largest irradiance.
+const ROUNDS_END: f64 = 1e-9;
+
+/// What the underside sends back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Underside {
+    /// By Fresnel's equations and total reflection.
+    Fresnel,
+    /// Nothing: only the straight way counts.
+    Dark,
+    /// Everything, with no loss at the dome's foot: for tests against closed forms.
+    Perfect,
+}
+
+impl DomeRoom {
+    /// Works out how the underside mirrors the dome.
+    pub fn new(optics: &SensorOptics, rings: Rings, underside: Underside) -> Self {
+        let radius_mm = optics.dome_radius_mm();
+        let mut mirror = vec![0.0; rings.rings * rings.rings * rings.patches];
+        if underside != Underside::Dark {
+            for to in 0..rings.rings {
+                let target = rings.direction(to, 0);
+                for from in 0..rings.rings {
+                    let mut near = 0.0;
+                    for shift in 0..rings.patches {
+                        let source = rings.direction(from, shift);
+                        let (value, tangent) =
+                            mirrored(optics, source, target * radius_mm, target, underside, near);
+                        near = tangent;
+                        mirror[(to * rings.rings + from) * rings.patches + shift] =
+                            value * patch_mm2(rings, radius_mm);
+                    }
+                }
+            }
+        }
+        Self { rings, radius_mm, mirror }
+    }
+
+    /// The patches.
+    pub fn rings(&self) -> Rings {
+        self.rings
+    }
+
+    /// Area of every patch, mm^2.
+    pub fn patch_mm2(&self) -> f64 {
+        patch_mm2(self.rings, self.radius_mm)
+    }
+
+    /// Irradiance of every patch by the exitance of all.
+    pub fn irradiance(&self, exitance: &[f64]) -> Vec<f64> {
+        let Rings { rings, patches } = self.rings;
+        let straight = exitance.iter().sum::<f64>() / (2 * self.rings.count()) as f64;
+        let mut out = vec![straight; self.rings.count()];
+        for (to, row) in out.chunks_mut(patches).enumerate() {
+            for (from, light) in exitance.chunks(patches).enumerate() {
+                let at = (to * rings + from) * patches;
+                let kernel = &self.mirror[at..at + patches];
+                for (p, sum) in row.iter_mut().enumerate() {
+                    // patch q is (q - p) further round
+                    let (tail, head) = light.split_at(p);
+                    let ahead: f64 = head.iter().zip(kernel).map(|(b, k)| b * k).sum();
+                    let behind: f64 = tail.iter().zip(&kernel[patches - p..]).map(|(b, k)| b * k).sum();
+                    *sum += ahead + behind;
+                }
+            }
+        }
+        out
+    }
+
+    /// The balance for the direct irradiance of every patch and one albedo (0 to below 1).
+    pub fn solve(&self, direct: &[f64], albedo: f64) -> Balance {
+        let largest = direct.iter().copied().fold(0.0, f64::max);
+        let mut indirect = vec![0.0; self.rings.count()];
+        let mut exitance: Vec<f64> = direct.iter().map(|e| albedo * e).collect();
+        let (mut rounds, mut residual) = (0, 0.0);
+        while rounds < MAX_ROUNDS {
+            let next = self.irradiance(&exitance);
+            residual = next.iter().zip(&indirect).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            indirect = next;
+            for ((b, e), i) in exitance.iter_mut().zip(direct).zip(&indirect) {
+                *b = albedo * (e + i);
+            }
+            rounds += 1;
+            if residual <= ROUNDS_END * largest {
+                break;
+            }
+        }
+        Balance { indirect, exitance, rounds, residual }
+    }
+
+    /// Irradiance that the membrane gives a point of the sheet's top beside the dome, from below, by way of the
+    /// underside.
+    pub fn beside(&self, optics: &SensorOptics, exitance: &[f64], point_mm: DVec3) -> f64 {
+        let mut near = 0.0;
+        let mut sum = 0.0;
+        for ring in 0..self.rings.rings {
+            for patch in 0..self.rings.patches {
+                let source = self.rings.direction(ring, patch);
+                let (value, tangent) = mirrored(optics, source, point_mm, DVec3::Z, Underside::Fresnel, near);
+                near = tangent;
+                sum += value * exitance[ring * self.rings.patches + patch];
+            }
+        }
+        sum * self.patch_mm2()
+    }
+}
+
+fn patch_mm2(rings: Rings, radius_mm: f64) -> f64 {
+    std::f64::consts::TAU * radius_mm * radius_mm / rings.count() as f64
+}
+
+/// Irradiance at a point by way of the underside, for an exitance of one and an area of 1 mm^2 at the dome's
+/// point in the direction `source`; and the tangent of the way.
+fn mirrored(
+    optics: &SensorOptics,
+    source: DVec3,
+    point_mm: DVec3,
+    normal: DVec3,
+    underside: Underside,
+    near: f64,
+) -> (f64, f64) {
+    let radius = optics.dome_radius_mm();
+    let Ok(tube) = optics.mirrored_tube(source * radius, point_mm, near) else { return (0.0, near) };
+    let cosines = (-source.dot(tube.leaving)).max(0.0) * normal.dot(tube.arriving).max(0.0);
+    let value = cosines * tube.sr_per_mm2 / std::f64::consts::PI;
+    if underside == Underside::Perfect {
+        return (value, tube.tangent);
+    }
+    // Where it crosses the sheet's top, down and (for a point of the dome) up.
+    let foot = |end: DVec3, along: DVec3| (end - along * (end.z / along.z)).truncate().length() <= radius;
+    let up = point_mm.z <= 0.0 || foot(point_mm, tube.arriving);
+    if !(up && foot(source * radius, tube.leaving)) {
+        return (0.0, tube.tangent);
+    }
+    let channel = optics.channel();
+    // From the dome down, without the air that stands first.
+    let mut down: Vec<f64> = optics.layers().iter().skip(1).rev().map(|l| l.index_for(channel)).collect();
+    let mut back: Vec<f64> = down.iter().rev().copied().collect();
+    if point_mm.z <= 0.0 {
+        back.pop();
+    }
+    if down.is_empty() {
+        down.push(1.0);
+    }
+    (value * fresnel::returned(&down, &back, tube.momentum), tube.tangent)
+}

@@ -1,0 +1,191 @@
+//! From the design's lights and the scene's to the sources of a field.
+
+use glam::{DVec2, DVec3};
+
+use super::LightUse;
+use super::cavity::Cavities;
+use super::direct::Emitter;
+use super::lobe::{Diffuser, Lobe};
+use super::tables::{Source, Ways};
+use crate::design::sections::LedColor;
+use crate::design::{Design, DesignError};
+use crate::optics::{Channel, SensorOptics};
+use crate::parts::{self, Measures};
+use crate::sim::SimError;
+use crate::sim::scene::Scene;
+
+/// Channels of the camera.
+pub type Channels = [f64; 3];
+
+/// The colours that a light sends.
+fn colors(color: LedColor) -> &'static [Channel] {
+    match color {
+        LedColor::Red => &[Channel::Red],
+        LedColor::Green => &[Channel::Green],
+        LedColor::Blue => &[Channel::Blue],
+        LedColor::White => &Channel::ALL,
+    }
+}
+
+/// How the channels see a colour of light.
+fn seen(color: Channel, crosstalk: f64) -> Channels {
+    std::array::from_fn(|channel| match channel.abs_diff(color as usize) {
+        0 => 1.0,
+        1 => crosstalk,
+        _ => 0.0,
+    })
+}
+
+/// The brightness that the scene gives each light of the design.
+fn drives(scene: &Scene) -> Result<Vec<f64>, SimError> {
+    let count = scene.design().sections().leds.list.len();
+    let Some(light) = &scene.file().light.leds else { return Ok(Vec::new()) };
+    if !light.each.is_empty() && light.each.len() != count {
+        return Err(DesignError::at(
+            "light.leds.each",
+            serde_json::json!(light.each),
+            format!("{} numbers for {count} lights", light.each.len()),
+            format!("one number for each of the design's {count} lights, or none at all"),
+        )
+        .into());
+    }
+    let each = |i: usize| light.each.get(i).copied().unwrap_or(1.0);
+    Ok((0..count).map(|i| light.power * each(i)).collect())
+}
+
+/// Height of the highest point of each emitter, with or without the diffuser in front, mm.
+pub fn emitter_tops_mm(design: &Design) -> Vec<f64> {
+    let leds = &design.sections().leds;
+    (0..leds.list.len())
+        .map(|i| {
+            let pose = parts::platform_from_led(leds, i);
+            let front = pose.matrix3.z_axis.z.max(0.0) * leds.diffuser_thickness_mm;
+            pose.translation.z + 0.5 * leds.emitter_mm * pose.matrix3.y_axis.z.abs() + front
+        })
+        .collect()
+}
+
+/// The sources of a scene, for the effects that take part.
+///
+/// # Errors
+/// Lights that do not fit the design, or stand in the sheet.
+pub fn sources(scene: &Scene, used: &LightUse) -> Result<Vec<Source>, SimError> {
+    let Some(light) = &scene.file().light.leds else { return Ok(Vec::new()) };
+    let design = scene.design();
+    let leds = &design.sections().leds;
+    for (i, top) in emitter_tops_mm(design).into_iter().enumerate() {
+        let bottom = design.sheet_underside_z_mm();
+        if top >= bottom {
+            return Err(DesignError::at(
+                "leds.center_z_mm",
+                leds.center_z_mm,
+                format!("the top of light {i} reaches z = {top:.3} mm, into the sheet"),
+                format!("a light that ends below the sheet's underside, z = {bottom} mm"),
+            )
+            .into());
+        }
+    }
+    let bare = Lobe::cosine_power(leds.lobe_exponent);
+    let diffuser = leds.diffuser.filter(|_| used.diffuser);
+    let lobe = match diffuser {
+        None => bare,
+        Some(tape) => bare.behind(&Diffuser {
+            lambert_fraction: tape.lambert_fraction,
+            lobe_width_rad: tape.lobe_width_deg.to_radians(),
+            transmittance: tape.transmittance,
+        }),
+    };
+    let front_mm = if diffuser.is_some() { leds.diffuser_thickness_mm } else { 0.0 };
+    let flux = leds.radiant_flux_mw.to_array();
+    let mut out = Vec::new();
+    for ((i, led), drive) in leds.list.iter().enumerate().zip(drives(scene)?) {
+        let mut pose = parts::platform_from_led(leds, i);
+        // The tape's outer face is what shines.
+        pose.translation += pose.matrix3.z_axis * front_mm;
+        for &color in colors(led.color) {
+            out.push(Source {
+                emitter: Emitter {
+                    platform_from_emitter: pose,
+                    half_side_mm: 0.5 * leds.emitter_mm,
+                    flux_mw: 1.0,
+                    lobe: lobe.clone(),
+                },
+                optics: design.optics().for_channel(color),
+                seen_mw: seen(color, light.crosstalk).map(|r| r * drive * flux[color as usize]),
+            });
+        }
+    }
+    Ok(out)
+}
+
+/// The ways of the light of a scene, for the effects that take part.
+///
+/// # Errors
+/// Lights that do not fit the design, or a platform that cannot be made.
+pub fn ways(scene: &Scene, used: &LightUse) -> Result<Ways, SimError> {
+    let design = scene.design();
+    Ok(Ways {
+        sources: sources(scene, used)?,
+        optics: channel_optics(design),
+        cavities: if used.platform_shadow { Some(cavities(design)?) } else { None },
+        through_platform: design.sections().leds.through_platform,
+        sheet_half_mm: sheet_half_mm(design),
+        fresnel: used.fresnel,
+    })
+}
+
+/// What the upper platform leaves open to the light.
+///
+/// # Errors
+/// A platform that the design cannot have.
+pub fn cavities(design: &Design) -> Result<Cavities, SimError> {
+    let shapes = Measures::of(design)
+        .and_then(|measures| parts::upper_platform(&measures))
+        .map_err(DesignError::from)?;
+    // No light goes down before it goes up into the sheet.
+    let leds = &design.sections().leds;
+    let lowest = leds.center_z_mm - leds.emitter_mm - leds.diffuser_thickness_mm;
+    Ok(Cavities::of(&shapes).between(lowest, design.sheet_underside_z_mm()))
+}
+
+/// Half sides of the sheet, mm.
+pub fn sheet_half_mm(design: &Design) -> DVec2 {
+    0.5 * DVec2::from_array(design.sections().sheet.size_mm)
+}
+
+/// The membrane's reflectance, with the dots' share of the dome less bright: for the light in the dome as a whole.
+pub fn mean_reflectance(scene: &Scene) -> Channels {
+    let radius = scene.optics().dome_radius_mm();
+    let printed: f64 = scene
+        .layout()
+        .dots
+        .iter()
+        .map(|dot| 0.25 * std::f64::consts::PI * dot.diameter_mm * dot.diameter_mm)
+        .sum();
+    let share = (printed / (std::f64::consts::TAU * radius * radius)).min(1.0);
+    let ink = scene.file().ink.reflectance;
+    let bare = scene.design().sections().elastomer.membrane_reflectance.to_array();
+    bare.map(|r| r * (1.0 - share + share * ink))
+}
+
+/// Layers and dome for every channel.
+pub fn channel_optics(design: &Design) -> [SensorOptics; 3] {
+    Channel::ALL.map(|channel| design.optics().for_channel(channel))
+}
+
+/// Index of the medium that a point is seen in: the dome's, or the sheet's top layer's where `beside` it.
+pub fn index_at(optics: &SensorOptics, beside: bool) -> f64 {
+    let layers = optics.layers();
+    let from_end = if beside && layers.len() > 2 { 2 } else { 1 };
+    layers.get(layers.len() - from_end).map_or(1.0, |layer| layer.index_for(optics.channel()))
+}
+
+/// A direction towards the camera, inside the sheet's top layer, from a point of the sheet's top at rest: its
+/// momentum (index times sine), or 0 where the camera does not see it.
+pub fn momentum_to_camera(optics: &SensorOptics, point_mm: DVec3) -> f64 {
+    let ray = optics.project(point_mm).and_then(|pixel| Ok(optics.lens().unproject(pixel)?));
+    ray.map_or(0.0, |ray| {
+        let direction = optics.sensor_from_camera().vector(ray);
+        direction.truncate().length().min(1.0)
+    })
+}

@@ -1,0 +1,202 @@
+//! Levels of the membrane and the white markers, from the light on them.
+
+use glam::DVec3;
+
+use super::field::{FieldParts, LightField};
+use super::setup::{self, Channels};
+use super::{LightUse, fresnel, tables};
+use crate::design::sections::LedColor;
+use crate::sim::SimError;
+use crate::sim::effect::EffectName;
+use crate::sim::scene::Scene;
+use crate::sim::shading::{Shading, SurfaceSample};
+use crate::sim::work::Work;
+
+/// Work of one look-up in the table of the undeformed membrane.
+pub const STILL_UNITS: u64 = 25;
+/// Work of one point that was moved.
+pub const MOVED_UNITS: u64 = 90;
+/// Work of the way out to the camera, a point.
+pub const LEAVING_UNITS: u64 = 6;
+/// Work of one exact evaluation of one light at one point without shadow: sixteen ways.
+pub const EXACT_UNITS: u64 = 16 * 150;
+/// The same for the shadow: looks, halvings, and each of them past all hollows.
+pub const SHADOW_UNITS: u64 = 4 * 14 * 600;
+/// The same for what the sheet's faces take.
+pub const FRESNEL_UNITS: u64 = 16 * 25;
+/// Work of a diffuser's table.
+pub const DIFFUSER_UNITS: u64 = 20_000_000;
+/// Work of the dome's balance with itself.
+pub const ROOM_UNITS: u64 = 40_000_000;
+
+/// Largest error of a light's table that is refined no further, as a part of its largest value: it stands in a narrow
+/// strip along the edge of the platform's shadow.
+const TABLE_TOLERANCE: f64 = 1e-2;
+
+/// Places of the table of what leaves towards the camera.
+const LEAVING: usize = 256;
+
+/// Lights of a scene, each colour of a white one counted for itself.
+pub fn source_count(scene: &Scene) -> u64 {
+    let lights = &scene.design().sections().leds.list;
+    lights.iter().map(|led| if led.color == LedColor::White { 3 } else { 1 }).sum()
+}
+
+/// Exact evaluations, over all lights, that the tables of a scene take if the first resolution is enough.
+pub fn predicted_evaluations(scene: &Scene) -> u64 {
+    tables::predicted_evaluations(!scene.file().objects.is_empty()) * source_count(scene)
+}
+
+/// The dome under the design's lights.
+pub struct LitDome {
+    field: LightField,
+    radius_mm: f64,
+    /// Level for each mW/mm^2.
+    gain: [f32; 3],
+    stray: f32,
+    /// By channel and by the momentum squared over its largest value, what passes to the camera.
+    leaving: Option<[Vec<f32>; 3]>,
+    index_squared: [f32; 3],
+    markers: Vec<(DVec3, [f32; 3])>,
+    steepest_per_mm: f64,
+}
+
+impl LitDome {
+    /// Works out the light of a scene.
+    ///
+    /// # Errors
+    /// Lights that do not fit the design, or a platform that cannot be made.
+    pub fn new(scene: &Scene, used: &LightUse, work: &mut Work) -> Result<Option<Self>, SimError> {
+        let Some(light) = &scene.file().light.leds else { return Ok(None) };
+        let design = scene.design();
+        let ways = setup::ways(scene, used)?;
+        let optics = &ways.optics;
+        let lights = ways.sources.len() as u64;
+        let key = format!("{} {} {} {}", used.diffuser, used.fresnel, used.platform_shadow, design.text());
+        let prepared = tables::prepared(&key);
+        let parts = FieldParts {
+            falloff: used.falloff,
+            albedo: used.interreflection.then(|| setup::mean_reflectance(scene)),
+            moved: !scene.file().objects.is_empty(),
+            tolerance: TABLE_TOLERANCE,
+        };
+        let field = LightField::new(&ways, &prepared, &parts);
+        let exact = field.evaluations() * lights;
+        let falloff_exact = exact.saturating_sub(lights);
+        work.add(EffectName::DirectLight, EXACT_UNITS * lights);
+        work.add(EffectName::Falloff, EXACT_UNITS * falloff_exact);
+        if used.platform_shadow {
+            work.add(EffectName::PlatformShadow, SHADOW_UNITS * exact);
+        }
+        if used.fresnel {
+            work.add(EffectName::Fresnel, FRESNEL_UNITS * exact);
+        }
+        if used.diffuser {
+            work.add(EffectName::Diffuser, DIFFUSER_UNITS);
+        }
+        if used.interreflection {
+            work.add(EffectName::Interreflection, ROOM_UNITS);
+        }
+
+        let sections = design.sections();
+        let reflectance = sections.elastomer.membrane_reflectance.to_array();
+        // Radiance falls by the square of the index on the way out into air.
+        let squared = |beside: bool| -> Channels {
+            std::array::from_fn(|c| setup::index_at(&optics[c], beside).powi(2))
+        };
+        let (in_dome, in_sheet) = (squared(false), squared(true));
+        let gain: Channels = std::array::from_fn(|c| light.level_per_mw_mm2 * reflectance[c] / in_dome[c]);
+        let markers = scene
+            .markers()
+            .iter()
+            .map(|marker| {
+                let lit = field.beside(&ways, &prepared, marker.position_mm);
+                let level = std::array::from_fn(|c| {
+                    let momentum = setup::momentum_to_camera(&optics[c], marker.position_mm);
+                    let passed = if used.fresnel { leaves(&optics[c], momentum, true) } else { 1.0 };
+                    let white = sections.white_markers.reflectance / in_sheet[c];
+                    (light.level_per_mw_mm2 * white * lit[c] * passed + light.stray_level) as f32
+                });
+                (marker.position_mm, level)
+            })
+            .collect();
+        let leaving = used.fresnel.then(|| {
+            std::array::from_fn(|c| {
+                (0..=LEAVING)
+                    .map(|i| leaves(&optics[c], (i as f64 / LEAVING as f64).sqrt(), false) as f32)
+                    .collect()
+            })
+        });
+        let brightest_gain = gain.iter().copied().fold(0.0, f64::max);
+        Ok(Some(Self {
+            steepest_per_mm: 1.5 * field.steepest_per_mm() * brightest_gain,
+            radius_mm: scene.optics().dome_radius_mm(),
+            field,
+            gain: gain.map(|v| v as f32),
+            stray: light.stray_level as f32,
+            leaving,
+            index_squared: in_dome.map(|v| v as f32),
+            markers,
+        }))
+    }
+
+    /// The light on the membrane.
+    pub fn field(&self) -> &LightField {
+        &self.field
+    }
+
+    /// What passes to the camera along a direction in the dome, for each channel.
+    #[inline]
+    fn passed(&self, to_camera: DVec3) -> [f32; 3] {
+        let Some(tables) = &self.leaving else { return [1.0; 3] };
+        let sine_squared = (1.0 - (to_camera.z * to_camera.z) as f32).max(0.0);
+        std::array::from_fn(|c| {
+            let at = (sine_squared * self.index_squared[c]).min(1.0) * LEAVING as f32;
+            let i = (at as usize).min(LEAVING - 1);
+            let (low, high) = (tables[c][i], tables[c][i + 1]);
+            low + (high - low) * (at - i as f32)
+        })
+    }
+}
+
+/// Share of the light that leaves through the sheet into the air of the camera.
+pub(super) fn leaves(optics: &crate::optics::SensorOptics, momentum: f64, beside: bool) -> f64 {
+    let layers = optics.layers();
+    let count = if beside && layers.len() > 2 { layers.len() - 1 } else { layers.len() };
+    let indices: Vec<f64> = layers[..count].iter().map(|l| l.index_for(optics.channel())).collect();
+    fresnel::through(&indices, momentum.min(1.0))
+}
+
+impl Shading for LitDome {
+    fn levels(&self, samples: &[SurfaceSample], levels: &mut [[f32; 3]], work: &mut Work) {
+        let per_mm = 1.0 / self.radius_mm;
+        let mut moved = 0_u64;
+        for (sample, level) in samples.iter().zip(levels.iter_mut()) {
+            let light = if sample.deformed {
+                moved += 1;
+                self.field.moved(sample.point_mm, sample.normal)
+            } else {
+                self.field.still(sample.rest_mm * per_mm)
+            };
+            let passed = self.passed(sample.to_camera);
+            *level = std::array::from_fn(|c| self.gain[c] * light[c] * passed[c] + self.stray);
+        }
+        let still = samples.len() as u64 - moved;
+        work.add(EffectName::DirectLight, STILL_UNITS * still + MOVED_UNITS * moved);
+        if self.leaving.is_some() {
+            work.add(EffectName::Fresnel, LEAVING_UNITS * samples.len() as u64);
+        }
+    }
+
+    fn marker_level(&self, _scene: &Scene, position_mm: DVec3) -> [f32; 3] {
+        let nearest = self
+            .markers
+            .iter()
+            .min_by(|a, b| a.0.distance_squared(position_mm).total_cmp(&b.0.distance_squared(position_mm)));
+        nearest.map_or([0.0; 3], |(_, level)| *level)
+    }
+
+    fn steepest_per_mm(&self) -> f64 {
+        self.steepest_per_mm
+    }
+}

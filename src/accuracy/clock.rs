@@ -57,9 +57,14 @@ pub fn time<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing {
         }
         seconds.push(start.elapsed().as_secs_f64() / f64::from(batch));
     }
+    of(seconds)
+}
+
+/// The timing that single runs make.
+pub fn of(mut seconds: Vec<f64>) -> Timing {
     seconds.sort_by(f64::total_cmp);
     let at = |share: f64| {
-        let index = (share * (seconds.len() - 1) as f64).round() as usize;
+        let index = (share * seconds.len().saturating_sub(1) as f64).round() as usize;
         seconds.get(index).copied().unwrap_or_default()
     };
     Timing { median_s: at(0.5), lower_quartile_s: at(0.25), upper_quartile_s: at(0.75), runs: seconds.len() }

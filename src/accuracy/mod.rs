@@ -218,7 +218,7 @@ pub fn measure(
             own.as_ref().map_err(ToString::to_string)
         }
     };
-    match scene.and_then(|scene| frames::ladder(scene, patience, quick).map_err(|error| error.to_string())) {
+    match scene.and_then(|scene| frames::ladder(scene, quick).map_err(|error| error.to_string())) {
         Ok((ladder, sequence)) => {
             keep(Some(ladder), "");
             step(9, "the runtime");

@@ -29,6 +29,7 @@ mod state;
 mod sweeps;
 mod tangential;
 mod touch;
+mod trials;
 
 pub use elastomer::{Elastomer, Indenter};
 pub use error::ContactError;

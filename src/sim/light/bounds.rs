@@ -1,7 +1,7 @@
 //! How much light there can be, and how much of it each effect can be: bounds that hold before anything is drawn.
 //!
 //! Light straight from the lights is smooth over the dome where nothing throws a shadow. So it is sampled there, with
-//! and without the tape and with and without the faces' losses, and taken [`MARGIN`] times. What the platform can hide
+//! and without the tape and with and without the faces' losses, and taken somewhat larger than found. What the platform can hide
 //! and what the membrane can give itself follow from that in closed form: with the reflectance `a`, and `k` of the
 //! membrane's light coming back to it, the membrane's own light is at most `a k / (1 - a k)` of the lights', and what
 //! changes the lights' light changes all of it by at most `1 / (1 - a k)` of that.

@@ -4,7 +4,7 @@
 
 OpenCV: FileStorage, projectPoints against `image_px` where no layer refracts, solvePnP with the plain
 runtime's constants over the loads of `report/force.json`, through a refraction written here a second
-time; the bounds of the resolution by differences of it. PyYAML, and the rules of the programs that own the forms: camera_info
+time; the bounds of the resolution by differences of it; the springs' law by differences of an energy. PyYAML, and the rules of the programs that own the forms: camera_info
 and camchain. yourdfpy: URDF. mujoco: MJCF, stepped under a known load.
 """
 import json
@@ -14,6 +14,8 @@ import sys
 import cv2
 import numpy as np
 import yaml
+
+from spring_law import SpringLaw
 
 failed = 0
 
@@ -195,6 +197,17 @@ def check_resolution(constants, report):
     check("cv2.solvePnP under noise meets the bound", np.allclose(spread, said["pose_sd"], rtol=0.1), str(np.round(spread, 5)))
 
 
+def check_spring_law(constants):
+    springs = constants["springs"]
+    law = SpringLaw(springs)
+    table = springs["stiffness_at"]
+    worst = 0.0
+    for compression, K in [(0.0, springs["stiffness"])] + [(e["compression_mm"], e["stiffness"]) for e in table[1::2]]:
+        own, K = law.stiffness(compression), np.array(K)
+        worst = max(worst, np.abs(own - K).max() / np.abs(K).max(), *(np.abs(own - K).max(1) / np.abs(K).max(1)))
+    check("springs.law means stiffness and stiffness_at", worst < 1e-4, f"{worst:.1e}")
+
+
 def check_layer_free(constants):
     if any(l["index"] != 1.0 for l in constants["optics"]["layers"]):
         return
@@ -313,6 +326,7 @@ for argument in sys.argv[1:]:
     folder = root / "constants"
     constants = json.loads((folder / "constants.json").read_text())
     check_layer_free(constants)
+    check_spring_law(constants)
     check_opencv(folder, constants)
     check_ros(folder, constants)
     check_kalibr(folder, constants)

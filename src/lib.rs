@@ -22,6 +22,7 @@
 //! | find blobs in a camera's frames | [`frames`] |
 //! | write and read what the runtime needs | [`constants`] |
 //! | replace nominal numbers by measured ones | [`calibrate`] |
+//! | turn frames into markers, pose, wrench and displacement | [`track`] |
 //! | see what accuracy costs in time | [`accuracy`] |
 //! | do all of it | [`build`], and [`report`] for its page; [`compare`] two of them |
 //!
@@ -60,4 +61,5 @@ pub mod parts;
 pub mod pose;
 pub mod report;
 pub mod sim;
+pub mod track;
 pub mod transfer;

@@ -14,6 +14,7 @@ mod points;
 mod schema;
 mod shell;
 mod simulate;
+mod track;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -155,6 +156,8 @@ enum Command {
         #[arg(long)]
         scene: bool,
     },
+    /// From frames to markers, pose, wrench and local displacement.
+    Track(Box<track::TrackArguments>),
     /// Print the completions for a shell.
     Completions {
         /// Which shell.
@@ -227,6 +230,7 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         }
         Command::Simulate { scene, options } => simulate::run(output, scene, options),
         Command::Schema { scene } => schema::run(output, *scene),
+        Command::Track(arguments) => track::run(output, arguments),
         Command::CalibratePrint { measured, design, out, marks } => {
             calibrate_print::run(output, measured, design, out.as_deref(), *marks)
         }

@@ -6,6 +6,7 @@
 mod envelope_picture;
 mod force_report;
 pub mod formats;
+mod law;
 mod loads;
 mod model;
 mod plain;
@@ -18,6 +19,7 @@ mod springs;
 use serde_json::json;
 
 pub use force_report::{EnvelopeLine, ForceReport, force_report};
+pub use law::{MagnetLaw, SpringLaw, SpringLawEnds};
 pub use loads::{PosedLoad, loads_over};
 pub use model::{
     BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants, Matrix4,

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::law::SpringLaw;
+
 /// Marks the file for readers.
 pub const FORMAT: &str = "domecast-constants";
 /// Raised when a reader of an earlier version would misread the file.
@@ -167,6 +169,10 @@ pub struct SpringConstants {
     /// Stiffness as the springs are compressed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stiffness_at: Vec<StiffnessAt>,
+    /// What the springs are made of: the law that `stiffness` and `stiffness_at` are tangents and secants of, or, once
+    /// those are measured, what is added to them beyond the first order.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub law: Option<SpringLaw>,
     /// The wrench that a calibration's reference showed at rest; it is no part of `stiffness`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset: Option<[f64; 6]>,

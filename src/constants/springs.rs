@@ -3,6 +3,7 @@
 use glam::DVec3;
 use nalgebra::Matrix6;
 
+use super::law::SpringLaw;
 use super::loads::{PosedLoad, loads_over};
 use super::model::{Constants, PlainRuntime, SpringConstants, StiffnessAt};
 use super::plain::{PlainFit, PlainInput};
@@ -92,6 +93,7 @@ pub fn springs_of(design: &Design, sight: MarkerSight) -> Result<DesignSprings, 
         at_mm: at_mm.to_array(),
         source: "nominal".into(),
         stiffness_at,
+        law: Some(SpringLaw::of(&suspension, limits_of(design).grip_force_n)),
         offset: None,
         plain_runtime,
     };

@@ -41,6 +41,22 @@ impl Suspension {
         Ok(jacobian(force, moment))
     }
 
+    /// [`Suspension::wrench_at`] and [`Suspension::tangent_at`] at the cost of one.
+    ///
+    /// # Errors
+    /// As [`Suspension::wrench_at`].
+    pub fn wrench_and_tangent_at(
+        &self,
+        displacement: &Displacement,
+    ) -> Result<(Wrench, Matrix6<f64>), MechanicsError> {
+        let (force, moment) = self.derive(displacement)?;
+        let wrench = Wrench {
+            force_n: force.value() - self.rest_load.force_n,
+            moment_nmm: moment.value() - self.rest_load.moment_nmm,
+        };
+        Ok((wrench, jacobian(force, moment)))
+    }
+
     /// The 6x6 at rest: the tangent of the whole law.
     pub fn stiffness(&self) -> Result<Matrix6<f64>, MechanicsError> {
         self.tangent_at(&Displacement::default())

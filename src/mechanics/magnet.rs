@@ -57,6 +57,26 @@ impl MagnetPair {
         Ok(Self { radius_mm: 0.5 * diameter_mm, thickness_mm, sign, remanence_t })
     }
 
+    /// Diameter of a disc, mm.
+    pub fn diameter_mm(&self) -> f64 {
+        2.0 * self.radius_mm
+    }
+
+    /// Thickness of a disc, mm.
+    pub fn thickness_mm(&self) -> f64 {
+        self.thickness_mm
+    }
+
+    /// Remanence, T.
+    pub fn remanence_t(&self) -> f64 {
+        self.remanence_t
+    }
+
+    /// Whether unlike poles face.
+    pub fn is_attracting(&self) -> bool {
+        self.sign > 0.0
+    }
+
     /// Attraction at a gap between the facing faces (N, mm) and its slope by the gap (N/mm).
     ///
     /// Below 0.4 radii the force at 0.4 radii is continued along its tangent: springs keep magnets further

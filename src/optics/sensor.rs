@@ -105,10 +105,12 @@ impl SensorOptics {
             bottom_mm,
             dome_radius_mm: spec.dome_radius_mm,
         };
-        optics.for_channel(Channel::Green).placed(rest_from_camera)
+        let mut optics = optics.for_channel(Channel::Green);
+        optics.place(rest_from_camera)?;
+        Ok(optics)
     }
 
-    fn placed(mut self, sensor_from_camera: Rigid) -> Result<Self, OpticsError> {
+    fn place(&mut self, sensor_from_camera: Rigid) -> Result<(), OpticsError> {
         let height = sensor_from_camera.translation_mm.z;
         let air_mm = self.bottom_mm - height;
         // One part in 1e12 of the lengths involved is rounding, not a place.
@@ -125,7 +127,7 @@ impl SensorOptics {
             self.sensor_from_camera.translation_mm.z = self.bottom_mm;
         }
         self.layers[0].thickness_mm = Some(self.air_gap_mm());
-        Ok(self)
+        Ok(())
     }
 
     /// The same sensor after the platform, with sheet and dome, has moved; the
@@ -134,11 +136,21 @@ impl SensorOptics {
     /// # Errors
     /// A pose that is not rigid, or one that puts the pupil into the sheet.
     pub fn at_pose(&self, rest_from_platform: &Rigid) -> Result<Self, OpticsError> {
+        let mut other = self.clone();
+        other.move_to(rest_from_platform)?;
+        Ok(other)
+    }
+
+    /// [`SensorOptics::at_pose`] in place, which allocates nothing; after an error the sensor is where it was.
+    ///
+    /// # Errors
+    /// As [`SensorOptics::at_pose`].
+    pub fn move_to(&mut self, rest_from_platform: &Rigid) -> Result<(), OpticsError> {
         rest_from_platform
             .check()
             .map_err(|error| OpticsError::new("rest_from_platform", "not rigid", error.to_string()))?;
         let platform_from_rest = rest_from_platform.orthonormalized().inverse();
-        self.clone().placed(platform_from_rest.compose(&self.rest_from_camera))
+        self.place(platform_from_rest.compose(&self.rest_from_camera))
     }
 
     /// The same sensor as another colour channel sees it.

@@ -1,0 +1,218 @@
+//! Where frames come from: files, a video through ffmpeg, a stream.
+
+use std::fs::{self, File};
+use std::io::{self, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::str::FromStr;
+
+use super::super::calibrate_force::input_fault;
+use super::super::output::Failure;
+use super::decode::{self, Picture};
+
+/// Most bytes of a picture's file.
+const MOST_FILE_BYTES: u64 = 1 << 28;
+const PICTURES: [&str; 5] = ["png", "jpg", "jpeg", "pgm", "ppm"];
+const VIDEOS: [&str; 8] = ["avi", "mp4", "mkv", "mov", "webm", "m4v", "mjpeg", "mpg"];
+const ALLOWED: &str = "a folder of PNG or JPEG frames, frames, one video, or - for a stream";
+
+/// Size and channels of raw frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RawSize {
+    width: usize,
+    height: usize,
+    channels: usize,
+}
+
+impl FromStr for RawSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || "WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb, such as 640x480:rgb".to_owned();
+        let (size, kind) = text.split_once(':').unwrap_or((text, "gray"));
+        let (width, height) = size.split_once('x').ok_or_else(wrong)?;
+        let number =
+            |t: &str| t.parse::<usize>().ok().filter(|v| (1..=1 << 14).contains(v)).ok_or_else(wrong);
+        let channels = match kind {
+            "gray" | "grey" => 1,
+            "rgb" => 3,
+            _ => return Err(wrong()),
+        };
+        Ok(Self { width: number(width)?, height: number(height)?, channels })
+    }
+}
+
+/// A frame, or why there is none.
+pub struct Next {
+    pub number: u64,
+    pub picture: Result<Picture, String>,
+}
+
+enum Kind {
+    Files(std::vec::IntoIter<(u64, PathBuf)>),
+    Raw(Box<dyn Read>, RawSize),
+    Pnm(Box<dyn Read>),
+}
+
+/// Frames, one after the other.
+pub struct Source {
+    kind: Kind,
+    next: u64,
+    done: bool,
+    video: Option<(Child, PathBuf)>,
+}
+
+impl Source {
+    /// Opens what the command line names.
+    pub fn open(paths: &[PathBuf], raw: Option<RawSize>) -> Result<Self, Failure> {
+        let of = |kind: Kind| Self { kind, next: 0, done: false, video: None };
+        let [path, more @ ..] = paths else {
+            return Err(input_fault(Path::new("-"), "nothing was given", ALLOWED));
+        };
+        let is_stream = path.as_os_str() == "-";
+        if (is_stream || raw.is_some() || has_extension(path, &VIDEOS)) && !more.is_empty() {
+            return Err(input_fault(path, "stands beside others", ALLOWED));
+        }
+        if is_stream || raw.is_some() {
+            let stream: Box<dyn Read> = if is_stream {
+                Box::new(BufReader::new(io::stdin()))
+            } else {
+                Box::new(BufReader::new(File::open(path).map_err(|e| unreadable(path, &e))?))
+            };
+            return Ok(of(match raw {
+                Some(size) => Kind::Raw(stream, size),
+                None => Kind::Pnm(stream),
+            }));
+        }
+        if has_extension(path, &VIDEOS) {
+            return Self::video(path);
+        }
+        let files = if path.is_dir() && more.is_empty() { pictures_in(path)? } else { paths.to_vec() };
+        Ok(of(Kind::Files(numbered(files).into_iter())))
+    }
+
+    fn video(path: &Path) -> Result<Self, Failure> {
+        File::open(path).map_err(|e| unreadable(path, &e))?;
+        // Pictures with a head each: their size is told, not guessed.
+        let child = Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "error", "-i"])
+            .arg(path)
+            .args(["-an", "-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::inherit())
+            .spawn();
+        let mut child = child.map_err(|error| {
+            let problem = format!("is a video, and ffmpeg, which would read it, does not start ({error})");
+            input_fault(path, problem, "a system with ffmpeg, or the frames as pictures")
+        })?;
+        let stream: Box<dyn Read> = match child.stdout.take() {
+            Some(stdout) => Box::new(BufReader::new(stdout)),
+            None => Box::new(io::empty()),
+        };
+        Ok(Self { kind: Kind::Pnm(stream), next: 0, done: false, video: Some((child, path.to_path_buf())) })
+    }
+
+    /// The next frame; `None` at the end. After a stream that broke off there is nothing more.
+    pub fn next_frame(&mut self) -> Option<Next> {
+        if self.done {
+            return None;
+        }
+        let number = self.next;
+        self.next += 1;
+        match &mut self.kind {
+            Kind::Files(files) => {
+                let (number, path) = files.next()?;
+                let picture = read_whole(&path).and_then(|bytes| decode::picture(&bytes));
+                Some(Next { number, picture: picture.map_err(|e| format!("{}: {e}", path.display())) })
+            }
+            Kind::Raw(stream, size) => {
+                let wanted = size.width * size.height * size.channels;
+                let mut bytes = Vec::with_capacity(wanted);
+                let read = stream.take(wanted as u64).read_to_end(&mut bytes);
+                let picture = match read {
+                    Ok(0) => return None,
+                    Ok(n) if n == wanted => {
+                        Ok(Picture { width: size.width, height: size.height, channels: size.channels, bytes })
+                    }
+                    Ok(n) => Err(format!("the stream ends after {n} of the frame's {wanted} bytes")),
+                    Err(error) => Err(format!("the stream broke off ({error})")),
+                };
+                self.done = picture.is_err();
+                Some(Next { number, picture })
+            }
+            Kind::Pnm(stream) => {
+                let picture = decode::pnm(stream).transpose()?;
+                self.done = picture.is_err();
+                Some(Next { number, picture })
+            }
+        }
+    }
+
+    /// What is left to be said at the end: a video that could not be read.
+    pub fn end(&mut self) -> Result<(), Failure> {
+        let Some((mut child, path)) = self.video.take() else { return Ok(()) };
+        match child.wait() {
+            Ok(status) if status.success() => Ok(()),
+            Ok(status) => Err(input_fault(
+                &path,
+                format!("was not read to its end (ffmpeg: {status})"),
+                "a whole video",
+            )),
+            Err(error) => Err(unreadable(&path, &error)),
+        }
+    }
+}
+
+fn unreadable(path: &Path, error: &io::Error) -> Failure {
+    input_fault(path, format!("cannot be read ({error})"), ALLOWED)
+}
+
+fn has_extension(path: &Path, list: &[&str]) -> bool {
+    path.extension().and_then(|e| e.to_str()).is_some_and(|e| list.contains(&e.to_ascii_lowercase().as_str()))
+}
+
+fn read_whole(path: &Path) -> Result<Vec<u8>, String> {
+    let fault = |error: io::Error| format!("cannot be read ({error})");
+    let file = File::open(path).map_err(fault)?;
+    let mut bytes = Vec::new();
+    file.take(MOST_FILE_BYTES).read_to_end(&mut bytes).map_err(fault)?;
+    Ok(bytes)
+}
+
+fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let entries = fs::read_dir(folder).map_err(|e| unreadable(folder, &e))?;
+    let mut found = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|e| unreadable(folder, &e))?.path();
+        if has_extension(&path, &PICTURES) {
+            found.push(path);
+        }
+    }
+    if found.is_empty() {
+        return Err(input_fault(folder, "holds no PNG or JPEG frame", ALLOWED));
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// The last number in a file's name.
+fn number_of(path: &Path) -> Option<u64> {
+    let name = path.file_stem()?.to_str()?;
+    let digits: String =
+        name.chars().rev().skip_while(|c| !c.is_ascii_digit()).take_while(char::is_ascii_digit).collect();
+    digits.chars().rev().collect::<String>().parse().ok()
+}
+
+/// Frames by the numbers in their names, so that a missing file shows as a gap; by their order where some have none,
+/// or two have the same.
+fn numbered(files: Vec<PathBuf>) -> Vec<(u64, PathBuf)> {
+    let mut by_name: Vec<(u64, PathBuf)> =
+        files.iter().filter_map(|path| Some((number_of(path)?, path.clone()))).collect();
+    by_name.sort_by_key(|(number, _)| *number);
+    let distinct = by_name.windows(2).all(|pair| pair[0].0 != pair[1].0);
+    if by_name.len() == files.len() && distinct {
+        return by_name;
+    }
+    files.into_iter().enumerate().map(|(i, path)| (i as u64, path)).collect()
+}

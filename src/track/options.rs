@@ -1,0 +1,105 @@
+//! What a user may choose.
+
+/// The channel that marks are measured in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Channel {
+    /// Red alone.
+    Red,
+    /// Green: the one that the constants' indices are for.
+    #[default]
+    Green,
+    /// Blue alone.
+    Blue,
+    /// The paper's grey, 0.30 R + 0.59 G + 0.11 B.
+    Luma,
+}
+
+/// How marks are told from the ground when the whole frame is searched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Thresholds {
+    /// Half way between the ground and the marks of each neighbourhood.
+    #[default]
+    Adaptive,
+    /// The paper's: black below one level, white above another, the same all over the frame.
+    Fixed {
+        /// A pixel below is black.
+        black: u8,
+        /// A pixel above is white.
+        white: u8,
+    },
+}
+
+/// How a dot is found again in the next frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Motion {
+    /// Where the new pose puts it, plus what it was displaced by; the neighbours' motion where that fails.
+    #[default]
+    Predicted,
+    /// Pyramidal Lucas-Kanade from its last centroid, as the paper does.
+    LucasKanade,
+}
+
+/// Where displacements and wrenches are counted from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Reference {
+    /// The constants' rest: nothing needs to be unloaded, not even in the first frame.
+    #[default]
+    Constants,
+    /// The mean of the first so many good frames, which must be without load: takes out what the constants are off.
+    Frames(u32),
+}
+
+/// Steps of the paper on the frame that is searched as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Steps {
+    /// Binomial blur (3 x 3): noise of single pixels makes no blobs then.
+    pub blur: bool,
+    /// Sharpening (3 x 3) after it.
+    pub sharpen: bool,
+    /// Opening (3 x 3) of the thresholded frame.
+    pub open: bool,
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self { blur: true, sharpen: false, open: false }
+    }
+}
+
+/// What a tracker takes for granted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackOptions {
+    /// The channel that marks are measured in.
+    pub channel: Channel,
+    /// How marks are told from the ground when the whole frame is searched.
+    pub thresholds: Thresholds,
+    /// Steps of that search.
+    pub steps: Steps,
+    /// How a dot is found again.
+    pub motion: Motion,
+    /// Where displacements and wrenches are counted from.
+    pub reference: Reference,
+    /// Largest rms of the white markers' residuals that is still a pose, px. The constants' own tolerances say above which
+    /// they are told to be another camera's.
+    pub most_residual_px: f64,
+    /// Largest distance, in parts of the dots' spacing, at which a quarter of the dots may lie from where the pose
+    /// puts them, with which constants still pass for the camera's.
+    pub most_misplaced: f64,
+    /// The whole frame is searched for lost and false dots at least every so many frames; 0: only when needed.
+    pub search_every: u32,
+}
+
+impl Default for TrackOptions {
+    fn default() -> Self {
+        Self {
+            channel: Channel::Green,
+            thresholds: Thresholds::Adaptive,
+            steps: Steps::default(),
+            motion: Motion::Predicted,
+            reference: Reference::Constants,
+            most_residual_px: 2.0,
+            most_misplaced: 0.25,
+            search_every: 30,
+        }
+    }
+}

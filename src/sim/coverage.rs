@@ -46,7 +46,7 @@ impl Coverage {
         }
         if polygon.len() < 3
             || largest <= 0.0
-            || !((high - low).max_element() <= LARGEST_BOX_PX)
+            || (high - low).max_element() > LARGEST_BOX_PX
             || low.abs().max_element() > 1e9
         {
             return;

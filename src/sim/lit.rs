@@ -141,11 +141,9 @@ impl<const N: usize> Lit<N> {
             for (x, y) in squares {
                 let in_dent = side > IN_DENT && dented.is_some_and(|dented| dented.meets(x, y, side));
                 match self.judge(x, y, half, surface.tolerance) {
-                    Verdict::Smooth if !in_dent => {
-                        if half > 1 {
-                            self.biquadratic(x, y, half);
-                            work.add_base((side * side) as u64 * units::FILL);
-                        }
+                    Verdict::Smooth if !in_dent && half > 1 => {
+                        self.biquadratic(x, y, half);
+                        work.add_base((side * side) as u64 * units::FILL);
                     }
                     // A square whose nine rays all miss may still hold a corner of the dome; the largest squares
                     // are wide, so they are divided once more.

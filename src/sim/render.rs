@@ -69,6 +69,9 @@ pub struct Around {
     pub after: Touch,
 }
 
+/// By band of rows, what was seen at each of its times.
+type SeenInBands = Vec<(Range<usize>, Vec<Spots>)>;
+
 /// Rows that are drawn at one set of times.
 struct Band {
     rows: Range<usize>,
@@ -240,7 +243,7 @@ impl<'a> Renderer<'a> {
         around: Option<&Around>,
         scratch: &mut Scratch,
         work: &mut Work,
-    ) -> Result<(Image8, Vec<(Range<usize>, Vec<Spots>)>), SimError> {
+    ) -> Result<(Image8, SeenInBands), SimError> {
         let scene = self.scene;
         let parts = Parts { scene, pipeline: &self.pipeline, points: &self.points, field };
         let (width, height) = scene.image_size();

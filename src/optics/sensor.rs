@@ -223,6 +223,17 @@ impl SensorOptics {
         Ok(self.surface_point(pixel, field_angle_rad, &hit))
     }
 
+    /// [`SensorOptics::trace`] and the ray's unit direction inside the dome, away from the camera.
+    ///
+    /// # Errors
+    /// As `trace`.
+    pub fn trace_inside(&self, pixel: DVec2) -> Result<(SurfacePoint, DVec3), Limit> {
+        let ray = self.lens.unproject(pixel)?;
+        let field_angle_rad = Lens::field_angle_rad(ray);
+        let hit = self.meet(ray, field_angle_rad)?;
+        Ok((self.surface_point(pixel, field_angle_rad, &hit), hit.inside))
+    }
+
     pub(super) fn surface_point(&self, pixel: DVec2, field_angle_rad: f64, hit: &Hit) -> SurfacePoint {
         SurfacePoint {
             pixel,
@@ -286,6 +297,19 @@ impl SensorOptics {
     /// The limit that the point is past.
     pub fn project(&self, point_mm: DVec3) -> Result<DVec2, Limit> {
         Ok(self.lens.project(self.chief_ray(point_mm)?)?)
+    }
+
+    /// [`SensorOptics::project`] for a point of a dome that is out of shape: the medium is taken to reach as far as
+    /// the point, also where it bulges past the undeformed dome.
+    ///
+    /// # Errors
+    /// As `project`, but never [`Limit::OutsideDome`].
+    pub fn project_deformed(&self, point_mm: DVec3) -> Result<DVec2, Limit> {
+        if !point_mm.is_finite() {
+            return Err(Limit::NotFinite);
+        }
+        let (pupil, _) = self.chief_pupil(point_mm)?;
+        Ok(self.lens.project(self.central_ray(point_mm, pupil)?)?)
     }
 
     /// No climb through the layers takes more steps.

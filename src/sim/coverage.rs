@@ -22,8 +22,14 @@ impl Coverage {
     /// sign of its direction; a running sum along each row then gives the covered area of every pixel, without
     /// any sampling. A polygon that is not finite, empty or wider than 20000 px covers nothing.
     pub fn fill(&mut self, polygon: &[DVec2]) {
+        self.fill_rings(polygon, DVec2::ZERO, &[1.0]);
+    }
+
+    /// The mean coverage by copies of a polygon that are scaled about a centre.
+    pub fn fill_rings(&mut self, polygon: &[DVec2], center: DVec2, scales: &[f64]) {
         self.values.clear();
         (self.width, self.height) = (0, 0);
+        let largest = scales.iter().copied().fold(0.0, f64::max);
         let mut low = DVec2::INFINITY;
         let mut high = DVec2::NEG_INFINITY;
         for point in polygon {
@@ -33,7 +39,16 @@ impl Coverage {
             low = low.min(*point);
             high = high.max(*point);
         }
-        if polygon.len() < 3 || (high - low).max_element() > LARGEST_BOX_PX || low.abs().max_element() > 1e9 {
+        if scales != [1.0] {
+            // The largest copy; it holds the others where the centre lies inside.
+            low = (center + (low - center) * largest).min(low);
+            high = (center + (high - center) * largest).max(high);
+        }
+        if polygon.len() < 3
+            || largest <= 0.0
+            || (high - low).max_element() > LARGEST_BOX_PX
+            || low.abs().max_element() > 1e9
+        {
             return;
         }
         // Pixel i covers i - 0.5 to i + 0.5.
@@ -45,13 +60,19 @@ impl Coverage {
         // One more column takes what an edge in the last one leaves for its right neighbour.
         let stride = self.width + 1;
         self.values.resize(stride * self.height, 0.0);
-        let local = |point: DVec2| point + 0.5 - origin;
         let Some(last) = polygon.last() else { return };
-        let mut from = local(*last);
-        for point in polygon {
-            let to = local(*point);
-            add_edge(&mut self.values, stride, from, to);
-            from = to;
+        let share = 1.0 / scales.len() as f64;
+        for scale in scales {
+            let local = |point: DVec2| {
+                let placed = if *scale == 1.0 { point } else { center + (point - center) * *scale };
+                placed + 0.5 - origin
+            };
+            let mut from = local(*last);
+            for point in polygon {
+                let to = local(*point);
+                add_edge(&mut self.values, stride, from, to, share);
+                from = to;
+            }
         }
         for row in self.values.chunks_exact_mut(stride) {
             let mut sum = 0.0;
@@ -76,6 +97,17 @@ impl Coverage {
         })
     }
 
+    /// The box's columns and rows inside a picture, ends excluded.
+    pub fn bounds(&self, width: usize, height: usize) -> [usize; 4] {
+        let clamp = |value: i64, most: usize| usize::try_from(value).unwrap_or(0).min(most);
+        [
+            clamp(self.left, width),
+            clamp(self.top, height),
+            clamp(self.left + self.width as i64, width),
+            clamp(self.top + self.height as i64, height),
+        ]
+    }
+
     /// Pixels of the box.
     pub fn area(&self) -> usize {
         self.width * self.height
@@ -84,13 +116,14 @@ impl Coverage {
 
 /// Adds an edge to the accumulation: for each row that it crosses, its height there, split between the pixels by
 /// the area to its right.
-fn add_edge(values: &mut [f32], stride: usize, from: DVec2, to: DVec2) {
+fn add_edge(values: &mut [f32], stride: usize, from: DVec2, to: DVec2, share: f64) {
     if from.y == to.y {
         return;
     }
-    let (sign, a, b) = if from.y < to.y { (1.0, from, to) } else { (-1.0, to, from) };
+    let (sign, a, b) = if from.y < to.y { (share, from, to) } else { (-share, to, from) };
     let per_row = (b.x - a.x) / (b.y - a.y);
-    let first = a.y.floor() as usize;
+    // Places are not negative: the cast is the floor.
+    let first = a.y as usize;
     let mut x = a.x;
     let mut y = a.y;
     for (index, row) in values.chunks_exact_mut(stride).enumerate().skip(first) {
@@ -107,10 +140,9 @@ fn add_edge(values: &mut [f32], stride: usize, from: DVec2, to: DVec2) {
 /// Adds the part of an edge inside one row: signed height `dy`, between two columns.
 fn add_piece(row: &mut [f32], dy: f64, x0: f64, x1: f64) {
     let (low, high) = if x0 < x1 { (x0, x1) } else { (x1, x0) };
-    let first = low.floor();
-    let last = high.ceil();
-    let start = first as usize;
-    if last <= first + 1.0 {
+    let start = low as usize;
+    let first = start as f64;
+    if high <= first + 1.0 {
         // Inside one pixel: the part right of the edge's middle is covered.
         let middle = 0.5 * (low + high) - first;
         add(row, start, dy * (1.0 - middle));

@@ -107,6 +107,16 @@ impl EffectName {
     /// Number of effects.
     pub const COUNT: usize = EFFECT_COUNT;
 
+    /// The effects that move where things appear, without contact.
+    pub const GEOMETRIC: [Self; 6] = [
+        Self::LensDistortion,
+        Self::PupilShift,
+        Self::Refraction,
+        Self::Dispersion,
+        Self::SheetMotion,
+        Self::GapChange,
+    ];
+
     /// The effect of that name.
     pub fn parse(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|effect| effect.as_str() == name)

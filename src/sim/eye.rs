@@ -21,7 +21,6 @@ pub struct Eye {
 /// An [`Eye`] at one pose of the platform.
 #[derive(Debug, Clone)]
 pub struct PlacedEye {
-    geometry: Geometry,
     optics: Vec<SensorOptics>,
 }
 
@@ -88,7 +87,7 @@ impl Eye {
             })
         };
         let optics = self.optics.iter().map(place).collect::<Result<_, _>>()?;
-        Ok(PlacedEye { geometry: self.geometry, optics })
+        Ok(PlacedEye { optics })
     }
 
     /// Colours that have rays of their own: 1 or 3.
@@ -140,17 +139,20 @@ impl PlacedEye {
         self.optics.len()
     }
 
-    /// Whether the bend is solved here, or apparent points stand for it.
-    pub fn solves(&self) -> bool {
-        self.geometry.gap_change || !self.geometry.refraction || !self.geometry.sheet_motion
-    }
-
     /// The pixel of a point (sensor frame, mm) in a channel.
     ///
     /// # Errors
     /// The limit that the point is past.
     pub fn project(&self, channel: usize, point_mm: DVec3) -> Result<DVec2, Limit> {
         self.optics(channel).ok_or(Limit::Unreachable)?.project(point_mm)
+    }
+
+    /// The pixel of a point of the deformed dome.
+    ///
+    /// # Errors
+    /// The limit that the point is past.
+    pub fn project_deformed(&self, channel: usize, point_mm: DVec3) -> Result<DVec2, Limit> {
+        self.optics(channel).ok_or(Limit::Unreachable)?.project_deformed(point_mm)
     }
 
     /// The pixel of an apparent point in a channel: one rigid motion and the lens.

@@ -27,20 +27,71 @@ impl Frame {
 
     /// The code of each value: `255 value^(1/gamma)`, rounded, as interleaved bytes.
     pub fn encode(&self, gamma: f64) -> Image8 {
-        let code = |value: f32| {
-            let clear = f64::from(value).clamp(0.0, 1.0);
-            let level = if gamma == 1.0 { clear } else { clear.powf(1.0 / gamma) };
-            // In range by the clamp; NaN, which no pass gives, would become 0.
-            (255.0 * level + 0.5) as u8
-        };
+        let coder = Coder::new(gamma);
         let mut bytes = vec![0; self.width * self.height * self.planes.len()];
-        for (channel, plane) in self.planes.iter().enumerate() {
-            let places = bytes.iter_mut().skip(channel).step_by(self.planes.len());
-            for (byte, value) in places.zip(plane) {
-                *byte = code(*value);
+        match self.planes.as_slice() {
+            [red, green, blue] => {
+                let three = red.iter().zip(green).zip(blue);
+                for (pixel, ((r, g), b)) in bytes.chunks_exact_mut(3).zip(three) {
+                    pixel.copy_from_slice(&[coder.code(*r), coder.code(*g), coder.code(*b)]);
+                }
+            }
+            planes => {
+                for (channel, plane) in planes.iter().enumerate() {
+                    let places = bytes.iter_mut().skip(channel).step_by(planes.len());
+                    for (byte, value) in places.zip(plane) {
+                        *byte = coder.code(*value);
+                    }
+                }
             }
         }
         Image8 { width: self.width, height: self.height, channels: self.planes.len(), bytes }
+    }
+}
+
+/// From light to code.
+enum Coder {
+    Linear,
+    /// The light at which each code begins, and the code at the start of each of 1024 equal parts of the scale:
+    /// few steps from there lead to the exact one.
+    Power {
+        begins: Box<[f32; 256]>,
+        start: Box<[u8; PARTS + 1]>,
+    },
+}
+
+const PARTS: usize = 1024;
+
+impl Coder {
+    fn new(gamma: f64) -> Self {
+        if gamma == 1.0 {
+            return Self::Linear;
+        }
+        let begin = |code: usize| ((code as f64 - 0.5).max(0.0) / 255.0).powf(gamma) as f32;
+        let begins: Box<[f32; 256]> = Box::new(std::array::from_fn(begin));
+        let code_of = |part: usize| {
+            let value = part as f32 / PARTS as f32;
+            begins.partition_point(|begin| *begin <= value).saturating_sub(1) as u8
+        };
+        let start = Box::new(std::array::from_fn(code_of));
+        Self::Power { begins, start }
+    }
+
+    /// NaN, which no pass gives, becomes 0.
+    #[inline]
+    fn code(&self, value: f32) -> u8 {
+        let clear = value.clamp(0.0, 1.0);
+        match self {
+            Self::Linear => (255.0 * clear + 0.5) as u8,
+            Self::Power { begins, start } => {
+                let part = (clear * PARTS as f32) as usize;
+                let mut code = start.get(part).copied().unwrap_or(0);
+                while code < 255 && begins.get(usize::from(code) + 1).is_some_and(|begin| *begin <= clear) {
+                    code += 1;
+                }
+                code
+            }
+        }
     }
 }
 

@@ -4,18 +4,21 @@ use glam::DVec2;
 
 use super::SimError;
 use super::eye::Eye;
-use super::instant::{Points, at_time};
-use super::pipeline::Geometry;
-use super::scene::Scene;
+use super::instant::Instant;
+use super::pipeline::{Geometry, Pipeline};
+use super::scene::{Scene, State};
+use super::spots::Points;
+use super::touch::{Between, Stepper};
 use super::work::Work;
+use crate::mechanics::contact::Level;
 
 /// Frames at which shifts are looked at; a longer sequence is sampled.
-const MOST_FRAMES: u32 = 33;
+const MOST_FRAMES: u32 = 17;
 
 /// All geometric effects that the scene calls for.
 pub fn called_for(scene: &Scene) -> Geometry {
     let lens = scene.optics().lens();
-    let moves = scene.motion().moves();
+    let moves = scene.motion().moves() || !scene.objects().is_empty();
     let layers = scene.optics().layers();
     let bends = layers.iter().any(|layer| layer.index != [1.0; 3]);
     Geometry {
@@ -39,11 +42,36 @@ fn frames(scene: &Scene) -> Vec<u32> {
     (0..MOST_FRAMES).map(|k| (u64::from(k) * last / u64::from(MOST_FRAMES - 1)) as u32).collect()
 }
 
-/// Largest distance between the images of any dot or marker, in any colour, with two sets of geometric effects, px.
+/// The sensor's states at some frames; under an object by the geometric level, which answers at once.
+fn states(scene: &Scene, frames: &[u32]) -> Result<Vec<(u32, State, Option<Between>)>, SimError> {
+    let mut uncounted = Work::default();
+    let mut stepper =
+        if scene.objects().is_empty() { None } else { Some(Stepper::new(scene, Level::Geometric)?) };
+    let mut out = Vec::new();
+    for frame in frames {
+        let time_s = scene.time_s(*frame);
+        out.push(match &mut stepper {
+            None => (*frame, scene.state_at(*frame, time_s)?, None),
+            Some(stepper) => {
+                let touch = stepper.next(*frame, time_s, &mut uncounted)?;
+                (*frame, touch.state.clone(), Some(Between::at_frame(touch)))
+            }
+        });
+    }
+    Ok(out)
+}
+
+/// A dot's centroid moves with the mean of its surroundings: no more than this often the largest motion of a centre.
+const CENTROID: f64 = 1.1;
+/// The same under an object, where the states of the bound are those of another level of contact.
+const UNDER_OBJECT: f64 = 1.5;
+
+/// A bound on the distance between the images of any dot or marker, in any colour, with two sets of geometric
+/// effects, px.
 ///
-/// Exact for sequences of up to 33 frames: the points and frames are the scene's own. A longer one is looked at in
-/// 33 frames, and each point's largest change from one of them to the next is added, which a motion that is smooth
-/// between them cannot pass. A point that is seen with one set only has no distance: infinite.
+/// The points and frames are the scene's own. A sequence of more than 17 frames is looked at in 17, and each point's
+/// largest change from one of them to the next is added, which a motion that is smooth between them cannot pass. A
+/// point that is seen with one set only has no distance: infinite.
 ///
 /// # Errors
 /// A frame whose load has no balance.
@@ -51,42 +79,36 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
     let mut uncounted = Work::default();
     let side = |geometry: Geometry, work: &mut Work| -> Result<(Eye, Points), SimError> {
         let eye = Eye::new(scene, geometry)?;
-        let solves = geometry.gap_change || !geometry.refraction || !geometry.sheet_motion;
-        let points = Points::new(scene, &eye, solves, 0.1, work);
+        let pipeline = Pipeline { geometry, ..Pipeline::default() };
+        let points = Points::new(scene, &pipeline, &eye, 0.1, work);
         Ok((eye, points))
     };
     let (a_eye, a_points) = side(with, &mut uncounted)?;
     let (b_eye, b_points) = side(without, &mut uncounted)?;
     let frames = frames(scene);
     let sampled = (frames.len() as u32) < scene.frame_count();
+    let colours = if a_eye.channels() == 1 && b_eye.channels() == 1 { 1 } else { scene.planes() };
     let mut last: Vec<DVec2> = Vec::new();
     let (mut worst, mut change): (f64, f64) = (0.0, 0.0);
-    for frame in frames {
+    for (frame, state, touch) in states(scene, &frames)? {
         let time_s = scene.time_s(frame);
-        let a = at_time(scene, &a_eye, with, frame, time_s, &mut uncounted)?;
-        let b = at_time(scene, &b_eye, without, frame, time_s, &mut uncounted)?;
+        let mut at = |eye: &Eye, geometry: Geometry| {
+            Instant::new(scene, eye, geometry, time_s, state.clone(), touch.clone(), None, &mut uncounted)
+        };
+        let (a, b) = (at(&a_eye, with)?, at(&b_eye, without)?);
         let mut now = Vec::new();
-        let dots = scene.dots().len();
-        for channel in 0..scene.planes() {
+        for colour in 0..colours {
             // A colour without rays of its own is seen with those of the reference.
-            let (ca, cb) = (channel.min(a_eye.channels() - 1), channel.min(b_eye.channels() - 1));
-            for item in 0..dots + scene.markers().len() {
-                let see = |points: &Points, instant, channel| match item.checked_sub(dots) {
-                    None => points.dot(scene, instant, channel, item),
-                    Some(marker) => points.marker(scene, instant, channel, marker),
-                };
-                match (see(&a_points, &a, ca), see(&b_points, &b, cb)) {
+            let (ca, cb) = (colour.min(a_eye.channels() - 1), colour.min(b_eye.channels() - 1));
+            for pair in a_points.centers(&a, ca).into_iter().zip(b_points.centers(&b, cb)) {
+                match pair {
                     (Some(a), Some(b)) => {
-                        let off = b.centroid_px - a.centroid_px;
-                        worst = worst.max(off.length()).max((b.center_px - a.center_px).length());
-                        now.push(off);
+                        worst = worst.max((b - a).length());
+                        now.push(b - a);
                     }
                     (None, None) => now.push(DVec2::ZERO),
                     _ => return Ok(f64::INFINITY),
                 }
-            }
-            if a_eye.channels() == 1 && b_eye.channels() == 1 {
-                break;
             }
         }
         for (before, off) in last.iter().zip(&now) {
@@ -94,5 +116,6 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
         }
         last = now;
     }
-    Ok(if sampled { worst + change } else { worst })
+    let margin = if scene.objects().is_empty() { CENTROID } else { UNDER_OBJECT };
+    Ok(margin * if sampled { worst + change } else { worst })
 }

@@ -5,14 +5,17 @@
 //! parts into a [`Pipeline`], and a renderer draws frames and tells the exact truth about them.
 
 mod coverage;
+mod dent;
 mod effect;
 mod effects;
 mod error;
 mod eye;
+mod field;
 mod frame;
 mod geometry_bound;
 mod instant;
 pub mod light;
+mod lit;
 mod outline;
 mod picture;
 pub mod pipeline;
@@ -21,6 +24,8 @@ mod render;
 pub mod run;
 pub mod scene;
 mod shading;
+mod spots;
+mod touch;
 mod truth;
 mod video;
 mod work;
@@ -31,11 +36,14 @@ pub use frame::{Frame, Image8};
 pub use instant::Instant;
 pub use pipeline::Pipeline;
 pub use plan::{Entry, Plan};
-pub use render::{Drawn, Renderer};
+pub use render::{Around, Drawn, Renderer, Scratch};
 pub use scene::Scene;
 pub use shading::{Shading, SurfaceSample};
+pub use touch::{Stepper, Touch};
 pub use truth::{DotTruth, EffectTruth, FrameTruth, MarkerTruth};
 pub use work::Work;
 
+#[cfg(test)]
+mod honesty;
 #[cfg(test)]
 mod tests;

@@ -7,6 +7,7 @@ use super::frame::{Frame, Image8};
 use super::light::LightUse;
 use super::shading::Shading;
 use super::work::Work;
+use crate::mechanics::contact::Level;
 
 /// What the used effects have installed.
 ///
@@ -17,6 +18,8 @@ pub struct Pipeline {
     pub geometry: Geometry,
     /// Which effects of light take part; [`super::light::shading`] makes the shading of them.
     pub light: LightUse,
+    /// How contact is worked out; `None`: nothing touches the dome.
+    pub contact: Option<Level>,
     /// What the dots look like.
     pub ink: Ink,
     /// When the rows gather light.
@@ -44,6 +47,25 @@ pub struct Geometry {
     pub sheet_motion: bool,
     /// The bend is solved in each frame; else the apparent points at rest move with the platform.
     pub gap_change: bool,
+}
+
+impl Geometry {
+    /// The geometric effects among those that are used.
+    pub fn of(uses: &dyn Fn(EffectName) -> bool) -> Self {
+        Self {
+            lens_distortion: uses(EffectName::LensDistortion),
+            pupil_shift: uses(EffectName::PupilShift),
+            refraction: uses(EffectName::Refraction),
+            dispersion: uses(EffectName::Dispersion),
+            sheet_motion: uses(EffectName::SheetMotion),
+            gap_change: uses(EffectName::GapChange),
+        }
+    }
+
+    /// Whether each frame solves the bend of its rays; else apparent points at rest move with the platform.
+    pub fn solves(self) -> bool {
+        self.gap_change || !self.refraction || !self.sheet_motion
+    }
 }
 
 /// How dots are drawn.

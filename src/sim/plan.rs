@@ -4,7 +4,10 @@ use serde::Serialize;
 
 use super::effect::{Bound, Cost, Effect, EffectChoice, EffectName};
 use super::effects;
+use super::geometry_bound::shift_px;
+use super::pipeline::Geometry;
 use super::scene::Scene;
+use super::scene::file::{LevelName, ToleranceSection};
 use super::{Pipeline, SimError, Work, light};
 
 /// What the plan says of one effect.
@@ -35,6 +38,9 @@ pub struct Plan {
     /// Sum of the bounds of what the plan leaves out although the scene calls for it (not counting what the
     /// scene forbids); within the scene's tolerance.
     pub left_out: Bound,
+    /// The level of contact where it is coarser than the scene's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact_level: Option<LevelName>,
 }
 
 /// An effect that the plan may leave out.
@@ -93,17 +99,69 @@ impl Plan {
         }
         // What a scene forbids takes with it what needs it.
         drop_orphans(&mut entries);
-        let mut plan = Self { entries, left_out: Bound::default() };
+        let mut plan = Self { entries, left_out: Bound::default(), contact_level: None };
         if spare {
-            plan.leave_out(scene);
+            plan.leave_out(scene)?;
         }
         Ok(plan)
     }
 
-    fn leave_out(&mut self, scene: &Scene) {
+    /// What leaving out a set can do to a pixel of the coded picture, grey levels: the sum of the bounds, and what
+    /// the steps after it can make of the smallest difference: rounding to a code, the converter's rounding, and
+    /// a lossy code, whose own error both pictures have.
+    fn grey_of(&self, scene: &Scene, spares: &[Spare], set: u64) -> f64 {
+        let members =
+            || spares.iter().enumerate().filter(|(place, _)| set & (1 << place) != 0).map(|(_, s)| s);
+        let sum: f64 = members().map(|spare| spare.grey).sum();
+        if sum == 0.0 || !scene.draws() {
+            return 0.0;
+        }
+        let kept = |name: EffectName| {
+            let entry = self.entries.iter().enumerate().find(|(_, e)| e.effect == name && e.used);
+            entry.filter(|(at, _)| !members().any(|spare| spare.index == *at)).map(|(_, entry)| entry)
+        };
+        let mut steps = 1.0;
+        if let (Some(_), Some(noise)) = (kept(EffectName::Noise), &scene.file().electronics.noise) {
+            steps += 255.0 / f64::from((1_u32 << noise.bits.min(31)) - 1);
+        }
+        if let Some(entry) = kept(EffectName::Compression) {
+            steps += 2.0 * entry.bound.map_or(0.0, |bound| bound.grey);
+        }
+        sum + steps
+    }
+
+    /// Whether the geometric effects of a set, left out together, stay within the tolerance: each one's bound is
+    /// that of its absence alone, and two absences might add to more than their sum.
+    fn holds_jointly(
+        &self,
+        scene: &Scene,
+        spares: &[Spare],
+        set: u64,
+        per_px: f64,
+    ) -> Result<bool, SimError> {
+        let out = |name: EffectName| {
+            let chosen = spares.iter().enumerate().filter(|(place, _)| set & (1 << place) != 0);
+            chosen
+                .into_iter()
+                .any(|(_, spare)| self.entries.get(spare.index).is_some_and(|e| e.effect == name))
+        };
+        let geometric = EffectName::GEOMETRIC.into_iter().filter(|name| out(*name)).count();
+        if geometric < 2 {
+            return Ok(true);
+        }
+        let uses = |name: EffectName| self.uses(name);
+        let with = Geometry::of(&uses);
+        let without = Geometry::of(&|name| uses(name) && !out(name));
+        let shift = shift_px(scene, with, without)?;
         let tolerance = scene.file().tolerance;
+        Ok(shift <= tolerance.px && shift * per_px <= tolerance.grey)
+    }
+
+    fn leave_out(&mut self, scene: &Scene) -> Result<(), SimError> {
+        let mut tolerance = scene.file().tolerance;
         let frames = u64::from(scene.frame_count());
         let per_px = grey_per_px(scene);
+        self.choose_level(scene, per_px, &mut tolerance);
         let spares: Vec<Spare> = self
             .entries
             .iter()
@@ -117,8 +175,21 @@ impl Plan {
                 (small && free && cost > 0).then_some(Spare { index, px: bound.px, grey, cost })
             })
             .collect();
-        let chosen =
-            best_set(&spares, tolerance.px, tolerance.grey, &|set| closed(&self.entries, &spares, set));
+        let mut banned: Vec<u64> = Vec::new();
+        let mut chosen = 0;
+        for _ in 0..JOINT_TRIES {
+            let allowed = |set: u64| {
+                !banned.contains(&set)
+                    && closed(&self.entries, &spares, set)
+                    && self.grey_of(scene, &spares, set) <= tolerance.grey
+            };
+            chosen = best_set(&spares, tolerance.px, tolerance.grey, &allowed);
+            if self.holds_jointly(scene, &spares, chosen, per_px)? {
+                break;
+            }
+            banned.push(chosen);
+            chosen = 0;
+        }
         for (place, spare) in spares.iter().enumerate() {
             let Some(entry) = self.entries.get_mut(spare.index) else { continue };
             if chosen & (1 << place) != 0 {
@@ -130,6 +201,36 @@ impl Plan {
                 self.left_out.px += spare.px;
                 self.left_out.grey += spare.grey;
             }
+        }
+        Ok(())
+    }
+
+    /// Takes the coarsest level of contact that the tolerance allows; what it uses up is taken off.
+    fn choose_level(&mut self, scene: &Scene, per_px: f64, tolerance: &mut ToleranceSection) {
+        let free = scene.choice(EffectName::Contact) == EffectChoice::Plan;
+        if !self.uses(EffectName::Contact) || !free {
+            return;
+        }
+        for (name, px, _) in effects::contact::coarser_levels(scene) {
+            // Under the design's lights a membrane of another shape may be lit quite otherwise.
+            let lit = scene.draws() && scene.file().light.leds.is_some();
+            let grey = if lit { 255.0 } else { px * per_px };
+            let steps = if grey > 0.0 { 1.0 } else { 0.0 };
+            if px > tolerance.px || grey + steps > tolerance.grey {
+                continue;
+            }
+            tolerance.px -= px;
+            tolerance.grey -= grey;
+            self.left_out = Bound { px, grey };
+            self.contact_level = Some(name);
+            if let Some(entry) = self.entries.iter_mut().find(|entry| entry.effect == EffectName::Contact) {
+                entry.why = format!(
+                    "{}; the {} level instead: at most {px:.2e} px and {grey:.2e} grey levels off",
+                    entry.why,
+                    name.as_str()
+                );
+            }
+            return;
         }
     }
 
@@ -155,11 +256,17 @@ impl Plan {
                 effect.apply(scene, &mut pipeline)?;
             }
         }
+        if let Some(name) = self.contact_level {
+            pipeline.contact = Some(effects::contact::level_named(scene, name));
+        }
         pipeline.passes.sort_by_key(|pass| pass.stage());
         pipeline.shading = light::shading(scene, &pipeline.light, work)?;
         Ok(pipeline)
     }
 }
+
+/// Sets that are tried before the plan gives up leaving anything out.
+const JOINT_TRIES: u32 = 16;
 
 fn effect_of(name: EffectName) -> Option<&'static dyn Effect> {
     effects::all().iter().copied().find(|effect| effect.name() == name)
@@ -231,9 +338,10 @@ fn grey_per_px(scene: &Scene) -> f64 {
         return 0.0;
     }
     let light = &scene.file().light;
-    let levels = [light.membrane_level, light.marker_level, light.surround_level];
-    let brightest = levels.into_iter().fold(0.0, f64::max);
-    let darkest = (light.membrane_level * scene.file().ink.reflectance).min(light.surround_level);
+    let brightest = light.brightest_level();
+    // Under the design's lights parts of the dome may be dark.
+    let dark = (light.membrane_level * scene.file().ink.reflectance).min(light.surround_level);
+    let darkest = if light.leds.is_some() { 0.0 } else { dark };
     // A straight or convex edge that moves by d changes the covered part of a pixel by at most d times the
     // pixel's width across the motion, sqrt(2); two edges in one pixel may move apart.
     let edges = 2.0 * std::f64::consts::SQRT_2;

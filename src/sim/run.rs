@@ -10,8 +10,9 @@ use rayon::prelude::*;
 use super::SimError;
 use super::frame::Image8;
 use super::plan::Plan;
-use super::render::{Drawn, Renderer};
+use super::render::{Around, Drawn, Renderer, Scratch};
 use super::scene::Scene;
+use super::touch::Touch;
 use super::video::VideoWriter;
 use super::work::Work;
 
@@ -120,13 +121,24 @@ pub fn run(
 
     let count = scene.frame_count();
     let batch = (BATCH_PER_THREAD * rayon::current_num_threads()).max(1) as u32;
+    let mut stepper = renderer.stepper()?;
+    // The touched dome, solved in order, from the frame before the batch to the one after it.
+    let mut touches: Vec<Touch> = Vec::new();
     let mut first = 0;
     while first < count {
         let end = count.min(first.saturating_add(batch));
+        let start = first.saturating_sub(1);
+        if let Some(stepper) = &mut stepper {
+            let solved = start as usize + touches.len();
+            for number in solved as u32..count.min(end.saturating_add(1)) {
+                touches.push(stepper.next(number, scene.time_s(number), &mut summary.work)?);
+            }
+        }
         let drawn: Vec<Result<Coded, SimError>> = (first..end)
             .into_par_iter()
-            .map(|number| {
-                let drawn = renderer.frame(number)?;
+            .map_init(Scratch::default, |scratch, number| {
+                let around = Around::of(&touches, (number - start) as usize);
+                let drawn = renderer.frame_around(number, around.as_ref(), scratch)?;
                 let png =
                     drawn.image.as_ref().map(png_bytes).transpose().map_err(|error| SimError::Frame {
                         frame: number,
@@ -150,6 +162,7 @@ pub fn run(
                     video.add(image).map_err(fault("write the video", &video_path))?;
                 }
             }
+            write_extras(scene, &drawn, &fresh)?;
             writeln!(truth, "{}", drawn.truth.to_line()).map_err(fault("write the truth", &truth_path))?;
             if let Some(note) = drawn.truth.note {
                 summary.notes.push((number, format!("{}: {note}", drawn.truth.status)));
@@ -158,6 +171,9 @@ pub fn run(
             summary.frames += 1;
         }
         first = end;
+        if stepper.is_some() {
+            touches.drain(..(first.saturating_sub(1) - start) as usize);
+        }
         progress(first);
     }
     truth.flush().map_err(fault("write the truth", &truth_path))?;
@@ -170,6 +186,69 @@ pub fn run(
     fs::write(&plan_path, text).map_err(fault("write the plan", &plan_path))?;
     put_in_place(staging, &fresh, out)?;
     Ok(summary)
+}
+
+/// Samples along each side of a height map.
+const HEIGHT_SIDE: u32 = 200;
+
+/// The membrane's heights and the contact's pressure, where the scene wants them.
+fn write_extras(scene: &Scene, drawn: &Drawn, folder: &Path) -> Result<(), RunError> {
+    let wanted = scene.file().output;
+    let number = drawn.truth.frame;
+    let radius_mm = scene.optics().dome_radius_mm();
+    let write = |path: PathBuf, bytes: Vec<u8>| {
+        fs::write(&path, bytes).map_err(|source| RunError::Io { doing: "write the file", path, source })
+    };
+    if wanted.heights {
+        let heights = match &drawn.contact {
+            Some(contact) => contact.height_map_mm(radius_mm, HEIGHT_SIDE as usize),
+            None => still_heights_mm(radius_mm, HEIGHT_SIDE as usize),
+        };
+        let path = folder.join(format!("heights_{number:04}.tif"));
+        let bytes = float_tiff(&heights, HEIGHT_SIDE).map_err(|error| RunError::Io {
+            doing: "code the heights",
+            path: path.clone(),
+            source: io::Error::other(error.to_string()),
+        })?;
+        write(path, bytes)?;
+    }
+    if wanted.pressure {
+        let nodes = drawn.contact.as_ref().map_or(&[][..], |contact| &contact.nodes);
+        let told: Vec<_> = nodes
+            .iter()
+            .map(|node| {
+                serde_json::json!({
+                    "at_mm": node.at_mm.to_array(), "area_mm2": node.area_mm2, "force_n": node.force_n.to_array(),
+                    "pressure_mpa": node.pressure_mpa, "sticks": node.sticks,
+                })
+            })
+            .collect();
+        let text = serde_json::json!({
+            "frame": number,
+            "contact_radius_mm": drawn.contact.as_ref().map(|contact| contact.contact_radius_mm),
+            "peak_pressure_mpa": drawn.contact.as_ref().map(|contact| contact.peak_pressure_mpa),
+            "nodes": told,
+        });
+        write(folder.join(format!("pressure_{number:04}.json")), format!("{text}\n").into_bytes())?;
+    }
+    Ok(())
+}
+
+/// Heights of the undeformed dome on the raster of [`crate::mechanics::contact::ContactState::height_map_mm`].
+fn still_heights_mm(radius_mm: f64, side: usize) -> Vec<f64> {
+    let at = |i: usize| ((2 * i + 1) as f64 / side as f64 - 1.0) * radius_mm;
+    let height =
+        |k: usize| (radius_mm * radius_mm - at(k % side).powi(2) - at(k / side).powi(2)).max(0.0).sqrt();
+    (0..side * side).map(height).collect()
+}
+
+/// A square raster as 32-bit float TIFF.
+fn float_tiff(values: &[f64], side: u32) -> tiff::TiffResult<Vec<u8>> {
+    let mut bytes = io::Cursor::new(Vec::new());
+    let values: Vec<f32> = values.iter().map(|v| *v as f32).collect();
+    let mut encoder = tiff::encoder::TiffEncoder::new(&mut bytes)?;
+    encoder.write_image::<tiff::encoder::colortype::Gray32Float>(side, side, &values)?;
+    Ok(bytes.into_inner())
 }
 
 /// Moves a finished folder to its place; an earlier one makes room, and comes back if the move fails.

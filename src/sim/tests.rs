@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use super::coverage::{Coverage, area_moment, clip};
 use super::outline::RimFit;
 use super::*;
+use crate::design;
 
 fn scene(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes").join(name);
@@ -164,4 +165,94 @@ fn faults_are_named() {
     let keys = r#"[{ "time_s": 1, "force_n": [0,0,-1] }, { "time_s": 1, "force_n": [0,0,-1] }]"#;
     fault(&format!(r#"{frames}, {tolerance}, "motion": {{ "wrench": {keys} }}"#), "motion.wrench[1].time_s");
     fault(&format!(r#"{frames}, {tolerance}, "colour": true"#), "colour");
+    let beyond = r#"[{ "time_s": 0, "force_n": [6,0,0], "point_mm": [0,0,10] }]"#;
+    fault(&format!(r#"{frames}, {tolerance}, "motion": {{ "wrench": {beyond} }}"#), "motion.wrench[0]");
+    let ball = |path: &str| {
+        format!(
+            r#"{frames}, {tolerance}, "objects": [{{ "name": "o", "shape": {{ "kind": "sphere", "radius_mm": 2 }}, "path": [{path}] }}]"#
+        )
+    };
+    assert!(scene_of(&ball(r#"{ "time_s": 0, "position_mm": [0,0,13] }"#)).is_ok());
+    let mesh = |file: &str| {
+        format!(
+            r#"{frames}, {tolerance}, "objects": [{{ "name": "o", "shape": {{ "kind": "mesh", "file": "{file}" }}, "path": [{{ "time_s": 0, "position_mm": [0,0,30] }}] }}]"#
+        )
+    };
+    fault(&mesh("meshes/none.stl"), "objects[0].shape.file");
+    fault(&mesh("still.json"), "objects[0].shape.file");
+    // The nut with one triangle less.
+    let folder = tempfile::tempdir().unwrap();
+    let nut = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes/meshes/nut.stl");
+    let mut bytes = std::fs::read(nut).unwrap();
+    bytes.truncate(bytes.len() - 50);
+    bytes[80..84].copy_from_slice(&383_u32.to_le_bytes());
+    let open = folder.path().join("open.stl");
+    std::fs::write(&open, &bytes).unwrap();
+    fault(&mesh(&open.display().to_string()), "objects[0].shape.file");
+}
+
+#[test]
+fn an_object_in_the_sheet_is_named_with_its_frame() {
+    let scene = scene_of(
+        r#""frames": { "count": 1, "rate_hz": 30 }, "tolerance": { "px": 0.1, "grey": 1 },
+           "contact": { "level": "geometric" },
+           "objects": [{ "name": "o", "shape": { "kind": "sphere", "radius_mm": 3 },
+                         "path": [{ "time_s": 0, "position_mm": [9, 0, 1] }] }]"#,
+    )
+    .unwrap();
+    let plan = Plan::everything(&scene);
+    let drawn = plan.and_then(|plan| Renderer::new(&scene, &plan).and_then(|r| r.frame(0)));
+    match drawn.map(|_| ()) {
+        Err(SimError::Input(error)) => {
+            assert_eq!(error.field, "objects[0].path");
+            assert!(error.problem.contains("frame 0"), "{error}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn bound_coils_are_said_and_the_rest_runs() {
+    // Four coils bind at 20 N, before their wire is over-stressed; those of thumb24 as it is bind after it.
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs");
+    let text = design::read_text(&folder.join("thumb24.json")).unwrap();
+    let mut value = design::parse_json(&text).unwrap();
+    value["springs"]["active_coils"] = serde_json::json!(4);
+    let design = design::from_text(&value.to_string()).unwrap();
+    let file = serde_json::json!({
+        "version": 1, "name": "t", "design": "four-coils.json",
+        "frames": { "count": 4, "rate_hz": 1, "images": false }, "tolerance": { "px": 0.1, "grey": 1 },
+        "motion": { "wrench": [{ "time_s": 0, "force_n": [0, 0, 0] }, { "time_s": 3, "force_n": [0, 0, -45] }] },
+    });
+    let scene = Scene::new(design::from_value(&file).unwrap(), &folder, design).unwrap();
+    let renderer = Renderer::new(&scene, &Plan::everything(&scene).unwrap()).unwrap();
+    let truth: Vec<FrameTruth> = (0..4).map(|k| renderer.frame(k).unwrap().truth).collect();
+    let status: Vec<&str> = truth.iter().map(|t| t.status.as_str()).collect();
+    assert_eq!(status, ["ok", "ok", "coil_bind", "coil_bind"]);
+    assert!(truth[3].note.as_ref().is_some_and(|note| note.contains("spring")));
+    // The world's load is told whole; the platform goes no further.
+    assert_eq!(truth[3].wrench[2], -45.0);
+    assert!((truth[2].pose[2][3] - truth[3].pose[2][3]).abs() < 1e-9 && truth[2].pose[2][3] < -1.0);
+}
+
+#[test]
+fn frames_do_not_depend_on_threads() {
+    let mut scene = scene("push.json");
+    scene.override_run(Some(5), None).unwrap();
+    let plan = Plan::of(&scene).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let made = |threads: usize| {
+        let out = folder.path().join(format!("{threads}"));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| run::run(&scene, &plan, &out, &mut |_| {})).unwrap();
+        let mut files: Vec<_> = std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().path()).collect();
+        files.sort();
+        files
+            .iter()
+            .map(|f| (f.file_name().map(|n| n.to_owned()), std::fs::read(f).unwrap()))
+            .collect::<Vec<_>>()
+    };
+    let (one, three) = (made(1), made(3));
+    assert_eq!(one.len(), 5 + 3);
+    assert!(one == three);
 }

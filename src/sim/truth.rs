@@ -1,9 +1,14 @@
 //! What is true of a frame.
 
+use std::ops::Range;
+
+use glam::DVec2;
 use serde::Serialize;
 
 use super::effect::EffectName;
 use super::plan::Plan;
+use super::scene::Scene;
+use super::spots::{Spot, Spots};
 
 /// A dot in a frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -91,4 +96,96 @@ pub fn effects_of(plan: &Plan) -> Vec<EffectTruth> {
         why: entry.why.clone(),
     };
     plan.entries.iter().map(told).collect()
+}
+
+/// What was seen for a frame.
+pub(super) struct Seen<'a> {
+    /// At the frame's time.
+    pub now: &'a Spots,
+    /// By band of rows, at each of its times; empty where all rows are at the frame's time.
+    pub bands: &'a [(Range<usize>, Vec<Spots>)],
+    /// The reference channel.
+    pub reference: usize,
+}
+
+/// Mean centre, mean centroid and area of an item over the times at which its rows were exposed.
+struct Mean {
+    center_px: DVec2,
+    centroid_px: DVec2,
+    area_px2: f64,
+}
+
+impl Seen<'_> {
+    fn mean<'s>(
+        &'s self,
+        channel: usize,
+        see: &dyn Fn(&'s Spots, usize) -> Option<&'s Spot>,
+    ) -> Option<Mean> {
+        let now = see(self.now, channel)?;
+        // The band that holds the item where the item was when the band was exposed; near a band's edge there may
+        // be none or two, then the one where it is at the frame's time.
+        let row_of = |spot: &Spot| spot.center_px.y + 0.5;
+        let holds =
+            |rows: &Range<usize>, spot: &Spot| (rows.start as f64..rows.end as f64).contains(&row_of(spot));
+        let mut bands = self.bands.iter();
+        let band = bands
+            .find(|(rows, seen)| {
+                let middle = seen.get(seen.len() / 2).and_then(|spots| see(spots, channel));
+                middle.is_some_and(|spot| holds(rows, spot))
+            })
+            .or_else(|| self.bands.iter().find(|(rows, _)| holds(rows, now)));
+        let Some((_, seen)) = band else {
+            return Some(Mean {
+                center_px: now.center_px,
+                centroid_px: now.centroid_px,
+                area_px2: now.area_px2,
+            });
+        };
+        let spots: Vec<&Spot> = seen.iter().filter_map(|spots| see(spots, channel)).collect();
+        let count = spots.len().max(1) as f64;
+        let area: f64 = spots.iter().map(|spot| spot.area_px2).sum();
+        let weighted = spots.iter().map(|spot| spot.centroid_px * spot.area_px2).sum::<DVec2>();
+        Some(Mean {
+            center_px: spots.iter().map(|spot| spot.center_px).sum::<DVec2>() / count,
+            centroid_px: if area > 0.0 { weighted / area } else { now.centroid_px },
+            area_px2: area / count,
+        })
+    }
+}
+
+/// Centre, centroid, centroids by colour and whether it is seen.
+type Told = (Option<[f64; 2]>, Option<[f64; 2]>, Option<[Option<[f64; 2]>; 3]>, bool);
+
+fn told<'s>(seen: &'s Seen<'_>, see: &dyn Fn(&'s Spots, usize) -> Option<&'s Spot>) -> Told {
+    let mean = seen.mean(seen.reference, see);
+    let visible = mean.as_ref().is_some_and(|mean| mean.area_px2 > 0.0);
+    let colours = (seen.now.channels() == 3).then(|| {
+        std::array::from_fn(|channel| {
+            seen.mean(channel, see).filter(|mean| mean.area_px2 > 0.0).map(|mean| mean.centroid_px.to_array())
+        })
+    });
+    let centroid = mean.as_ref().filter(|_| visible).map(|mean| mean.centroid_px.to_array());
+    (mean.map(|mean| mean.center_px.to_array()), centroid, colours, visible)
+}
+
+/// What is true of a dot.
+pub(super) fn dot_truth(scene: &Scene, index: usize, seen: &Seen<'_>) -> DotTruth {
+    let (image_px, centroid_px, centroid_rgb_px, visible) =
+        told(seen, &|spots, channel| spots.dot(index, channel));
+    DotTruth {
+        id: scene.dots().get(index).map_or(0, |dot| dot.id),
+        image_px,
+        centroid_px,
+        centroid_rgb_px,
+        surface_mm: seen.now.surface_mm.get(index).copied().unwrap_or_default().to_array(),
+        visible,
+    }
+}
+
+/// What is true of a white marker.
+pub(super) fn marker_truth(scene: &Scene, index: usize, seen: &Seen<'_>) -> MarkerTruth {
+    let (image_px, centroid_px, centroid_rgb_px, visible) =
+        told(seen, &|spots, channel| spots.marker(index, channel));
+    let id = scene.markers().get(index).map_or(0, |marker| marker.id);
+    MarkerTruth { id, image_px, centroid_px, centroid_rgb_px, visible }
 }

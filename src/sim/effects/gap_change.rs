@@ -3,8 +3,9 @@
 
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
 use crate::sim::geometry_bound::{called_for, shift_px};
-use crate::sim::instant::{Points, units};
+use crate::sim::instant::units;
 use crate::sim::pipeline::Geometry;
+use crate::sim::spots::Points;
 use crate::sim::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -22,6 +23,10 @@ impl Effect for GapChange {
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
+        if !scene.objects().is_empty() {
+            // Points of a dome out of shape have no apparent place at rest.
+            return Ok(Bound::UNBOUNDED);
+        }
         let with = called_for(scene);
         Ok(Bound::px(shift_px(scene, with, Geometry { gap_change: false, ..with })?))
     }

@@ -2,6 +2,7 @@
 
 mod bayer;
 mod compression;
+pub mod contact;
 mod defocus;
 mod diffuser;
 mod direct_light;
@@ -10,6 +11,7 @@ mod dots;
 mod falloff;
 mod fresnel;
 mod gap_change;
+mod ink_edge;
 mod interreflection;
 mod lens_distortion;
 mod motion_blur;
@@ -19,7 +21,7 @@ mod pupil_shift;
 mod refraction;
 mod rolling_shutter;
 mod sheet_motion;
-mod speed;
+pub mod speed;
 #[cfg(test)]
 mod tests;
 mod vignetting;
@@ -35,7 +37,9 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &dispersion::Dispersion,
         &sheet_motion::SheetMotion,
         &gap_change::GapChange,
+        &contact::Contact,
         &dots::Dots,
+        &ink_edge::InkEdge,
         &direct_light::DirectLight,
         &falloff::Falloff,
         &diffuser::Diffuser,

@@ -2,8 +2,9 @@
 
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
 use crate::sim::geometry_bound::{called_for, shift_px};
-use crate::sim::instant::{Points, units};
+use crate::sim::instant::units;
 use crate::sim::pipeline::Geometry;
+use crate::sim::spots::Points;
 use crate::sim::{Pipeline, Scene, SimError};
 
 /// See the module.

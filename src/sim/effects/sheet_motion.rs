@@ -15,7 +15,7 @@ impl Effect for SheetMotion {
     }
 
     fn calls_for(&self, scene: &Scene) -> Option<String> {
-        called_for(scene).sheet_motion.then(|| "a load or a pose moves the platform".into())
+        called_for(scene).sheet_motion.then(|| "a load, a pose or an object moves the platform".into())
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {

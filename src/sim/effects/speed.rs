@@ -17,7 +17,7 @@ const DRAGGED: f64 = 2.0;
 const NEARER: f64 = 1.6;
 
 /// A bound on the speed of any dot or marker in the image, px/s; `None` where nothing moves.
-pub(super) fn fastest_px_per_s(scene: &Scene) -> Option<f64> {
+pub fn fastest_px_per_s(scene: &Scene) -> Option<f64> {
     let speed = platform_mm_per_s(scene).max(objects_mm_per_s(scene));
     (speed > 0.0).then(|| speed * largest_px_per_mm(scene))
 }
@@ -80,6 +80,12 @@ fn objects_mm_per_s(scene: &Scene) -> f64 {
             let turned = (turn_to - turn_from).length().to_radians();
             let way_mm = (to - from).length() + turned * lever_mm;
             fastest = fastest.max(way_mm / (pair[1].time_s - pair[0].time_s));
+        }
+        for pair in object.press.iter().flat_map(|press| press.force.windows(2)) {
+            // Neither springs nor dome give way by more than the dome's diameter together, whatever the force.
+            if pair[0].force_n != pair[1].force_n {
+                fastest = fastest.max(reach_mm / (pair[1].time_s - pair[0].time_s));
+            }
         }
     }
     DRAGGED * fastest

@@ -456,8 +456,7 @@ fn the_sensor_is_lit_from_three_sides() {
     };
     let moved_scene = self::scene(
         r#", "objects": [ { "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 },
-             "path": [ { "time_s": 0, "position_mm": [0, 0, 40] } ] } ],
-             "elastomer": { "young_mpa": 0.2, "poisson": 0.49 }"#,
+             "path": [ { "time_s": 0, "position_mm": [0, 0, 40] } ] } ]"#,
     );
     let dome = LitDome::new(&moved_scene, &ALL, &mut work).unwrap().unwrap();
     let brightest = 450.0 * 0.55 / 2.0 * dome.field().brightest()[1];
@@ -509,8 +508,7 @@ fn largest_change(a: &LitDome, b: &LitDome, deformed: bool) -> f64 {
 #[test]
 fn no_effect_of_light_passes_its_bound() {
     let object = r#", "objects": [ { "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 },
-             "path": [ { "time_s": 0, "position_mm": [0, 0, 40] } ] } ],
-             "elastomer": { "young_mpa": 0.2, "poisson": 0.49 }"#;
+             "path": [ { "time_s": 0, "position_mm": [0, 0, 40] } ] } ]"#;
     for more in ["", object] {
         let scene = scene(more);
         let bound = bounds::LightBounds::of(&scene).unwrap();

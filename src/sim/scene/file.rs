@@ -39,13 +39,13 @@ pub struct SceneFile {
     /// What moves the platform besides objects; left out: nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionSection>,
-    /// What touches the dome.
+    /// What touches the dome: nothing, or one object.
     #[serde(default)]
-    #[schemars(length(max = 16))]
+    #[schemars(length(max = 1))]
     pub objects: Vec<ObjectSection>,
-    /// The dome's elastomer; needed where objects touch it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub elastomer: Option<ElasticSection>,
+    /// How contact is worked out.
+    #[serde(default)]
+    pub contact: ContactSection,
     /// How bright things are; left out: evenly lit.
     #[serde(default)]
     pub light: LightSection,
@@ -158,19 +158,47 @@ pub struct PoseKey {
     pub rotation_deg: [f64; 3],
 }
 
-/// How the elastomer gives way.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ElasticSection {
-    /// Young's modulus, MPa.
-    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1e6))]
-    pub young_mpa: f64,
-    /// Poisson's ratio.
-    #[schemars(range(min = 0.0, max = 0.499))]
-    pub poisson: f64,
-    /// Reasons and sources, by field.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub why: Option<Why>,
+/// How contact is worked out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ContactSection {
+    /// The level that counts as exact for this scene; the plan takes none above it.
+    pub level: LevelName,
+    /// Length of a finite element on the dome, mm; for the levels that have elements.
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 100.0))]
+    pub element_mm: f64,
+}
+
+impl Default for ContactSection {
+    fn default() -> Self {
+        Self { level: LevelName::Linear, element_mm: 1.0 }
+    }
+}
+
+impl LevelName {
+    /// The name that files carry.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Geometric => "geometric",
+            Self::ClosedForm => "closed_form",
+            Self::Linear => "linear",
+            Self::NeoHookean => "neo_hookean",
+        }
+    }
+}
+
+/// How closely contact is modelled, from coarse to fine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LevelName {
+    /// The membrane is pushed out of the object.
+    Geometric,
+    /// Hertz and kin.
+    ClosedForm,
+    /// Linear finite elements.
+    Linear,
+    /// Neo-Hookean finite elements.
+    NeoHookean,
 }
 
 /// The printed dots as they came out.
@@ -212,8 +240,9 @@ pub struct BrokenDot {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OutputSection {
-    /// The membrane's shape for each frame.
+    /// The membrane's shape for each frame: `heights_NNNN.tif`, 200 x 200 samples (32-bit float, mm) over the base's
+    /// square, row by row from -y, each the height of the dome's point above it after it has moved.
     pub heights: bool,
-    /// The contact pressure for each frame.
+    /// The contact pressure for each frame: `pressure_NNNN.json`, by node of the dome's surface.
     pub pressure: bool,
 }

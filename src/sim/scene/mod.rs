@@ -4,6 +4,7 @@ pub mod electronics;
 pub mod file;
 pub mod light;
 mod motion;
+pub mod object;
 pub mod objects;
 mod resolve;
 
@@ -19,6 +20,7 @@ use crate::pose::Marker;
 
 pub use file::SceneFile;
 pub use motion::{Held, Motion, State};
+use object::SceneObject;
 
 use super::SimError;
 use super::effect::{EffectChoice, EffectName};
@@ -50,6 +52,7 @@ pub struct Scene {
     dots: Vec<SceneDot>,
     markers: Vec<Marker>,
     motion: Motion,
+    objects: Vec<SceneObject>,
 }
 
 impl Scene {
@@ -142,6 +145,20 @@ impl Scene {
     /// Pose and load of the platform over time.
     pub fn motion(&self) -> &Motion {
         &self.motion
+    }
+
+    /// Pose and load of the platform at a frame's time, without objects.
+    ///
+    /// # Errors
+    /// A load without balance, named with the frame.
+    pub fn state_at(&self, frame: u32, time_s: f64) -> Result<State, SimError> {
+        let state = self.motion.at(&self.suspension, time_s);
+        state.map_err(|error| SimError::Frame { frame, problem: error.to_string() })
+    }
+
+    /// The objects that may touch the dome.
+    pub fn objects(&self) -> &[SceneObject] {
+        &self.objects
     }
 
     /// Number of frames.

@@ -3,7 +3,9 @@
 use glam::DVec3;
 
 use super::file::{MotionSection, PoseKey, WrenchKey};
-use crate::mechanics::{Displacement, Limits, MechanicsError, Suspension, Wrench, limits_of, try_load};
+use crate::mechanics::{
+    Check, Displacement, Limit, Limits, MechanicsError, Suspension, Wrench, limits_of, try_load,
+};
 use crate::numeric::Rigid;
 
 /// Pose and load of the platform at one time.
@@ -44,6 +46,8 @@ enum Course {
 
 /// Bisections of the load down to the part that is just carried: 2^-40 of it.
 const HALVINGS: u32 = 40;
+/// Part of the travel from which a platform that goes no further is held by its coils, not by the end of the law.
+const NEARLY_BOUND: f64 = 1.0 - 1e-6;
 
 impl Motion {
     /// The motion of a scene; keys are in order of time.
@@ -110,33 +114,62 @@ impl Motion {
 
     /// The balance of a load; where coils bind, the pose at which they just do.
     fn balance(&self, suspension: &Suspension, wrench: &Wrench) -> Result<State, MechanicsError> {
-        let case = try_load(suspension, &self.limits, wrench);
-        let pose = case.equilibrium.as_ref().map_err(Clone::clone)?.pose;
-        let binds = |case: &crate::mechanics::LoadCase| {
-            case.passed().find(|check| check.limit == crate::mechanics::Limit::CoilBind).cloned()
-        };
-        let Some(check) = binds(&case) else { return Ok(State { pose, wrench: *wrench, held: None }) };
+        // Far beyond the bound the law may have no balance at all: then the part of the load tells which limit is first.
+        let whole = suspension.equilibrium(wrench);
+        if let Ok(balance) = &whole
+            && bound_spring(suspension, &balance.pose).is_none()
+        {
+            return Ok(State { pose: balance.pose, wrench: *wrench, held: None });
+        }
         let (mut low, mut high) = (0.0, 1.0);
         let mut pose = Rigid::identity();
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
-            let part = try_load(suspension, &self.limits, &wrench.scaled(middle));
-            match (&part.equilibrium, binds(&part)) {
-                (Ok(balance), None) => {
+            match suspension.equilibrium(&wrench.scaled(middle)) {
+                Ok(balance) if bound_spring(suspension, &balance.pose).is_none() => {
                     low = middle;
                     pose = balance.pose;
                 }
                 _ => high = middle,
             }
         }
-        let held = Held { limit: check.limit.as_str(), part: check.part, carried: low };
+        let Some(spring) = bound_spring_within(suspension, &pose, NEARLY_BOUND) else {
+            whole?;
+            return Ok(State { pose, wrench: *wrench, held: None });
+        };
+        let held = Held { limit: Limit::CoilBind.as_str(), part: format!("spring {spring}"), carried: low };
         Ok(State { pose, wrench: *wrench, held: Some(held) })
+    }
+
+    /// The limit other than bound coils that the load at a time passes, if it does.
+    pub(super) fn passed_at(&self, suspension: &Suspension, time_s: f64) -> Option<Check> {
+        let (wrench, _) = self.load_at(time_s);
+        let state = self.balance(suspension, &wrench).ok();
+        // Where coils bind, the platform goes no further: the limits are those of that pose.
+        let carried = state.and_then(|state| state.held).map_or(1.0, |held| held.carried);
+        let case = try_load(suspension, &self.limits, &wrench.scaled(carried));
+        case.passed().find(|check| check.limit != Limit::CoilBind).cloned()
     }
 
     /// The limits of a load.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
+}
+
+/// The spring whose coils lie deepest on each other, by number; `None` where none do.
+fn bound_spring(suspension: &Suspension, pose: &Rigid) -> Option<usize> {
+    // Rounding beyond the bound is not binding; the same slack as the envelope's.
+    bound_spring_within(suspension, pose, 1.0 + 1e-12)
+}
+
+/// The same for a part of the springs' travel.
+fn bound_spring_within(suspension: &Suspension, pose: &Rigid, part: f64) -> Option<usize> {
+    let spec = suspension.spec();
+    let room_mm = spec.spring.solid_compression_mm() - suspension.rest_compression_mm();
+    let pressed = spec.upper_ends_mm.iter().map(|end| end.z - pose.point(*end).z).enumerate();
+    let (number, pressed_mm) = pressed.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (pressed_mm > room_mm * part).then_some(number)
 }
 
 fn wrench_key(key: &WrenchKey, at_mm: DVec3) -> (f64, Wrench) {

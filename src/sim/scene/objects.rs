@@ -21,13 +21,12 @@ pub struct ObjectSection {
     #[serde(default = "poisson")]
     #[schemars(range(min = 0.0, max = 0.499))]
     pub poisson: f64,
-    /// Coulomb's coefficient between object and membrane.
-    #[serde(default)]
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub friction: f64,
     /// Its poses over time, in the rest frame.
     #[schemars(length(min = 1, max = 100000))]
     pub path: Vec<ObjectKey>,
+    /// Forces over time with which it is pressed on, along a way from its pose; left out: its pose is held.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub press: Option<PressSection>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
@@ -48,6 +47,29 @@ pub struct ObjectKey {
     /// Rotation vector from its frame to the rest frame, degrees.
     #[serde(default)]
     pub rotation_deg: [f64; 3],
+}
+
+/// An object that moves along a way until the dome bears a force.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PressSection {
+    /// The way, rest frame; any length.
+    pub direction: [f64; 3],
+    /// The force along it over time, N: linear in between, constant before and after; at 0 the object does not
+    /// touch.
+    #[schemars(length(min = 1, max = 100000))]
+    pub force: Vec<ForceKey>,
+}
+
+/// A force at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ForceKey {
+    /// When, s.
+    pub time_s: f64,
+    /// How strong, N.
+    #[schemars(range(min = 0.0, max = 1e4))]
+    pub force_n: f64,
 }
 
 /// A shape around the origin of its own frame.

@@ -6,10 +6,11 @@ use glam::DVec3;
 
 use super::file::{MotionSection, SceneFile};
 use super::motion::Motion;
+use super::object::SceneObject;
 use super::{RIM_POINTS, Scene, SceneDot};
 use crate::design::{self, Design, DesignError};
 use crate::layout::{Dot, Layout};
-use crate::mechanics::suspension_of;
+use crate::mechanics::{Suspension, suspension_of};
 use crate::optics::SensorOptics;
 use crate::pose::Marker;
 use crate::sim::SimError;
@@ -48,7 +49,22 @@ pub(super) fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<
     let diameter_mm = design.sections().white_markers.diameter_mm;
     let numbered = (0..).zip(design.white_markers_mm());
     let markers = numbered.map(|(id, position_mm)| Marker { id, position_mm, diameter_mm }).collect();
-    Ok(Scene { file, folder: folder.to_path_buf(), design, layout, suspension, dots, markers, motion })
+    let object = |(index, section): (usize, &super::objects::ObjectSection)| {
+        SceneObject::new(section, &format!("objects[{index}]"), folder)
+    };
+    let objects = file.objects.iter().enumerate().map(object).collect::<Result<Vec<_>, _>>()?;
+    check_loads(&motion, &suspension, &file)?;
+    Ok(Scene {
+        file,
+        folder: folder.to_path_buf(),
+        design,
+        layout,
+        suspension,
+        dots,
+        markers,
+        motion,
+        objects,
+    })
 }
 
 /// A dot as printed: its outline carried from the image at rest to the dome.
@@ -94,6 +110,39 @@ fn check(file: &SceneFile) -> Result<(), DesignError> {
     }
     for (index, object) in file.objects.iter().enumerate() {
         check_times(&format!("objects[{index}].path"), object.path.iter().map(|key| key.time_s))?;
+        if let Some(press) = &object.press {
+            check_times(&format!("objects[{index}].press.force"), press.force.iter().map(|key| key.time_s))?;
+        }
+        if file.motion.is_some() {
+            return Err(DesignError::at(
+                "motion",
+                "",
+                "an object moves the platform by itself",
+                "no `motion` beside objects: what they press is what the springs carry",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Every load of the scene has a place inside the envelope; coils that bind are a matter of the frame.
+fn check_loads(motion: &Motion, suspension: &Suspension, file: &SceneFile) -> Result<(), DesignError> {
+    let Some(MotionSection::Wrench(keys)) = &file.motion else { return Ok(()) };
+    for (index, key) in keys.wrench.iter().enumerate() {
+        if let Some(passed) = motion.passed_at(suspension, key.time_s) {
+            let [value, bound] = [passed.value, passed.bound];
+            return Err(DesignError::at(
+                format!("motion.wrench[{index}]"),
+                serde_json::json!(key),
+                format!(
+                    "the load is beyond the envelope: {} at {}, {value:.3} {}",
+                    passed.limit.as_str(),
+                    passed.part,
+                    passed.unit
+                ),
+                format!("at most {bound:.3} {}", passed.unit),
+            ));
+        }
     }
     Ok(())
 }

@@ -1,0 +1,243 @@
+//! How fast the simulator is on one core: frames a second, the cost of each effect, and how time grows with the size
+//! of the task. Prints tables; `cargo bench --bench sim`.
+
+use std::path::Path;
+use std::sync::LazyLock;
+use std::time::Instant;
+
+use domecast::design::{self, Design};
+use domecast::sim::scene::SceneFile;
+use domecast::sim::{Around, EffectName, Plan, Renderer, Scene, Scratch};
+use serde_json::{Value, json};
+
+/// Repetitions of what takes microseconds.
+const AGAIN: u32 = 200;
+
+/// Each figure is the median of so many rounds.
+const ROUNDS: usize = 7;
+
+fn design_with(change: impl Fn(&mut Value)) -> Option<Design> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
+    let mut value = design::parse_json(&design::read_text(&path).ok()?).ok()?;
+    change(&mut value);
+    match design::from_text(&value.to_string()) {
+        Ok(design) => Some(design),
+        Err(error) => {
+            println!("design: {error}");
+            None
+        }
+    }
+}
+
+fn scene_of(design: &Design, value: &Value) -> Option<Scene> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes");
+    let file: Result<SceneFile, _> = design::from_value(value);
+    let scene = file
+        .map_err(|e| e.to_string())
+        .and_then(|file| Scene::new(file, &folder, design.clone()).map_err(|e| e.to_string()));
+    scene.map_err(|error| println!("scene: {error}")).ok()
+}
+
+/// A sideways push under a press; 20 frames.
+fn push(images: bool, colour: bool) -> Value {
+    json!({
+        "version": 1, "name": "bench", "design": "",
+        "frames": { "count": 20, "rate_hz": 30, "images": images, "colour": colour },
+        "tolerance": { "px": 1e-9, "grey": 1e-9 },
+        "motion": { "wrench": [
+            { "time_s": 0, "force_n": [0, 0, 0], "point_mm": [0, 0, 10] },
+            { "time_s": 0.7, "force_n": [0.5, 0.2, -4], "point_mm": [0, 0, 10] },
+        ]},
+    })
+}
+
+fn lit() -> Value {
+    json!({ "surround_level": 0.02, "leds": { "level_per_mw_mm2": 450, "stray_level": 0.005, "crosstalk": 0.08 } })
+}
+
+/// A ball pressed into the dome and rolled, under the design's lights.
+fn ball(level: &str, element_mm: f64) -> Value {
+    json!({
+        "version": 1, "name": "bench", "design": "",
+        "frames": { "count": 8, "rate_hz": 30, "colour": true },
+        "tolerance": { "px": 1e-9, "grey": 1e-9 },
+        "contact": { "level": level, "element_mm": element_mm },
+        "objects": [{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": 5 }, "path": [
+            { "time_s": 0, "position_mm": [0, 0, 14.6] },
+            { "time_s": 0.25, "position_mm": [0.6, 0, 14.0], "rotation_deg": [0, 7, 0] },
+        ]}],
+        "light": lit(),
+        "effects": { "dispersion": "never" },
+    })
+}
+
+static BEGAN: LazyLock<Instant> = LazyLock::new(Instant::now);
+
+/// Seconds that this program has spent computing, where the system tells it; else seconds gone by. Others may load the
+/// machine while it is measured.
+fn clock_s() -> f64 {
+    let told = std::fs::read_to_string("/proc/self/schedstat").ok();
+    let spent_ns = told.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+    spent_ns.map_or_else(|| BEGAN.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Seconds for a frame: solving the contact, and drawing.
+fn frame_s(scene: &Scene, rounds: usize) -> Option<[f64; 2]> {
+    let plan = Plan::everything(scene).map_err(|error| println!("plan: {error}")).ok()?;
+    let renderer = Renderer::new(scene, &plan).map_err(|error| println!("renderer: {error}")).ok()?;
+    let mut scratch = Scratch::default();
+    let count = scene.frame_count();
+    let mut touches = Vec::new();
+    if let Ok(Some(mut stepper)) = renderer.stepper() {
+        // The tables are made once for a design.
+        let began = clock_s();
+        for k in 0..count {
+            match stepper.next(k, scene.time_s(k), &mut Default::default()) {
+                Ok(touch) => touches.push(touch),
+                Err(error) => println!("contact: {error}"),
+            }
+        }
+        let solving = (clock_s() - began) / f64::from(count);
+        return Some([
+            solving,
+            median((0..rounds).map(|_| drawing_s(&renderer, &touches, count, &mut scratch)).collect()),
+        ]);
+    }
+    Some([0.0, median((0..rounds).map(|_| drawing_s(&renderer, &[], count, &mut scratch)).collect())])
+}
+
+fn drawing_s(
+    renderer: &Renderer<'_>,
+    touches: &[domecast::sim::Touch],
+    count: u32,
+    scratch: &mut Scratch,
+) -> f64 {
+    let began = clock_s();
+    for k in 0..count {
+        let around = Around::of(touches, k as usize);
+        if let Err(error) = renderer.frame_around(k, around.as_ref(), scratch) {
+            println!("frame {k}: {error}");
+        }
+    }
+    (clock_s() - began) / f64::from(count)
+}
+
+fn line(what: &str, seconds: [f64; 2]) {
+    let whole = seconds[0] + seconds[1];
+    println!(
+        "{what:<56} {:>9.1} frames/s  ({:.3} ms contact, {:.3} ms picture)",
+        1.0 / whole,
+        1e3 * seconds[0],
+        1e3 * seconds[1]
+    );
+}
+
+fn main() {
+    let Some(design) = design_with(|_| {}) else { return };
+    if let Some(scene) = scene_of(&design, &push(false, false)) {
+        println!("== frames a second, one core, 640 x 480, {} dots", scene.dots().len());
+        let plan = Plan::everything(&scene).and_then(|plan| Ok((Renderer::new(&scene, &plan)?, plan)));
+        if let Ok((renderer, _)) = plan {
+            let round = |_| {
+                let began = clock_s();
+                // The system counts in some milliseconds.
+                for k in 0..AGAIN * scene.frame_count() {
+                    std::hint::black_box(renderer.centers(k % scene.frame_count(), None).ok());
+                }
+                (clock_s() - began) / f64::from(AGAIN * scene.frame_count())
+            };
+            line("positions of dots and markers, no image", [0.0, median((0..ROUNDS).map(round).collect())]);
+        }
+    }
+    for (what, value) in [
+        ("truth with centroids, no image", push(false, false)),
+        ("dots, lens, refraction: grey picture", push(true, false)),
+        ("dots, lens, refraction, dispersion: colour picture", push(true, true)),
+        ("direct light, geometric contact", ball("geometric", 1.0)),
+        ("direct light, closed-form contact", ball("closed_form", 1.0)),
+        ("direct light, linear finite elements", ball("linear", 1.0)),
+    ] {
+        if let Some(seconds) = scene_of(&design, &value).and_then(|scene| frame_s(&scene, ROUNDS)) {
+            line(what, seconds);
+        }
+    }
+
+    println!("\n== cost of each effect: a frame with everything, less a frame without it");
+    let mut whole = ball("geometric", 1.0);
+    whole["effects"] = json!({});
+    whole["frames"]["count"] = json!(3);
+    whole["ink"] = json!({ "edge_mm": 0.05 });
+    whole["electronics"] = json!({
+        "vignetting_exponent": 1.5, "focus": { "pupil_diameter_mm": 0.2, "distance_mm": 15.5 },
+        "shutter": { "exposure_s": 0.005, "readout_s": 0.01 }, "bayer": "rggb",
+        "noise": { "full_scale_electrons": 4000, "read_electrons": 4 }, "jpeg_quality": 90,
+    });
+    let all =
+        scene_of(&design, &whole).and_then(|scene| frame_s(&scene, 2)).map_or(f64::NAN, |s| s[0] + s[1]);
+    println!("{:<20} {:>9.3} ms", "everything", 1e3 * all);
+    for effect in EffectName::ALL {
+        let mut value = whole.clone();
+        value["effects"][effect.as_str()] = json!("never");
+        if let Some(seconds) = scene_of(&design, &value).and_then(|scene| frame_s(&scene, 2)) {
+            println!("{:<20} {:>9.3} ms", effect.as_str(), 1e3 * (all - seconds[0] - seconds[1]));
+        }
+    }
+
+    println!("\n== slopes");
+    for share in [0.5, 1.0, 2.0] {
+        let grown = design_with(|value| {
+            let camera = &mut value["camera"];
+            camera["width"] = json!((640.0 * share) as u32);
+            camera["height"] = json!((480.0 * share) as u32);
+            let middle = |n: f64| (n * share - 1.0) / 2.0;
+            let f = 229.18 * share;
+            camera["matrix"] = json!([[f, 0, middle(640.0)], [0, f, middle(480.0)], [0, 0, 1]]);
+            value["runtime"]["mask_radius_px"] = json!(240.0 * share);
+            value["pattern"]["pitch_px"] = json!(18.0 * share);
+            value["pattern"]["dot_diameter_px"] = json!(7.0 * share);
+        });
+        let Some(grown) = grown else { continue };
+        for (what, value) in [("dots", push(true, true)), ("lit, contact", ball("geometric", 1.0))] {
+            if let Some(seconds) = scene_of(&grown, &value).and_then(|scene| frame_s(&scene, ROUNDS)) {
+                line(&format!("{} x {} px, {what}", 640.0 * share, 480.0 * share), seconds);
+            }
+        }
+    }
+    for pitch in [26.0, 18.0, 13.0] {
+        let Some(grown) = design_with(|value| value["pattern"]["pitch_px"] = json!(pitch)) else { continue };
+        if let Some(scene) = scene_of(&grown, &push(true, true)) {
+            if let Some(seconds) = frame_s(&scene, ROUNDS) {
+                line(&format!("{} dots", scene.dots().len()), seconds);
+            }
+        }
+    }
+    for count in [1_usize, 2, 3] {
+        let Some(grown) = design_with(|value| {
+            if let Some(list) = value["leds"]["list"].as_array_mut() {
+                list.truncate(count);
+            }
+        }) else {
+            continue;
+        };
+        if let Some(scene) = scene_of(&grown, &ball("geometric", 1.0)) {
+            let began = clock_s();
+            let made = Plan::everything(&scene).and_then(|plan| Renderer::new(&scene, &plan).map(|_| ()));
+            let setup = clock_s() - began;
+            if let (Ok(()), Some(seconds)) = (made, frame_s(&scene, ROUNDS)) {
+                line(&format!("{count} lights (tables {setup:.2} s once)"), seconds);
+            }
+        }
+    }
+    for element_mm in [2.0, 1.0, 0.5] {
+        if let Some(seconds) =
+            scene_of(&design, &ball("linear", element_mm)).and_then(|scene| frame_s(&scene, ROUNDS))
+        {
+            line(&format!("elements of {element_mm} mm"), seconds);
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Objects dent the dome, and press the platform on its springs.
+
+use crate::mechanics::contact::{Elastomer, Level, estimate};
+use crate::sim::effect::{Bound, Cost, Effect, EffectName};
+use crate::sim::scene::file::LevelName;
+use crate::sim::scene::object::Hold;
+use crate::sim::spots::Points;
+use crate::sim::{Pipeline, Scene, SimError};
+
+/// See the module.
+pub struct Contact;
+
+/// Times at which an object's way is looked at.
+const LOOKS: u32 = 257;
+
+/// Contact solves that a balance with the springs takes, as a rule.
+const SOLVES: f64 = 12.0;
+/// Largest motion in the image for a millimetre of the dome's surface, px over focal lengths and nearest distances.
+const NEARER: f64 = 1.6;
+/// Directions of the dome at which its depth in an object is looked at.
+const DEPTH_LOOKS: u32 = 2000;
+
+/// A level with the scene's element length.
+pub fn level_named(scene: &Scene, name: LevelName) -> Level {
+    let element_mm = scene.file().contact.element_mm;
+    match name {
+        LevelName::Geometric => Level::Geometric,
+        LevelName::ClosedForm => Level::ClosedForm,
+        LevelName::Linear => Level::Linear { element_mm },
+        LevelName::NeoHookean => Level::NeoHookean { element_mm },
+    }
+}
+
+/// The level that the scene takes for exact.
+pub fn level_of(scene: &Scene) -> Level {
+    level_named(scene, scene.file().contact.level)
+}
+
+/// Predicted work of a level for a frame.
+fn per_frame(scene: &Scene, name: LevelName) -> u64 {
+    let elastomer = Elastomer::of_design(scene.design());
+    let depth_mm = 0.1 * elastomer.dome_radius_mm;
+    let work = scene.objects().first().map_or(0.0, |object| {
+        estimate(level_named(scene, name), &elastomer, &object.indenter, depth_mm).work
+    });
+    (SOLVES * work) as u64
+}
+
+/// A coarser level than the scene's that the plan may take: its name, how far its pictures of dots may be from those
+/// of the scene's level, px, and the work that it saves in a frame. Cheapest first; none where an object is
+/// pressed on by a force, for its depth is not known before it is solved.
+pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
+    let best = scene.file().contact.level;
+    let Some(depth_mm) = deepest_mm(scene) else { return Vec::new() };
+    let Some(object) = scene.objects().first() else { return Vec::new() };
+    let elastomer = Elastomer::of_design(scene.design());
+    let error_mm = |name| {
+        let found = estimate(level_named(scene, name), &elastomer, &object.indenter, depth_mm);
+        found.applies.then_some(found.displacement_mm)
+    };
+    let Some(own_mm) = error_mm(best) else { return Vec::new() };
+    let px_per_mm = largest_px_per_mm(scene);
+    let own_work = per_frame(scene, best);
+    [LevelName::Geometric, LevelName::ClosedForm, LevelName::Linear]
+        .into_iter()
+        .filter(|name| *name < best)
+        .filter_map(|name| {
+            // Both are within their bounds of the reference.
+            let px = (error_mm(name)? + own_mm) * px_per_mm;
+            Some((name, px, own_work.saturating_sub(per_frame(scene, name))))
+        })
+        .filter(|(_, _, saved)| *saved > 0)
+        .collect()
+}
+
+fn largest_px_per_mm(scene: &Scene) -> f64 {
+    let seen = scene.dots().iter().filter_map(|dot| scene.optics().project_with_jacobian(dot.center_mm).ok());
+    NEARER * seen.map(|(_, by_point)| by_point.norm()).fold(0.0, f64::max)
+}
+
+/// A bound on how deep the undeformed dome at rest lies in an object that is held, over the frames; `None` where
+/// the object is pressed on instead.
+fn deepest_mm(scene: &Scene) -> Option<f64> {
+    let object = scene.objects().first()?;
+    let radius_mm = scene.optics().dome_radius_mm();
+    // No point of the dome is further from a direction looked at than this.
+    let spacing_mm = 2.5 * radius_mm / f64::from(DEPTH_LOOKS).sqrt();
+    let frames = scene.frame_count().min(LOOKS);
+    let mut deepest: f64 = 0.0;
+    for k in 0..frames {
+        let frame = if frames > 1 { k * (scene.frame_count() - 1) / (frames - 1) } else { 0 };
+        match object.hold_at(scene.time_s(frame)) {
+            Hold::Pressed(..) => return None,
+            Hold::Away(_) => {}
+            Hold::At(pose) => {
+                let object_from_rest = pose.inverse();
+                for i in 0..DEPTH_LOOKS {
+                    let height = (f64::from(i) + 0.5) / f64::from(DEPTH_LOOKS);
+                    // The golden angle spreads them evenly.
+                    let turn = f64::from(i) * 2.399_963_229_728_653;
+                    let flat = (1.0 - height * height).max(0.0).sqrt();
+                    let at = glam::DVec3::new(flat * turn.cos(), flat * turn.sin(), height) * radius_mm;
+                    let distance = object.indenter.solid.distance(object_from_rest.point(at));
+                    deepest = deepest.max(spacing_mm - distance.value_mm);
+                }
+            }
+        }
+    }
+    Some(deepest)
+}
+
+impl Effect for Contact {
+    fn name(&self) -> EffectName {
+        EffectName::Contact
+    }
+
+    fn calls_for(&self, scene: &Scene) -> Option<String> {
+        let radius_mm = scene.optics().dome_radius_mm();
+        let end_s = scene.time_s(scene.frame_count().saturating_sub(1));
+        let touches = |object: &&crate::sim::scene::object::SceneObject| {
+            (0..LOOKS).any(|k| object.may_touch(end_s * f64::from(k) / f64::from(LOOKS - 1), radius_mm))
+        };
+        let object = scene.objects().iter().find(touches)?;
+        Some(format!("{} may touch the dome; {} level", object.name, level_of(scene).name()))
+    }
+
+    fn bound(&self, _scene: &Scene) -> Result<Bound, SimError> {
+        // What a touched dome shows without the touch has no bound worth a tolerance.
+        Ok(Bound::UNBOUNDED)
+    }
+
+    fn cost(&self, scene: &Scene) -> Cost {
+        let name = scene.file().contact.level;
+        let elastomer = Elastomer::of_design(scene.design());
+        let once = scene
+            .objects()
+            .first()
+            .map_or(0.0, |object| estimate(level_of(scene), &elastomer, &object.indenter, 0.0).setup_work);
+        Cost { once: once as u64, per_frame: per_frame(scene, name) + Points::count(scene) * 100 }
+    }
+
+    fn apply(&self, scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
+        pipeline.contact = Some(level_of(scene));
+        Ok(())
+    }
+}

@@ -1,0 +1,61 @@
+//! The ink fades out at a dot's edge: evenly, over a width about the outline, as six nested outlines of a sixth of the
+//! ink each.
+
+use crate::sim::effect::{Bound, Cost, Effect, EffectName};
+use crate::sim::instant::units;
+use crate::sim::{Pipeline, Scene, SimError};
+
+/// See the module.
+pub struct InkEdge;
+
+/// Outlines more than the sharp edge has.
+const MORE_RINGS: u64 = 5;
+/// Corners of an outline, predicted.
+const CORNERS: u64 = 50;
+/// The image of a dot may be this much wider than at rest.
+const WIDER: f64 = 1.5;
+
+impl Effect for InkEdge {
+    fn name(&self) -> EffectName {
+        EffectName::InkEdge
+    }
+
+    fn calls_for(&self, scene: &Scene) -> Option<String> {
+        let edge_mm = scene.file().ink.edge_mm;
+        let called = scene.draws() && edge_mm > 0.0 && !scene.dots().is_empty();
+        called.then(|| format!("the ink fades out over {edge_mm} mm"))
+    }
+
+    fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
+        let ink = &scene.file().ink;
+        let light = &scene.file().light;
+        let edge = |dot: &crate::layout::Dot| {
+            let share = ink.edge_mm / dot.diameter_mm;
+            let radius_px = WIDER * 0.5 * dot.image_outline.widths().1;
+            // Half of the ramp's width, px, and what the nested outlines' unlike areas do to the centroid: its
+            // distance from the centre, at most a tenth of the radius, times the square of the share.
+            (share * radius_px, 0.1 * radius_px * share * share)
+        };
+        let edges = scene.layout().dots.iter().map(edge);
+        let (width_px, shift_px) = edges.fold((0.0_f64, 0.0_f64), |(w, s), (a, b)| (w.max(a), s.max(b)));
+        // A ramp of half width w about an edge changes what a pixel is covered by at most w / 2 on one side of it
+        // (a triangle of height 1/2 and base w), over a length of sqrt(2); never by more than half.
+        let covered = (0.5 * std::f64::consts::SQRT_2 * width_px).min(0.5);
+        let brightest = light.brightest_level();
+        let slope = scene.file().electronics.steepest_code(light.membrane_level * ink.reflectance);
+        Ok(Bound { px: shift_px, grey: 255.0 * slope * covered * brightest * (1.0 - ink.reflectance) })
+    }
+
+    fn cost(&self, scene: &Scene) -> Cost {
+        Cost { once: 0, per_frame: scene.dots().len() as u64 * MORE_RINGS * CORNERS * units::CORNER }
+    }
+
+    fn needs(&self) -> &'static [EffectName] {
+        &[EffectName::Dots]
+    }
+
+    fn apply(&self, _scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
+        pipeline.ink.soft_edge = true;
+        Ok(())
+    }
+}

@@ -1,0 +1,130 @@
+//! What of the sensor lies where in the picture: the lens's field, the dome's rim, a cap of the dome.
+
+use std::ops::Range;
+
+use glam::{DVec2, DVec3};
+
+use super::lit::PixelBox;
+use crate::camera::Lens;
+use crate::optics::SensorOptics;
+
+/// Points at which the dome's rim is projected; a circle of 200 px is then met within 0.06 px, and its
+/// polygon is refined by [`RIM_BETWEEN`].
+const RIM_AZIMUTHS: usize = 64;
+
+/// Corners between two of them, on a cubic through the neighbours.
+const RIM_BETWEEN: usize = 6;
+
+/// The columns of each row that the lens shows: outside there is no light.
+#[derive(Debug, Clone)]
+pub struct LensField {
+    rows: Vec<Range<usize>>,
+}
+
+impl LensField {
+    /// From the lens; the field is taken to be one piece in each row.
+    pub fn new(lens: &Lens, width: usize, height: usize) -> Self {
+        let sees = |x: usize, y: usize| lens.unproject(DVec2::new(x as f64, y as f64)).is_ok();
+        let [[_, _, cx], _, _] = lens.spec().matrix;
+        let middle = (cx.round().max(0.0) as usize).min(width.saturating_sub(1));
+        let row = |y: usize| {
+            if !sees(middle, y) {
+                return 0..0;
+            }
+            // Nearest to the edge that is still seen, on each side.
+            let edge = |mut inside: usize, mut outside: usize| {
+                if sees(outside, y) {
+                    return outside;
+                }
+                while inside.abs_diff(outside) > 1 {
+                    let half = inside.midpoint(outside);
+                    if sees(half, y) { inside = half } else { outside = half }
+                }
+                inside
+            };
+            edge(middle, 0)..edge(middle, width - 1) + 1
+        };
+        Self { rows: (0..height).map(row).collect() }
+    }
+
+    /// The columns of a row.
+    pub fn row(&self, y: usize) -> Range<usize> {
+        self.rows.get(y).cloned().unwrap_or(0..0)
+    }
+}
+
+/// The columns of a row of coverage that the lens shows, and their coverage.
+pub fn inside(field: Range<usize>, x: usize, part: &[f32]) -> (Range<usize>, &[f32]) {
+    let start = x.max(field.start).min(x + part.len());
+    let end = (x + part.len()).min(field.end).max(start);
+    (start..end, part.get(start - x..end - x).unwrap_or(&[]))
+}
+
+/// Box of the pixels that may show a cap of the dome.
+pub fn cap_box(
+    optics: &SensorOptics,
+    middle: DVec3,
+    angle_rad: f64,
+    width: usize,
+    height: usize,
+) -> PixelBox {
+    const AZIMUTHS: u32 = 16;
+    /// The polygon through the azimuths lies inside the cap's outline, and the dent moves it.
+    const MARGIN_PX: f64 = 6.0;
+    let side = middle.any_orthonormal_vector();
+    let up = middle.cross(side);
+    let (sin, cos) = angle_rad.min(std::f64::consts::FRAC_PI_2).sin_cos();
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for k in 0..AZIMUTHS {
+        let turn = DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(AZIMUTHS));
+        let mut at = (middle * cos + (side * turn.x + up * turn.y) * sin) * optics.dome_radius_mm();
+        at.z = at.z.max(0.0);
+        let Ok(pixel) = optics.project_deformed(at) else {
+            return PixelBox { left: 0, top: 0, right: width, bottom: height };
+        };
+        low = low.min(pixel);
+        high = high.max(pixel);
+    }
+    let whole = |value: f64, most: usize| (value.max(0.0) as usize).min(most);
+    PixelBox {
+        left: whole(low.x - MARGIN_PX, width),
+        top: whole(low.y - MARGIN_PX, height),
+        right: whole(high.x + MARGIN_PX + 1.0, width),
+        bottom: whole(high.y + MARGIN_PX + 1.0, height),
+    }
+}
+
+/// The dome's rim in the image, px. Where the lens does not see it, the polygon runs outside the lens's field.
+pub fn rim_polygon(optics: &SensorOptics) -> Vec<DVec2> {
+    let radius = optics.dome_radius_mm();
+    let lens = optics.lens();
+    let [[_, _, cx], [_, _, cy], _] = lens.spec().matrix;
+    let center = DVec2::new(cx, cy);
+    let camera_from_sensor = optics.sensor_from_camera().inverse();
+    let place = |k: usize| {
+        let (sin, cos) = (std::f64::consts::TAU * k as f64 / RIM_AZIMUTHS as f64).sin_cos();
+        let point = DVec3::new(radius * cos, radius * sin, 0.0);
+        optics.project(point).unwrap_or_else(|_| {
+            let aside = camera_from_sensor.point(point).truncate().normalize_or_zero();
+            center + aside * (1.5 * lens.max_radius_px())
+        })
+    };
+    let coarse: Vec<DVec2> = (0..RIM_AZIMUTHS).map(place).collect();
+    let at = |k: usize| coarse[k % RIM_AZIMUTHS];
+    let mut polygon = Vec::with_capacity(RIM_AZIMUTHS * RIM_BETWEEN);
+    for k in 0..RIM_AZIMUTHS {
+        let (a, b, c, d) = (at(k + RIM_AZIMUTHS - 1), at(k), at(k + 1), at(k + 2));
+        for step in 0..RIM_BETWEEN {
+            let t = step as f64 / RIM_BETWEEN as f64;
+            // Lagrange's cubic through the four.
+            let (p, q, r) = (t + 1.0, t - 1.0, t - 2.0);
+            polygon.push(
+                a * (-t * q * r / 6.0)
+                    + b * (p * q * r / 2.0)
+                    + c * (-p * t * r / 2.0)
+                    + d * (p * t * q / 6.0),
+            );
+        }
+    }
+    polygon
+}

@@ -1,0 +1,183 @@
+//! The dome under an object, frame by frame: friction remembers the way, so the frames are solved in order.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::EffectName;
+use super::SimError;
+use super::scene::object::Hold;
+use super::scene::{Held, Scene, State};
+use super::work::Work;
+use crate::design::DesignError;
+use crate::mechanics::Displacement;
+use crate::mechanics::contact::{Contact, ContactState, Elastomer, Level, PressStatus, Pressed};
+use crate::numeric::Rigid;
+
+/// The dome touched at one time.
+#[derive(Debug, Clone)]
+pub struct Touch {
+    /// Pose and load of the platform.
+    pub state: State,
+    /// The contact; `None` where nothing touches.
+    pub contact: Option<Arc<ContactState>>,
+}
+
+/// Solves the contact of a scene from frame to frame.
+pub struct Stepper<'a> {
+    scene: &'a Scene,
+    contact: Contact,
+    last: Option<Pressed>,
+}
+
+impl<'a> Stepper<'a> {
+    /// Makes the level's tables.
+    ///
+    /// # Errors
+    /// An elastomer that the level cannot work with.
+    pub fn new(scene: &'a Scene, level: Level) -> Result<Self, SimError> {
+        let contact = Contact::new(Elastomer::of_design(scene.design()), level).map_err(|error| {
+            DesignError::at("contact", "", error.to_string(), "an elastomer and a level that fit")
+        })?;
+        Ok(Self { scene, contact, last: None })
+    }
+
+    /// Solves the next frame.
+    ///
+    /// # Errors
+    /// An object inside the sheet, or deeper in the dome than the level goes; named with the frame.
+    pub fn next(&mut self, frame: u32, time_s: f64, work: &mut Work) -> Result<Touch, SimError> {
+        let free = |rest: &Scene| -> Result<Touch, SimError> {
+            let state = rest.state_at(frame, time_s)?;
+            Ok(Touch { state, contact: None })
+        };
+        let Some(object) = self.scene.objects().first() else { return free(self.scene) };
+        let suspension = self.scene.suspension();
+        let radius_mm = self.scene.optics().dome_radius_mm();
+        let before = self.last.as_ref();
+        let solved = match object.hold_at(time_s) {
+            Hold::Away(_) => {
+                self.last = None;
+                return free(self.scene);
+            }
+            Hold::At(_) if !object.may_touch(time_s, radius_mm) => {
+                self.last = None;
+                return free(self.scene);
+            }
+            Hold::At(pose) => self.contact.press(&object.indenter, suspension, &pose, before),
+            Hold::Pressed(pose, way, force_n) => {
+                self.contact.press_with_force(&object.indenter, suspension, &pose, way, force_n, before)
+            }
+        };
+        let pressed = solved.map_err(|error| {
+            SimError::from(DesignError::at(
+                "objects[0].path",
+                "",
+                format!("frame {frame}: {error}"),
+                "an object outside the sheet and no deeper in the dome than the contact's level goes",
+            ))
+        })?;
+        work.add(EffectName::Contact, pressed.state.work.max(0.0) as u64);
+        let held = match pressed.status {
+            PressStatus::Balanced => None,
+            PressStatus::SpringsBind { spring } => {
+                Some(Held { limit: "coil_bind", part: format!("spring {spring}"), carried: 1.0 })
+            }
+            PressStatus::NotBalanced { residual_n } => Some(Held {
+                limit: "not_balanced",
+                part: format!("a residual of {residual_n:.2e} N"),
+                carried: 1.0,
+            }),
+        };
+        let state = State { pose: pressed.rest_from_platform, wrench: pressed.wrench, held };
+        let contact = (!pressed.state.nodes.is_empty()).then(|| Arc::new(pressed.state.clone()));
+        self.last = Some(pressed);
+        Ok(Touch { state, contact })
+    }
+}
+
+/// The dome at a time between two frames: shape and pose in between, too.
+#[derive(Debug, Clone)]
+pub struct Between {
+    /// The frame before.
+    pub from: Touch,
+    /// The frame after.
+    pub to: Touch,
+    /// How far between, 0 to 1.
+    pub part: f64,
+}
+
+impl Between {
+    /// The frame itself.
+    pub fn at_frame(touch: Touch) -> Self {
+        Self { from: touch.clone(), to: touch, part: 0.0 }
+    }
+
+    /// Pose and load of the platform.
+    pub fn state(&self, about_mm: DVec3) -> State {
+        if self.part == 0.0 {
+            return self.from.state.clone();
+        }
+        let [a, b] = [&self.from.state, &self.to.state];
+        let [da, db] = [a, b].map(|state| Displacement::of_pose(&state.pose, about_mm));
+        let pose: Rigid = Displacement {
+            translation_mm: da.translation_mm.lerp(db.translation_mm, self.part),
+            rotation_rad: da.rotation_rad.lerp(db.rotation_rad, self.part),
+        }
+        .to_pose(about_mm);
+        let mut wrench = a.wrench;
+        wrench.force_n = a.wrench.force_n.lerp(b.wrench.force_n, self.part);
+        wrench.moment_nmm = a.wrench.moment_nmm.lerp(b.wrench.moment_nmm, self.part);
+        State { pose, wrench, held: a.held.clone() }
+    }
+
+    /// Whether the membrane is out of shape.
+    pub fn is_dented(&self) -> bool {
+        self.parts().into_iter().any(|(_, weight)| weight > 0.0)
+    }
+
+    /// The contact states with their weights; weight 0 where there is none.
+    fn parts(&self) -> [(Option<&ContactState>, f64); 2] {
+        let of =
+            |touch: &'_ Touch, weight: f64| -> f64 { if touch.contact.is_some() { weight } else { 0.0 } };
+        [
+            (self.from.contact.as_deref(), of(&self.from, 1.0 - self.part)),
+            (self.to.contact.as_deref(), of(&self.to, self.part)),
+        ]
+    }
+
+    /// Displacements of points of the undeformed dome, sensor frame, mm.
+    pub fn displacements_mm(&self, at_mm: &[DVec3]) -> Vec<DVec3> {
+        let mut sum = vec![DVec3::ZERO; at_mm.len()];
+        let mut one = vec![DVec3::ZERO; at_mm.len()];
+        for (contact, weight) in self.parts() {
+            let Some(contact) = contact.filter(|_| weight > 0.0) else { continue };
+            // The slices have one length.
+            if contact.displacements_mm(at_mm, &mut one).is_ok() {
+                sum.iter_mut().zip(&one).for_each(|(sum, u)| *sum += *u * weight);
+            }
+        }
+        sum
+    }
+
+    /// The pressed part of the dome: direction of its middle and half the angle of a cap about it; `None` where
+    /// nothing bears a load.
+    pub fn pressed_cap(&self) -> Option<(DVec3, f64)> {
+        let nodes = || {
+            let parts = self.parts().into_iter().filter(|(_, weight)| *weight > 0.0);
+            parts.filter_map(|(contact, _)| contact).flat_map(|contact| &contact.nodes)
+        };
+        let middle = nodes().map(|node| node.at_mm.normalize_or_zero()).sum::<DVec3>().try_normalize()?;
+        let angle_of = |at: DVec3| middle.dot(at.normalize_or(middle)).clamp(-1.0, 1.0).acos();
+        Some((middle, nodes().map(|node| angle_of(node.at_mm)).fold(0.0, f64::max)))
+    }
+
+    /// The region that moves: direction of its middle, half its angle, and the most that anything moves outside.
+    pub fn extents(&self) -> Vec<crate::mechanics::contact::Extent> {
+        self.parts()
+            .into_iter()
+            .filter(|(_, weight)| *weight > 0.0)
+            .filter_map(|(c, _)| Some(c?.extent()))
+            .collect()
+    }
+}

@@ -1,0 +1,148 @@
+//! `domecast simulate`: what it writes, and what it refuses with file, field, value and what is allowed.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::domecast;
+use serde_json::{Value, json};
+
+const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
+
+/// A scene with a ball on the pole, changed by a closure.
+fn scene(change: impl Fn(&mut Value)) -> Value {
+    let mut scene = json!({
+        "version": 1, "name": "t", "design": format!("{FOLDER}/designs/thumb24.json"),
+        "frames": { "count": 2, "rate_hz": 30 },
+        "tolerance": { "px": 0.1, "grey": 4 },
+        "contact": { "level": "geometric" },
+        "objects": [{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 }, "path": [
+            { "time_s": 0, "position_mm": [0, 0, 14] }, { "time_s": 0.033, "position_mm": [0, 0, 13.2] },
+        ]}],
+        "output": { "heights": true, "pressure": true },
+    });
+    change(&mut scene);
+    scene
+}
+
+fn write(folder: &Path, scene: &Value) {
+    fs::write(folder.join("scene.json"), scene.to_string()).expect("written");
+}
+
+#[test]
+fn a_scene_becomes_frames_video_and_truth() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), &scene(|_| {}));
+    let planned = domecast(&["simulate", "scene.json", "--explain"], folder.path());
+    assert_eq!(planned.status.code(), Some(0));
+    assert!(String::from_utf8_lossy(&planned.stdout).contains("contact"));
+    assert!(!folder.path().join("output").exists(), "--explain draws nothing");
+
+    let output = domecast(&["simulate", "scene.json", "--out", "out", "--json"], folder.path());
+    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!((output.status.code(), &told["frames"]), (Some(0), &json!(2)), "{told}");
+    let out = folder.path().join("out");
+    let mut names: Vec<String> = domecast::build::list_files(&out).expect("listed");
+    names.sort();
+    let expected = [
+        "frame_0000.png",
+        "frame_0001.png",
+        "heights_0000.tif",
+        "heights_0001.tif",
+        "plan.json",
+        "pressure_0000.json",
+        "pressure_0001.json",
+        "truth.jsonl",
+        "video.avi",
+    ];
+    assert_eq!(names, expected);
+
+    let truth = fs::read_to_string(out.join("truth.jsonl")).expect("truth");
+    let lines: Vec<Value> = truth.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    assert_eq!(lines.len(), 2);
+    for (number, line) in lines.iter().enumerate() {
+        assert_eq!(line["frame"], json!(number));
+        assert_eq!(line["black_dots"].as_array().map(Vec::len), Some(172));
+        assert_eq!(line["white_markers"].as_array().map(Vec::len), Some(4));
+        for name in ["id", "image_px", "centroid_px", "surface_mm", "visible"] {
+            assert!(line["black_dots"][0].get(name).is_some(), "{name}");
+        }
+        for effect in line["effects"].as_array().expect("effects") {
+            assert!(effect["id"].is_string() && effect["used"].is_boolean() && effect["why"].is_string());
+        }
+    }
+    // The second frame is pressed: down, by the load that the springs bear and the pressure sums to.
+    let force_n = -lines[1]["wrench"][2].as_f64().expect("Fz");
+    assert!(lines[1]["pose"][2][3].as_f64().expect("z") < -0.01 && force_n > 0.1, "{force_n}");
+    let pressure: Value =
+        serde_json::from_str(&fs::read_to_string(out.join("pressure_0001.json")).expect("read"))
+            .expect("JSON");
+    let nodes = pressure["nodes"].as_array().expect("nodes");
+    let sum: f64 = nodes.iter().filter_map(|node| node["force_n"][2].as_f64()).sum();
+    assert!((sum + force_n).abs() < 1e-3 * force_n, "{sum} {force_n}");
+
+    let video = fs::read(out.join("video.avi")).expect("video");
+    assert_eq!((&video[..4], &video[8..12]), (&b"RIFF"[..], &b"AVI "[..]));
+    let length = u32::from_le_bytes([video[4], video[5], video[6], video[7]]) as usize;
+    assert!(length + 8 <= video.len());
+}
+
+/// The one line that refuses a scene; nothing is written.
+#[track_caller]
+fn refused(scene: &Value, more: &[&str], parts: &[&str]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), scene);
+    let arguments = [&["simulate", "scene.json", "--out", "out"], more].concat();
+    let output = domecast(&arguments, folder.path());
+    let message = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_eq!(message.trim_end().lines().count(), 1, "one message: {message}");
+    assert!(message.starts_with("error: scene.json"), "the file is named: {message}");
+    for part in parts.iter().chain(&["allowed"]) {
+        assert!(message.contains(part), "\"{part}\" is missing in: {message}");
+    }
+    assert!(!folder.path().join("out").exists(), "nothing is written");
+}
+
+#[test]
+fn bad_scenes_are_named() {
+    let none = scene(|scene| scene["frames"]["count"] = json!(0));
+    refused(&none, &[], &["frames.count", "0"]);
+    refused(&scene(|_| {}), &["--frames", "0"], &["frames.count", "0"]);
+    for value in [0.0, -1.0] {
+        refused(&scene(|scene| scene["tolerance"]["px"] = json!(value)), &[], &["tolerance.px"]);
+        refused(&scene(|scene| scene["tolerance"]["grey"] = json!(value)), &[], &["tolerance.grey"]);
+    }
+    let unknown = scene(|scene| scene["effects"] = json!({ "gravity_waves": "always" }));
+    refused(&unknown, &[], &["effects.gravity_waves", "unknown key"]);
+    let heavy = scene(|scene| {
+        scene["objects"] = json!([]);
+        scene["motion"] =
+            json!({ "wrench": [{ "time_s": 0, "force_n": [6, 0, 0], "point_mm": [0, 0, 10] }] });
+    });
+    refused(&heavy, &[], &["motion.wrench[0]", "envelope"]);
+    let inside = scene(|scene| scene["objects"][0]["path"][0]["position_mm"] = json!([9, 0, 1]));
+    refused(&inside, &[], &["objects[0].path", "frame 0"]);
+}
+
+#[test]
+fn bad_meshes_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let nut = fs::read(Path::new(FOLDER).join("designs/scenes/meshes/nut.stl")).expect("a nut");
+    let count = u32::from_le_bytes([nut[80], nut[81], nut[82], nut[83]]);
+    // One triangle less, and one twice.
+    let mut open = nut[..nut.len() - 50].to_vec();
+    open[80..84].copy_from_slice(&(count - 1).to_le_bytes());
+    let mut twice = nut.clone();
+    twice.extend_from_within(nut.len() - 50..);
+    twice[80..84].copy_from_slice(&(count + 1).to_le_bytes());
+    for (name, bytes) in [("open.stl", open), ("twice.stl", twice)] {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).expect("written");
+        let held = scene(|scene| {
+            scene["objects"][0]["shape"] = json!({ "kind": "mesh", "file": path.display().to_string() });
+        });
+        refused(&held, &[], &["objects[0].shape.file", name]);
+    }
+}

@@ -210,10 +210,10 @@ fn main() {
     }
     for pitch in [26.0, 18.0, 13.0] {
         let Some(grown) = design_with(|value| value["pattern"]["pitch_px"] = json!(pitch)) else { continue };
-        if let Some(scene) = scene_of(&grown, &push(true, true)) {
-            if let Some(seconds) = frame_s(&scene, ROUNDS) {
-                line(&format!("{} dots", scene.dots().len()), seconds);
-            }
+        if let Some(scene) = scene_of(&grown, &push(true, true))
+            && let Some(seconds) = frame_s(&scene, ROUNDS)
+        {
+            line(&format!("{} dots", scene.dots().len()), seconds);
         }
     }
     for count in [1_usize, 2, 3] {

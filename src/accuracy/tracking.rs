@@ -27,6 +27,7 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
         ("points only, searched where one is lost", TrackOptions { search_every: 0, ..plain }),
         ("as it runs", plain),
     ];
+    let half_way_px = half_way_px(frames)?;
     let mut rungs = Vec::new();
     for (index, (label, options)) in ways.into_iter().enumerate() {
         let mut tracker = Tracker::new(constants, options).ok()?;
@@ -41,7 +42,11 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
                 seen += 1;
                 match found.filter(|dot| dot.state == MarkState::Ok).and_then(|dot| dot.centroid_px) {
                     Some(px) => errors.push(px.distance(glam::DVec2::from_array(at))),
-                    None => missed += 1,
+                    // farther than this it would pass for its neighbour
+                    None => {
+                        missed += 1;
+                        errors.push(half_way_px);
+                    }
                 }
             }
         }
@@ -74,7 +79,7 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
             name: "tracker",
             title: "Dots in the runtime".into(),
             dial: "options",
-            error: "distance of a dot's centroid from the truth",
+            error: "distance of a dot's centroid from the truth; half way to the nearest dot for one that is not found",
             unit: "px",
             item: "frame",
             items: frames.drawn.len(),
@@ -90,4 +95,14 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
         }
         .finish(),
     )
+}
+
+/// Half of the least distance between two dots of the first frame, px.
+fn half_way_px(frames: &Sequence) -> Option<f64> {
+    let dots = &frames.drawn.first()?.truth.black_dots;
+    let places: Vec<glam::DVec2> =
+        dots.iter().filter_map(|dot| dot.centroid_px.map(glam::DVec2::from_array)).collect();
+    let apart = |i: usize| places[..i].iter().map(move |other| (i, other));
+    let least = (0..places.len()).flat_map(apart).map(|(i, other)| places[i].distance(*other));
+    least.reduce(f64::min).map(|least| 0.5 * least)
 }

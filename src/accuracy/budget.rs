@@ -1,19 +1,21 @@
 //! What the final position of a dot, and the final force, owe to each step: so that nobody pays for digits that the
 //! print shop throws away.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use nalgebra::Vector6;
 use serde::Serialize;
 
 use super::ladder::Ladder;
+use super::pose::sightings;
 use crate::constants::{Constants, markers_of, matrix_of, resolution_at};
 use crate::design::Design;
+use crate::design::settings::{Off, off_by_tolerances};
 use crate::layout::Layout;
 use crate::layout::report::LayoutReport;
 use crate::mechanics::{Displacement, claims_of, suspension_of};
 use crate::numeric::Rigid;
-use crate::optics::{OpticsSpec, SensorOptics};
-use crate::pose::{Marker, PoseOptions, PoseSolver, Sighting};
+use crate::optics::SensorOptics;
+use crate::pose::{Marker, PoseOptions, PoseSolver};
 
 /// What one step adds, as one standard deviation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -162,9 +164,9 @@ pub fn of_force(design: &Design, constants: &Constants, ladders: &[Ladder]) -> O
         add("centroid noise of one frame", "noise.white_centroid_px", false, sd);
     }
     let t = &sections.tolerances;
-    for (name, field, changes) in perturbed(optics, t) {
-        let squares: f64 = changes.iter().map(|changed| off(read(changed, &markers)).powi(2)).sum();
-        add(name, field, false, squares.sqrt());
+    for Off { what, field, sensors } in off_by_tolerances(optics, t) {
+        let squares: f64 = sensors.iter().map(|sensor| off(read(sensor, &markers)).powi(2)).sum();
+        add(what, field, false, squares.sqrt());
     }
     let mut squares = 0.0;
     for index in 0..2 * markers.len() {
@@ -195,65 +197,4 @@ pub fn of_force(design: &Design, constants: &Constants, ladders: &[Ladder]) -> O
 
 fn size(force_n: &[f64; 3]) -> f64 {
     DVec3::from_array(*force_n).length()
-}
-
-fn sightings(optics: &SensorOptics, markers: &[Marker], pose: &Rigid) -> Option<Vec<Sighting>> {
-    let placed = optics.at_pose(pose).ok()?;
-    let seen = |marker: &Marker| {
-        Some(Sighting { id: marker.id, centroid_px: marker.image(&placed).ok()?.centroid_px })
-    };
-    markers.iter().map(seen).collect()
-}
-
-/// Name, field and sensors with one number off by its tolerance.
-fn perturbed(
-    optics: &SensorOptics,
-    t: &crate::design::sections::TolerancesSection,
-) -> Vec<(&'static str, &'static str, Vec<SensorOptics>)> {
-    let spec = OpticsSpec {
-        lens: optics.lens().spec().clone(),
-        sensor_from_camera: *optics.rest_from_camera(),
-        layers: optics.layers().get(1..).unwrap_or_default().to_vec(),
-        dome_radius_mm: optics.dome_radius_mm(),
-    };
-    let with = |change: &dyn Fn(&mut OpticsSpec)| {
-        let mut changed = spec.clone();
-        change(&mut changed);
-        SensorOptics::new(&changed).ok()
-    };
-    let axes = [0_usize, 1, 2];
-    let moved = |axis: usize| with(&|spec| spec.sensor_from_camera.translation_mm[axis] += t.pupil_mm[axis]);
-    let turned = |axis: usize| {
-        let angle = t.camera_rotation_deg[axis].to_radians();
-        let turn = [DMat3::from_rotation_x, DMat3::from_rotation_y, DMat3::from_rotation_z][axis](angle);
-        with(&|spec| {
-            let place = spec.sensor_from_camera;
-            spec.sensor_from_camera = Rigid::new(turn * place.rotation, place.translation_mm);
-        })
-    };
-    let denser = |index: usize| {
-        with(&|spec| {
-            if let Some(layer) = spec.layers.get_mut(index) {
-                layer.index = layer.index.map(|n| n + t.index);
-            }
-        })
-    };
-    let thicker = |index: usize| {
-        with(&|spec| {
-            if let Some(thickness) = spec.layers.get_mut(index).and_then(|l| l.thickness_mm.as_mut()) {
-                *thickness += t.layer_thickness_mm;
-            }
-        })
-    };
-    let layers = 0..spec.layers.len();
-    vec![
-        ("pupil's place", "tolerances.pupil_mm", axes.into_iter().filter_map(moved).collect()),
-        (
-            "camera's direction",
-            "tolerances.camera_rotation_deg",
-            axes.into_iter().filter_map(turned).collect(),
-        ),
-        ("indices", "tolerances.index", layers.clone().filter_map(denser).collect()),
-        ("sheet's thickness", "tolerances.layer_thickness_mm", layers.filter_map(thicker).collect()),
-    ]
 }

@@ -27,6 +27,31 @@ pub struct Rung {
     pub dominated: bool,
 }
 
+impl Rung {
+    /// A rung from the errors and the time of `items`; errors that are not finite are told as failures, in the words
+    /// of `failure`.
+    pub fn of(
+        (way, label): (&'static str, String),
+        dial: f64,
+        errors: impl Iterator<Item = f64>,
+        (time, items): (Timing, usize),
+        failure: &str,
+    ) -> Self {
+        let (max_error, rms_error, failed) = sizes(errors);
+        Self {
+            way,
+            label,
+            dial,
+            max_error,
+            rms_error,
+            time,
+            per_item_s: time.median_s / items.max(1) as f64,
+            notes: if failed > 0 { vec![(failure.into(), failed as f64)] } else { Vec::new() },
+            dominated: false,
+        }
+    }
+}
+
 /// How an error follows the dial.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(tag = "law", rename_all = "snake_case")]

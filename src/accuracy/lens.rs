@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::clock::{Patience, time};
-use super::ladder::{Ladder, Law, Rung, sizes};
+use super::ladder::{Ladder, Law, Rung};
 use crate::camera::{Lens, Model};
 use crate::layout::Layout;
 
@@ -24,22 +24,9 @@ pub fn ladder(lens: &Lens, layout: &Layout, asked_px: Option<f64>, patience: Pat
     };
     let mut rungs = Vec::new();
     let mut add = |way: &'static str, label: String, dial: f64, solve: &dyn Fn(DVec2) -> Option<DVec3>| {
-        let (max_error, rms_error, failed) = sizes(pixels.iter().map(|&pixel| error_px(pixel, solve(pixel))));
+        let errors = pixels.iter().map(|&pixel| error_px(pixel, solve(pixel)));
         let time = time(patience, || pixels.iter().filter(|pixel| solve(**pixel).is_some()).count());
-        let notes =
-            if failed > 0 { vec![("pixels without a ray".into(), failed as f64)] } else { Vec::new() };
-        let per_item_s = time.median_s / pixels.len().max(1) as f64;
-        rungs.push(Rung {
-            way,
-            label,
-            dial,
-            max_error,
-            rms_error,
-            time,
-            per_item_s,
-            notes,
-            dominated: false,
-        });
+        rungs.push(Rung::of((way, label), dial, errors, (time, pixels.len()), "pixels without a ray"));
     };
     for rounds in FIXED_POINT_ROUNDS {
         let label = format!("fixed point, {rounds} rounds");

@@ -4,9 +4,9 @@ use glam::{DVec2, DVec3};
 use nalgebra::{Matrix2, Vector2};
 
 use super::clock::{Patience, time};
-use super::ladder::{Ladder, Law, Rung, sizes};
+use super::ladder::{Ladder, Law, Rung};
 use crate::layout::Layout;
-use crate::optics::{Channel, OpticsSpec, SensorOptics};
+use crate::optics::{Channel, SensorOptics};
 
 /// Newton steps of the reference: it starts within a pixel and ends at rounding after three.
 const REFERENCE_STEPS: u32 = 6;
@@ -18,12 +18,7 @@ pub fn ladder(
     asked_mm: Option<f64>,
     patience: Patience,
 ) -> Option<Ladder> {
-    let mut spec = OpticsSpec {
-        lens: optics.lens().spec().clone(),
-        sensor_from_camera: *optics.rest_from_camera(),
-        layers: optics.layers().get(1..)?.to_vec(),
-        dome_radius_mm: optics.dome_radius_mm(),
-    };
+    let mut spec = optics.spec();
     let channels = Channel::ALL.map(|channel| optics.for_channel(channel));
     for layer in &mut spec.layers {
         layer.index = [1.0; 3];
@@ -51,20 +46,9 @@ pub fn ladder(
             (Some(at), Some(truth)) => at.distance(*truth),
             _ => f64::NAN,
         });
-        let (max_error, rms_error, failed) = sizes(off);
         let time = time(patience, || pixels.iter().filter(|pixel| place(**pixel).is_some()).count());
-        let notes = if failed > 0 { vec![("dots off the dome".into(), failed as f64)] } else { Vec::new() };
-        rungs.push(Rung {
-            way: "",
-            label: (*label).to_owned(),
-            dial: index as f64 + 1.0,
-            max_error,
-            rms_error,
-            time,
-            per_item_s: time.median_s / pixels.len().max(1) as f64,
-            notes,
-            dominated: false,
-        });
+        let (name, dial) = (("", (*label).to_owned()), index as f64 + 1.0);
+        rungs.push(Rung::of(name, dial, off, (time, pixels.len()), "dots off the dome"));
     }
     let saved = rungs[0].rms_error / rungs[1].rms_error.max(f64::MIN_POSITIVE);
     Some(

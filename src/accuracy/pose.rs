@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::clock::{Patience, time};
-use super::ladder::{Ladder, Law, Rung, sizes};
+use super::ladder::{Ladder, Law, Rung};
 use crate::constants::{Constants, PlainInput, PlainRuntimeSolver, matrix_of};
 use crate::numeric::{Rigid, rotation_from_vector};
 use crate::optics::SensorOptics;
@@ -57,22 +57,8 @@ pub fn ladder(constants: &Constants, asked_n: Option<f64>, patience: Patience) -
     let mut rungs = Vec::new();
     let mut add = |way: &'static str, label: &str, solve: &dyn Fn(&Seen) -> Option<Rigid>| {
         let off = seen.iter().map(|one| solve(one).map_or(f64::NAN, |pose| force_off(&pose, &one.pose)));
-        let (max_error, rms_error, failed) = sizes(off);
         let time = time(patience, || seen.iter().filter(|one| solve(one).is_some()).count());
-        let per_item_s = time.median_s / seen.len() as f64;
-        let notes = if failed > 0 { vec![("poses not found".into(), failed as f64)] } else { Vec::new() };
-        let (label, dial) = (label.to_owned(), 0.0);
-        rungs.push(Rung {
-            way,
-            label,
-            dial,
-            max_error,
-            rms_error,
-            time,
-            per_item_s,
-            notes,
-            dominated: false,
-        });
+        rungs.push(Rung::of((way, label.to_owned()), 0.0, off, (time, seen.len()), "poses not found"));
     };
     let mut plain = |way: &'static str, label: &str, positions: &[DVec3]| -> Option<()> {
         let solver = PlainRuntimeSolver::new(&input, positions).ok()?;
@@ -128,10 +114,14 @@ fn pose_of(k: u32) -> Rigid {
 }
 
 fn see(optics: &SensorOptics, markers: &[Marker], pose: &Rigid) -> Option<Seen> {
+    Some(Seen { pose: *pose, raw: sightings(optics, markers, pose)? })
+}
+
+/// Where a camera sees the markers' centroids at a pose; `None` where one is not seen.
+pub(super) fn sightings(optics: &SensorOptics, markers: &[Marker], pose: &Rigid) -> Option<Vec<Sighting>> {
     let placed = optics.at_pose(pose).ok()?;
-    let raw = markers
-        .iter()
-        .map(|marker| Some(Sighting { id: marker.id, centroid_px: marker.image(&placed).ok()?.centroid_px }))
-        .collect::<Option<Vec<_>>>()?;
-    Some(Seen { pose: *pose, raw })
+    let seen = |marker: &Marker| {
+        Some(Sighting { id: marker.id, centroid_px: marker.image(&placed).ok()?.centroid_px })
+    };
+    markers.iter().map(seen).collect()
 }

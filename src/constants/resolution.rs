@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::mechanics::{Displacement, Suspension};
 use crate::numeric::Rigid;
-use crate::optics::{Layer, OpticsSpec, SensorOptics};
+use crate::optics::SensorOptics;
 use crate::pose::{Marker, displacement_from_motion};
 
 /// Names of the six axes of a displacement.
@@ -132,7 +132,7 @@ pub fn design_choices(
             &moved,
         ));
     }
-    let spec = spec_of(optics);
+    let spec = optics.spec();
     for step_mm in [-2.0, -1.0, 1.0, 2.0] {
         let mut changed = spec.clone();
         changed.sensor_from_camera.translation_mm.z -= step_mm;
@@ -151,15 +151,4 @@ pub fn design_choices(
         all.push(try_with(change, SensorOptics::new(&changed).ok(), markers));
     }
     all
-}
-
-/// The description that a sensor's optics were made from.
-pub fn spec_of(optics: &SensorOptics) -> OpticsSpec {
-    let layers: Vec<Layer> = optics.layers().iter().skip(1).cloned().collect();
-    OpticsSpec {
-        lens: optics.lens().spec().clone(),
-        sensor_from_camera: *optics.rest_from_camera(),
-        layers,
-        dome_radius_mm: optics.dome_radius_mm(),
-    }
 }

@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 
 use super::error::DesignError;
 use super::resolve::Design;
-use super::sections::{AccuracySection, DesignFile};
+use super::sections::{AccuracySection, DesignFile, TolerancesSection};
 use crate::numeric::Rigid;
 use crate::optics::{OpticsSpec, SensorOptics};
 
@@ -98,7 +98,9 @@ impl Settings {
             samples: setting(
                 "tolerances.samples",
                 file.tolerances.samples,
-                asked.zip(seen.as_ref()).map(|(asked, seen)| samples(asked, seen)),
+                asked
+                    .zip(seen.as_ref().and_then(|seen| seen.spread_px))
+                    .map(|(asked, px)| samples(asked, px)),
             )?,
         })
     }
@@ -152,14 +154,14 @@ fn optical(asked: &AccuracySection, seen: &Seen) -> (f64, String) {
     (fine(limit / SAFETY, 1e-4, 10.0), promise(field, value, &why))
 }
 
-fn samples(asked: &AccuracySection, seen: &Seen) -> (u32, String) {
+fn samples(asked: &AccuracySection, spread_px: f64) -> (u32, String) {
     // the mean over n sensors is known to the spread of one over the root of n
-    let wanted = (seen.spread_px * SAFETY / asked.image_px).powi(2).ceil();
+    let wanted = (spread_px * SAFETY / asked.image_px).powi(2).ceil();
     let mut count = 16_u32;
     while f64::from(count) < wanted && count < 65_536 {
         count *= 2;
     }
-    let why = format!("the mean shift of one sensor's dots spreads by at most {:.2} px", seen.spread_px);
+    let why = format!("the mean shift of one sensor's dots spreads by at most {spread_px:.2} px");
     (count, promise("image_px", asked.image_px, &why))
 }
 
@@ -169,8 +171,9 @@ struct Seen {
     px_per_radius_mm: f64,
     /// The same on the dome: how far beside its place the pixel's ray then meets it.
     mm_per_radius_mm: f64,
-    /// Upper bound of the spread of a sensor's mean shift, px: the root mean square shift, all tolerances together.
-    spread_px: f64,
+    /// Upper bound of the spread of a sensor's mean shift, px: the root mean square shift, all tolerances together;
+    /// worked out only where the number of sensors is open, for it makes a dozen of them.
+    spread_px: Option<f64>,
 }
 
 impl Seen {
@@ -208,7 +211,11 @@ impl Seen {
                 "optics that see the dome, or explicit settings",
             ));
         }
-        let spread_px = spread(file, optics, &seen_points, px_per_mm, px_per_radius_mm);
+        let spread_px = file
+            .tolerances
+            .samples
+            .is_none()
+            .then(|| spread(file, optics, &seen_points, px_per_mm, px_per_radius_mm));
         // a dome seen head-on hides its radius; its dots then still move by what the mesh leaves sideways
         Ok(Self { px_per_radius_mm, mm_per_radius_mm: mm_per_radius_mm.max(0.1), spread_px })
     }
@@ -229,44 +236,13 @@ fn spread(
     px_per_radius_mm: f64,
 ) -> f64 {
     let t = &file.tolerances;
-    let spec = OpticsSpec {
-        lens: optics.lens().spec().clone(),
-        sensor_from_camera: *optics.rest_from_camera(),
-        layers: optics.layers().get(1..).unwrap_or_default().to_vec(),
-        dome_radius_mm: optics.dome_radius_mm(),
-    };
     let mut squares = 0.0;
-    let mut add = |change: &dyn Fn(&mut OpticsSpec)| {
-        let mut changed = spec.clone();
-        change(&mut changed);
-        let Ok(optics) = SensorOptics::new(&changed) else { return };
+    for sensor in off_by_tolerances(optics, t).into_iter().flat_map(|off| off.sensors) {
         let shifts = points
             .iter()
-            .filter_map(|(point, pixel)| Some(optics.project(*point).ok()?.distance_squared(*pixel)));
+            .filter_map(|(point, pixel)| Some(sensor.project(*point).ok()?.distance_squared(*pixel)));
         let (sum, count) = shifts.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
         squares += sum / f64::max(count, 1.0);
-    };
-    for axis in 0..3 {
-        add(&|spec| spec.sensor_from_camera.translation_mm[axis] += t.pupil_mm[axis]);
-        let turn = [DMat3::from_rotation_x, DMat3::from_rotation_y, DMat3::from_rotation_z][axis];
-        let turn = turn(t.camera_rotation_deg[axis].to_radians());
-        add(&|spec| {
-            let place = spec.sensor_from_camera;
-            spec.sensor_from_camera = Rigid::new(turn * place.rotation, place.translation_mm);
-        });
-    }
-    for index in 0..spec.layers.len() {
-        add(&|spec| {
-            if let Some(layer) = spec.layers.get_mut(index) {
-                layer.index = layer.index.map(|n| n + t.index);
-            }
-        });
-        add(&|spec| {
-            if let Some(thickness) = spec.layers.get_mut(index).and_then(|layer| layer.thickness_mm.as_mut())
-            {
-                *thickness += t.layer_thickness_mm;
-            }
-        });
     }
     let radius_mm = file.dome.radius_mm;
     let on_dome = [
@@ -281,6 +257,64 @@ fn spread(
     let grown = px_per_radius_mm + px_per_mm * reach_deg(file).to_radians();
     squares += (t.dome_radius_mm * grown).powi(2);
     squares.sqrt()
+}
+
+/// One number of the optics off by its tolerance.
+#[derive(Debug, Clone)]
+pub struct Off {
+    /// What it is, in words.
+    pub what: &'static str,
+    /// Its field in the design file.
+    pub field: &'static str,
+    /// The sensors, one for each axis or layer that it has; what cannot be is left out.
+    pub sensors: Vec<SensorOptics>,
+}
+
+/// The optics with one number at a time off by its tolerance.
+pub fn off_by_tolerances(optics: &SensorOptics, t: &TolerancesSection) -> Vec<Off> {
+    let spec = optics.spec();
+    let with = |change: &dyn Fn(&mut OpticsSpec)| {
+        let mut changed = spec.clone();
+        change(&mut changed);
+        SensorOptics::new(&changed).ok()
+    };
+    let axes = [0_usize, 1, 2];
+    let moved = |axis: usize| with(&|spec| spec.sensor_from_camera.translation_mm[axis] += t.pupil_mm[axis]);
+    let turned = |axis: usize| {
+        let angle = t.camera_rotation_deg[axis].to_radians();
+        let turn = [DMat3::from_rotation_x, DMat3::from_rotation_y, DMat3::from_rotation_z][axis](angle);
+        with(&|spec| {
+            let place = spec.sensor_from_camera;
+            spec.sensor_from_camera = Rigid::new(turn * place.rotation, place.translation_mm);
+        })
+    };
+    let denser = |index: usize| {
+        with(&|spec| {
+            if let Some(layer) = spec.layers.get_mut(index) {
+                layer.index = layer.index.map(|n| n + t.index);
+            }
+        })
+    };
+    let thicker = |index: usize| {
+        with(&|spec| {
+            if let Some(thickness) = spec.layers.get_mut(index).and_then(|layer| layer.thickness_mm.as_mut())
+            {
+                *thickness += t.layer_thickness_mm;
+            }
+        })
+    };
+    let layers = 0..spec.layers.len();
+    let off = |what, field, sensors| Off { what, field, sensors };
+    vec![
+        off("pupil's place", "tolerances.pupil_mm", axes.into_iter().filter_map(moved).collect()),
+        off(
+            "camera's direction",
+            "tolerances.camera_rotation_deg",
+            axes.into_iter().filter_map(turned).collect(),
+        ),
+        off("indices", "tolerances.index", layers.clone().filter_map(denser).collect()),
+        off("sheet's thickness", "tolerances.layer_thickness_mm", layers.filter_map(thicker).collect()),
+    ]
 }
 
 impl Design {

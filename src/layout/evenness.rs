@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Layout;
 use super::spec::LayoutSpec;
-use crate::optics::{OpticsSpec, SensorOptics};
+use crate::optics::SensorOptics;
 
 /// A length's spread over a pattern.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -141,7 +141,7 @@ pub fn by_design(layout: &Layout) -> Option<EvennessReport> {
 /// The same pattern laid out by the pinhole alone: the rays of the pattern's pixels, by the same lens, go
 /// straight to the dome as if every index were 1. What the real stack shows of dots placed there.
 pub fn by_pinhole(spec: &LayoutSpec, layout: &Layout) -> Option<PinholeComparison> {
-    let mut clear = spec_of(&spec.optics);
+    let mut clear = spec.optics.spec();
     for layer in &mut clear.layers {
         layer.index = [1.0; 3];
     }
@@ -166,14 +166,4 @@ pub fn by_pinhole(spec: &LayoutSpec, layout: &Layout) -> Option<PinholeCompariso
         max_shift_mm: shifts.iter().map(|s| s.1).fold(0.0, f64::max),
         lost: layout.dots.len() - shifts.len(),
     })
-}
-
-/// What a sensor's optics were made from.
-pub(super) fn spec_of(optics: &SensorOptics) -> OpticsSpec {
-    OpticsSpec {
-        lens: optics.lens().spec().clone(),
-        sensor_from_camera: *optics.rest_from_camera(),
-        layers: optics.layers()[1..].to_vec(),
-        dome_radius_mm: optics.dome_radius_mm(),
-    }
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::Layout;
 use super::chance::Chance;
-use super::evenness::{evenness_of, in_plane, spec_of};
+use super::evenness::{evenness_of, in_plane};
 use super::spec::LayoutSpec;
 use crate::design::sections::TolerancesSection;
 use crate::numeric::Rigid;
@@ -178,7 +178,7 @@ fn sensor(
     chance: &mut Chance,
 ) -> Option<(f64, f64)> {
     let counts = |index: usize| f64::from(u8::from(only.is_none_or(|only| only == index)));
-    let mut made = spec_of(&spec.optics);
+    let mut made = spec.optics.spec();
     let shift = DVec3::from_array(tolerances.pupil_mm.map(|sd| sd * chance.normal())) * counts(0);
     let [a, b, c] = tolerances.camera_rotation_deg.map(|sd| sd.to_radians() * chance.normal() * counts(1));
     let turn = DMat3::from_rotation_z(c) * DMat3::from_rotation_y(b) * DMat3::from_rotation_x(a);

@@ -171,6 +171,17 @@ impl SensorOptics {
         self.channel
     }
 
+    /// What the sensor was made from: to make another that differs in one thing.
+    pub fn spec(&self) -> OpticsSpec {
+        OpticsSpec {
+            lens: self.lens.spec().clone(),
+            sensor_from_camera: self.rest_from_camera,
+            // the air is what the camera's place leaves
+            layers: self.layers.iter().skip(1).cloned().collect(),
+            dome_radius_mm: self.dome_radius_mm,
+        }
+    }
+
     /// The lens.
     pub fn lens(&self) -> &Lens {
         &self.lens

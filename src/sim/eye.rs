@@ -47,16 +47,10 @@ impl Eye {
         if !geometry.pupil_shift {
             lens.pupil_shift_mm.clear();
         }
-        let mut layers: Vec<_> = real.layers().iter().skip(1).cloned().collect();
+        let mut spec = OpticsSpec { lens, ..real.spec() };
         if !geometry.refraction {
-            layers.iter_mut().for_each(|layer| layer.index = [1.0; 3]);
+            spec.layers.iter_mut().for_each(|layer| layer.index = [1.0; 3]);
         }
-        let spec = OpticsSpec {
-            lens,
-            sensor_from_camera: *real.rest_from_camera(),
-            layers,
-            dome_radius_mm: real.dome_radius_mm(),
-        };
         let green = SensorOptics::new(&spec).map_err(|fault| {
             DesignError::at(fault.field, fault.value, "the optics cannot be", fault.allowed)
         })?;

@@ -25,6 +25,7 @@ mod mesh_distance;
 mod neo;
 mod press;
 mod solid;
+mod sparse;
 mod state;
 mod sweeps;
 mod tangential;

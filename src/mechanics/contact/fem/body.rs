@@ -6,6 +6,7 @@ use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Mat, Side};
 
+use super::super::sparse::lower_triangle;
 use super::element::{DOFS, stiffness};
 use super::mesh::Meridian;
 use crate::mechanics::contact::{ContactError, Elastomer};
@@ -204,15 +205,5 @@ fn pattern(mesh: &Meridian, masters: &[Vec<(usize, f64)>]) -> (Vec<usize>, Vec<u
             neighbours[a].extend(&all);
         }
     }
-    let (mut columns, mut rows) = (vec![0], Vec::new());
-    for (node, list) in neighbours.iter_mut().enumerate() {
-        list.sort_unstable();
-        list.dedup();
-        for direction in 0..3 {
-            let column = 3 * node + direction;
-            rows.extend(list.iter().flat_map(|n| 3 * n..3 * n + 3).filter(|row| *row >= column));
-            columns.push(rows.len());
-        }
-    }
-    (columns, rows)
+    lower_triangle(neighbours)
 }

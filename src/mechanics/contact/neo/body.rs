@@ -5,6 +5,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Mat, Side};
 use glam::DVec3;
 
+use super::super::sparse::lower_triangle;
 use super::brick::{DOFS, Point, points, respond};
 use super::mesh::Bricks;
 use crate::mechanics::contact::{ContactError, Elastomer};
@@ -122,15 +123,5 @@ fn pattern(mesh: &Bricks) -> (Vec<usize>, Vec<usize>) {
             neighbours[*a as usize].extend(brick.iter().map(|b| *b as usize));
         }
     }
-    let (mut columns, mut rows) = (vec![0], Vec::new());
-    for (node, list) in neighbours.iter_mut().enumerate() {
-        list.sort_unstable();
-        list.dedup();
-        for direction in 0..3 {
-            let column = 3 * node + direction;
-            rows.extend(list.iter().flat_map(|n| 3 * n..3 * n + 3).filter(|row| *row >= column));
-            columns.push(rows.len());
-        }
-    }
-    (columns, rows)
+    lower_triangle(neighbours)
 }

@@ -223,3 +223,36 @@ fn shells_and_manuals_get_their_text() {
     let man = said(&["man"], folder.path());
     assert!(man.contains(".TH") && man.contains("calibrate"));
 }
+
+/// Takes as long as a quick measurement does.
+#[test]
+fn long_a_measurement_goes_into_the_report() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let told = said(&["accuracy", DESIGN, "--quick", "--out", "measured"], folder.path());
+    assert!(told.contains("--accuracy measured"), "{told}");
+    said(&["build", DESIGN, "--accuracy", "measured", "--out", "built"], folder.path());
+    said(&["check", "built"], folder.path());
+    let page = fs::read_to_string(folder.path().join("built/report/index.html")).expect("the page");
+    let measured: Value = serde_json::from_str(
+        &fs::read_to_string(folder.path().join("built/accuracy/accuracy.json")).expect("carried along"),
+    )
+    .expect("JSON");
+    let chapter = page.split("<section id=\"accuracy\">").nth(1).expect("a chapter");
+    let chapter = chapter.split("</section>").next().expect("its end");
+    let ladders = measured["ladders"].as_array().expect("a list").len();
+    assert!(ladders >= 9, "{ladders}");
+    assert_eq!(chapter.matches("<img ").count(), ladders);
+    assert!(page.contains("href=\"#accuracy\"") && page.len() < 5_000_000, "{} bytes", page.len());
+
+    let refused = |arguments: &[&str], part: &str| {
+        let output = domecast(arguments, folder.path());
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        assert!(text.contains(part) && text.contains("domecast accuracy"), "{text}");
+    };
+    refused(&["build", FISHEYE, "--accuracy", "measured"], "another design");
+    refused(&["build", DESIGN, "--accuracy", "built"], "not a build");
+    refused(&["build", DESIGN, "--accuracy", "nowhere"], "nowhere");
+    fs::write(folder.path().join("measured/lens.svg"), "<svg/>").expect("written");
+    refused(&["build", DESIGN, "--accuracy", "measured"], "lens.svg");
+}

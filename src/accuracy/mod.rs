@@ -32,6 +32,7 @@ pub use budget::{Budget, Share};
 pub use clock::{Patience, Timing};
 pub use files::AccuracyFile;
 pub use ladder::{Ladder, Law, Rung};
+pub use page::duration;
 
 use crate::constants;
 use crate::design::{Design, DesignError};

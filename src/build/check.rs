@@ -56,18 +56,7 @@ impl CheckReport {
 /// Only where there is no build to look at: no folder, or no manifest that can be read. Everything else
 /// that is wrong is a finding.
 pub fn check(dir: &Path, step: &mut dyn FnMut(&str)) -> Result<CheckReport, DesignError> {
-    let path = dir.join(MANIFEST_NAME);
-    let fault = |problem: String| {
-        DesignError::at(
-            "",
-            "",
-            problem,
-            format!("a folder that `domecast build` wrote, with its {MANIFEST_NAME}"),
-        )
-    };
-    let text = fs::read_to_string(&path)
-        .map_err(|error| fault(format!("no build can be read here ({error})")).in_file(&path))?;
-    let manifest = Manifest::parse(&text).map_err(|problem| fault(problem).in_file(&path))?;
+    let manifest = Manifest::read(dir, "a folder that `domecast build` wrote")?;
     let mut report = CheckReport { design: manifest.design.name.clone(), findings: Vec::new() };
 
     step("checking files and hashes");
@@ -101,12 +90,11 @@ fn read(dir: &Path, path: &str) -> Result<String, String> {
 /// Every listed file is there, whole; nothing else is.
 fn check_files(dir: &Path, manifest: &Manifest) -> Result<String, String> {
     for file in &manifest.files {
-        // a manifest that was tampered with must not lead out of the folder
-        if Path::new(&file.path).components().any(|part| !matches!(part, std::path::Component::Normal(_))) {
+        if !file.is_inside() {
             return Err(format!("{}: not a path inside the folder", file.path));
         }
         let bytes = fs::read(dir.join(&file.path)).map_err(|error| format!("{}: {error}", file.path))?;
-        if bytes.len() as u64 != file.bytes || sha256_hex(&bytes) != file.sha256 {
+        if !file.is_of(&bytes) {
             return Err(format!("{}: changed since the build (its hash differs)", file.path));
         }
     }

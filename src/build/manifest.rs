@@ -1,9 +1,13 @@
 //! What a build wrote, from which design, with what warnings.
 
+use std::fs;
+use std::path::{Component, Path};
+
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::tree::Tree;
+use crate::design::DesignError;
 
 /// The manifest's name in the folder of a build.
 pub const MANIFEST_NAME: &str = "manifest.json";
@@ -68,6 +72,18 @@ pub struct FileRecord {
     pub sha256: String,
 }
 
+impl FileRecord {
+    /// Whether the path stays in the folder: a manifest that was tampered with must not lead out of it.
+    pub fn is_inside(&self) -> bool {
+        Path::new(&self.path).components().all(|part| matches!(part, Component::Normal(_)))
+    }
+
+    /// Whether this is the file as it was written.
+    pub fn is_of(&self, bytes: &[u8]) -> bool {
+        bytes.len() as u64 == self.bytes && sha256_hex(bytes) == self.sha256
+    }
+}
+
 /// Something that does not stop a build but that its maker should know.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Warning {
@@ -97,6 +113,20 @@ impl Manifest {
             warnings,
             files,
         }
+    }
+
+    /// Reads the manifest of a folder, which must be `allowed`.
+    ///
+    /// # Errors
+    /// No folder, no manifest in it, or one of another kind.
+    pub fn read(dir: &Path, allowed: &str) -> Result<Self, DesignError> {
+        let path = dir.join(MANIFEST_NAME);
+        let fault = |problem: String| {
+            DesignError::at("", "", problem, format!("{allowed}, with its {MANIFEST_NAME}")).in_file(&path)
+        };
+        let text = fs::read_to_string(&path)
+            .map_err(|error| fault(format!("nothing can be read here ({error})")))?;
+        Self::parse(&text).map_err(fault)
     }
 
     /// Reads a manifest's text.

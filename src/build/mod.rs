@@ -6,11 +6,13 @@
 
 pub mod check;
 mod manifest;
+mod measured;
 mod tree;
 
 pub use manifest::{
     DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning, sha256_hex,
 };
+pub use measured::Measured;
 pub use tree::{Tree, WriteError, list_files};
 
 use std::fmt;
@@ -114,14 +116,33 @@ impl Build {
 /// # Errors
 /// The first fault of the design that only shows when it is laid out, loaded or made.
 pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
-    make(design, step).map_err(|error| match error {
+    build_with(design, None, step)
+}
+
+/// [`build`] with what was measured of the design, which goes into the report.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_with(
+    design: &Design,
+    measured: Option<&Measured>,
+    step: &mut dyn FnMut(&str),
+) -> Result<Build, BuildError> {
+    make(design, measured, step).map_err(|error| match error {
         BuildError::Design(error) => design.beside_suspicions(with_value(design, *error)).into(),
         ours @ BuildError::Ours(_) => ours,
     })
 }
 
-fn make(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
+fn make(
+    design: &Design,
+    measured: Option<&Measured>,
+    step: &mut dyn FnMut(&str),
+) -> Result<Build, BuildError> {
     let mut tree = Tree::default();
+    for (path, bytes) in measured.map_or(&[][..], Measured::files) {
+        tree.add(path.as_str(), bytes.clone());
+    }
     let mut warnings: Vec<Warning> = design
         .warnings()
         .iter()

@@ -95,5 +95,10 @@ pub fn run(
         began.elapsed().as_secs_f64(),
         out.join("index.html").display()
     ))?;
+    output.say(&format!(
+        "to have it in the report: domecast build {} --accuracy {}",
+        design_file.display(),
+        out.display()
+    ))?;
     output.result(&json!({ "ok": true, "out": out.display().to_string(), "accuracy": measured }))
 }

@@ -6,23 +6,30 @@ use std::time::{Duration, Instant, SystemTime};
 use serde_json::json;
 
 use super::output::{Failure, Output};
-use crate::build::{self, Build, BuildError};
+use crate::build::{self, Build, BuildError, Measured};
 use crate::design;
 
 /// How often a watched design is looked at: fast enough to feel immediate, slow enough to cost nothing.
 const LOOK: Duration = Duration::from_millis(250);
 
+/// Where to write, and where a measurement of the design lies.
+#[derive(Debug, Clone, Copy)]
+pub struct Folders<'a> {
+    pub out: Option<&'a Path>,
+    pub accuracy: Option<&'a Path>,
+}
+
 /// Makes everything, then writes it whole. With `watch`, again whenever the design file changes.
-pub fn run(output: &Output, design_file: &Path, out: Option<&Path>, watch: bool) -> Result<(), Failure> {
+pub fn run(output: &Output, design_file: &Path, folders: &Folders<'_>, watch: bool) -> Result<(), Failure> {
     if !watch {
-        return once(output, design_file, out, false);
+        return once(output, design_file, folders, false);
     }
     let mut seen = None;
     loop {
         let now = stamp(design_file);
         if seen.as_ref() != Some(&now) {
             seen = Some(now);
-            match once(output, design_file, out, true) {
+            match once(output, design_file, folders, true) {
                 // a fault in the design is what watching is for: say it, and wait for the next save
                 Err(failure @ (Failure::Input(_) | Failure::Write(_))) => output.failure(&failure),
                 other => other?,
@@ -39,25 +46,34 @@ fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
     Some((about.modified().ok()?, about.len()))
 }
 
-fn once(output: &Output, design_file: &Path, out: Option<&Path>, watched: bool) -> Result<(), Failure> {
+fn once(output: &Output, design_file: &Path, folders: &Folders<'_>, watched: bool) -> Result<(), Failure> {
     let began = Instant::now();
     output.step("reading the design");
     let design = design::load(design_file)?;
+    let measured = match folders.accuracy.map(|dir| Measured::read(dir, &design)).transpose() {
+        // a design that is being changed has left its measurement behind; the rest is still wanted
+        Err(error) if watched => {
+            output.warn(&error.to_string());
+            None
+        }
+        other => other?,
+    };
     // what each step took, so that a person sees what their settings cost
     let mut steps: Vec<(String, Instant)> = Vec::new();
     let mut on_step = |doing: &str| {
         steps.push((doing.to_owned(), Instant::now()));
         output.step(doing);
     };
-    let mut result = build::build(&design, &mut on_step).map_err(|error| match error {
-        BuildError::Design(error) => Failure::from(error.in_file(design_file)),
-        BuildError::Ours(what) => Failure::Internal(what),
-    })?;
+    let mut result =
+        build::build_with(&design, measured.as_ref(), &mut on_step).map_err(|error| match error {
+            BuildError::Design(error) => Failure::from(error.in_file(design_file)),
+            BuildError::Ours(what) => Failure::Internal(what),
+        })?;
     let built = Instant::now();
     if watched {
         result.keep_fresh();
     }
-    let out = out.map_or_else(|| PathBuf::from("output").join(design.name()), Path::to_path_buf);
+    let out = folders.out.map_or_else(|| PathBuf::from("output").join(design.name()), Path::to_path_buf);
     output.step("writing");
     result.tree.write(&out).map_err(Failure::Write)?;
     output.steps_done();

@@ -46,6 +46,9 @@ enum Command {
         /// Where to write [default: output/<design name>].
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Show in the report what `domecast accuracy` measured of this design: its folder.
+        #[arg(long, value_name = "DIR")]
+        accuracy: Option<PathBuf>,
         /// Build again whenever the design file is saved, and keep the open page fresh.
         #[arg(long)]
         watch: bool,
@@ -214,7 +217,12 @@ pub fn run() -> ExitCode {
 
 fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
     match command {
-        Command::Build { design, out, watch } => build::run(output, design, out.as_deref(), *watch),
+        Command::Build { design, out, accuracy, watch } => build::run(
+            output,
+            design,
+            &build::Folders { out: out.as_deref(), accuracy: accuracy.as_deref() },
+            *watch,
+        ),
         Command::Accuracy { design, scene, out, quick } => {
             accuracy::run(output, design, scene.as_deref(), out.as_deref(), *quick)
         }

@@ -7,6 +7,7 @@ mod chart;
 mod forces;
 mod html;
 mod making;
+mod measured;
 mod pattern;
 pub mod section;
 
@@ -19,6 +20,7 @@ use crate::layout::report::LayoutReport;
 use crate::parts::Part;
 use html::{escape, figure, number, percent, picture, table};
 pub use making::{Step, steps};
+pub use measured::MEASURED;
 
 /// What the page is made from.
 #[derive(Clone, Copy)]
@@ -60,7 +62,7 @@ impl Subject<'_> {
 
 /// Sections of the page: anchor, heading, content.
 fn chapters(subject: &Subject<'_>) -> Vec<(&'static str, &'static str, String)> {
-    vec![
+    let mut all = vec![
         ("sensor", "The sensor in section", sensor(subject)),
         ("dots", "Dots", pattern::dots(subject)),
         ("coverage", "What the camera covers", pattern::coverage(subject)),
@@ -71,7 +73,12 @@ fn chapters(subject: &Subject<'_>) -> Vec<(&'static str, &'static str, String)> 
         ("constants", "Constants at a glance", constants(subject)),
         ("making", "Making it", making_list(subject)),
         ("files", "All files", files(subject)),
-    ]
+    ];
+    if let Some(measured) = measured::chapter(subject) {
+        let before_making = all.len() - 2;
+        all.insert(before_making, ("accuracy", "What accuracy costs in time", measured));
+    }
+    all
 }
 
 /// The page.
@@ -105,7 +112,7 @@ pub fn page(subject: &Subject<'_>) -> String {
         let _ = write!(text, "<section id=\"{anchor}\">\n<h2>{heading}</h2>\n{content}</section>\n");
     }
     text += "</main>\n<footer><p>Lengths mm, angles degrees, forces N, pixels px. Made by domecast from the design \
-             alone: the same design gives the same page.</p></footer>\n";
+             (and the measurement, where one is shown) alone: the same design gives the same page.</p></footer>\n";
     if let Some(bytes) = subject.file("parts/assembly.glb") {
         let _ = writeln!(
             text,

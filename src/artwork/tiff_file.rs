@@ -97,7 +97,14 @@ fn pack(coverage: &[u8], width: usize) -> Result<Vec<u8>, RenderError> {
     let mut row_bytes = vec![0u8; width.div_ceil(8)];
     for row in coverage.chunks_exact(width) {
         for (byte, pixels) in row_bytes.iter_mut().zip(row.chunks(8)) {
-            *byte = pixels.iter().enumerate().fold(0, |bits, (i, c)| bits | (u8::from(*c >= 128) << (7 - i)));
+            // Nearly all of a film is white.
+            *byte = match <[u8; 8]>::try_from(pixels).map(u64::from_le_bytes) {
+                Ok(0) => 0,
+                Ok(u64::MAX) => 0xff,
+                _ => {
+                    pixels.iter().enumerate().fold(0, |bits, (i, c)| bits | (u8::from(*c >= 128) << (7 - i)))
+                }
+            };
         }
         Packbits.write_to(&mut packed, &row_bytes).map_err(|error| RenderError::Encode(error.to_string()))?;
     }

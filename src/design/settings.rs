@@ -276,7 +276,7 @@ pub fn off_by_tolerances(optics: &SensorOptics, t: &TolerancesSection) -> Vec<Of
     let with = |change: &dyn Fn(&mut OpticsSpec)| {
         let mut changed = spec.clone();
         change(&mut changed);
-        SensorOptics::new(&changed).ok()
+        optics.rebuilt(&changed).ok()
     };
     let axes = [0_usize, 1, 2];
     let moved = |axis: usize| with(&|spec| spec.sensor_from_camera.translation_mm[axis] += t.pupil_mm[axis]);

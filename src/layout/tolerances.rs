@@ -10,7 +10,6 @@ use super::evenness::{evenness_of, in_plane};
 use super::spec::LayoutSpec;
 use crate::design::sections::TolerancesSection;
 use crate::numeric::Rigid;
-use crate::optics::SensorOptics;
 
 /// What tolerances do to a pattern.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -199,7 +198,7 @@ fn sensor(
     let mut pupil_mm = place.translation_mm + shift;
     pupil_mm.z = pupil_mm.z.min(-sheet_mm - LEAST_AIR_MM);
     made.sensor_from_camera = Rigid::new(turn * place.rotation, pupil_mm);
-    let optics = SensorOptics::new(&made).ok()?;
+    let optics = spec.optics.rebuilt(&made).ok()?;
 
     // Each hit is registered anew.
     let moved: Vec<(DVec2, DVec2)> = layout

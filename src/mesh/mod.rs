@@ -25,6 +25,7 @@ mod distance;
 mod error;
 mod exact;
 mod glb;
+mod meets;
 mod picture;
 mod primitives;
 mod rays;

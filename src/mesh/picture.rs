@@ -155,9 +155,22 @@ fn resolved(
         f64::from((depth[at] - depth[next]).abs()) > 2.0 / scale * slant || one.normal.dot(two.normal) < 0.8
     };
     let share = 255.0 / (OVERSAMPLING * OVERSAMPLING) as f32;
+    let level = |sum: f32| (sum * share).round().clamp(0.0, 255.0) as u8;
+    // Within a face, or beside everything, there is nothing to look for.
+    let plain = |x: usize, y: usize| {
+        let (left, right) = (x * OVERSAMPLING, ((x + 1) * OVERSAMPLING).min(w - 1));
+        let id = seen[y * OVERSAMPLING * w + left];
+        let rows = y * OVERSAMPLING..=((y + 1) * OVERSAMPLING).min(h - 1);
+        rows.map(|row| &seen[row * w + left..=row * w + right]).all(|row| row.iter().all(|s| *s == id))
+    };
     let mut out = Vec::with_capacity(3 * width * height);
     for y in 0..height {
         for x in 0..width {
+            if plain(x, y) {
+                let color = face(y * OVERSAMPLING * w + x * OVERSAMPLING).map_or([1.0; 3], |f| f.color);
+                out.extend(color.map(|c| level(c * (OVERSAMPLING * OVERSAMPLING) as f32)));
+                continue;
+            }
             let mut sum = [0.0_f32; 3];
             for (i, j) in (0..OVERSAMPLING * OVERSAMPLING).map(|k| (k % OVERSAMPLING, k / OVERSAMPLING)) {
                 let (px, py) = (x * OVERSAMPLING + i, y * OVERSAMPLING + j);
@@ -169,7 +182,7 @@ fn resolved(
                     *total += dark * c;
                 }
             }
-            out.extend(sum.map(|s| (s * share).round().clamp(0.0, 255.0) as u8));
+            out.extend(sum.map(level));
         }
     }
     out

@@ -7,18 +7,18 @@ use super::{BoundingBox, TriMesh};
 /// A mesh prepared for many rays: a tree of boxes over its triangles.
 #[derive(Debug, Clone)]
 pub struct RayTarget {
-    triangles: Vec<[DVec3; 3]>,
-    nodes: Vec<Node>,
+    pub(super) triangles: Vec<[DVec3; 3]>,
+    pub(super) nodes: Vec<Node>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Node {
-    low: DVec3,
-    high: DVec3,
+pub(super) struct Node {
+    pub(super) low: DVec3,
+    pub(super) high: DVec3,
     /// Triangles `first..first + count` of a leaf; for a branch `count` is 0,
     /// its first child is the next node, and `first` is its second child.
-    first: u32,
-    count: u32,
+    pub(super) first: u32,
+    pub(super) count: u32,
 }
 
 const LEAF: usize = 4;

@@ -87,7 +87,22 @@ impl SensorOptics {
     /// face.
     pub fn new(spec: &OpticsSpec) -> Result<Self, OpticsError> {
         spec.check()?;
-        let lens = Arc::new(Lens::new(spec.lens.clone())?);
+        Self::assemble(spec, Arc::new(Lens::new(spec.lens.clone())?))
+    }
+
+    /// As [`SensorOptics::new`], with this sensor's lens, which takes the longest to prepare, where it is the same.
+    ///
+    /// # Errors
+    /// As [`SensorOptics::new`].
+    pub fn rebuilt(&self, spec: &OpticsSpec) -> Result<Self, OpticsError> {
+        if spec.lens != *self.lens.spec() {
+            return Self::new(spec);
+        }
+        spec.check()?;
+        Self::assemble(spec, Arc::clone(&self.lens))
+    }
+
+    fn assemble(spec: &OpticsSpec, lens: Arc<Lens>) -> Result<Self, OpticsError> {
         let sheet = &spec.layers[..spec.layers.len() - 1];
         let bottom_mm = -sheet.iter().filter_map(|l| l.thickness_mm).sum::<f64>();
         let air = Layer { name: "air".to_owned(), index: [1.0; 3], thickness_mm: None };

@@ -122,6 +122,10 @@ impl Thing {
         Some(Self { name: name.to_owned(), solid, bounds, surface: OnceLock::new() })
     }
 
+    fn surface(&self) -> &RayTarget {
+        self.surface.get_or_init(|| RayTarget::new(&self.solid.to_mesh()))
+    }
+
     /// Whether a spring surely shares no point with this: no triangle comes into a box round any stretch of it,
     /// and it does not begin within.
     fn is_clear_of(&self, spring: &Spring, thing_from_rest: &DAffine3) -> bool {
@@ -129,34 +133,39 @@ impl Thing {
         if bounds.is_apart_from(&self.bounds) {
             return true;
         }
-        let surface = self.surface.get_or_init(|| RayTarget::new(&self.solid.to_mesh()));
-        let near = |stretch: &BoundingBox| surface.comes_near(&stretch.transformed(thing_from_rest));
-        if spring.stretches.iter().any(near) {
-            return false;
-        }
-        let inside = thing_from_rest.transform_point3(spring.start_mm);
-        let beyond = inside + DVec3::Z * (2.0 * self.bounds.size_mm().length());
-        // The first face on the way out of a solid is left through its back.
-        surface.first_hit(inside, beyond).is_none_or(|(_, normal)| normal.z <= 0.0)
+        let near = |stretch: &BoundingBox| self.surface().comes_near(&stretch.transformed(thing_from_rest));
+        !spring.stretches.iter().any(near)
+            && !self.surface().holds(thing_from_rest.transform_point3(spring.start_mm))
     }
 
-    /// Refuses a shared volume; says where its middle is.
-    fn apart_from(&self, other: &Self, when: &str) -> Result<(), PartError> {
-        if self.bounds.is_apart_from(&other.bounds) {
+    /// Refuses a shared volume; says where its middle is. Both in their own frames.
+    fn apart_from(
+        &self,
+        other: &Self,
+        [rest_from_self, rest_from_other]: [&DAffine3; 2],
+        when: &str,
+    ) -> Result<(), PartError> {
+        let other_from_self = rest_from_other.inverse() * *rest_from_self;
+        // Boxes first, then surfaces: most things are far apart, and moving and cutting a solid costs.
+        if self.bounds.transformed(&other_from_self).is_apart_from(&other.bounds)
+            || !other.surface().may_meet(self.surface(), &other_from_self)
+        {
             return Ok(());
         }
-        let shared = self.solid.intersection(&other.solid).map_err(|e| mesh_error(&self.name, e))?;
-        let Some(shared) = shared else { return Ok(()) };
+        let failed = |error| mesh_error(&self.name, error);
+        let moved = self.solid.moved(&other_from_self).map_err(failed)?;
+        let Some(shared) = moved.intersection(&other.solid).map_err(failed)? else { return Ok(()) };
         let volume = shared.volume_mm3();
         if volume <= TOUCHING_MM3 {
             return Ok(());
         }
-        let middle = shared.to_mesh().bounds().map_or(DVec3::ZERO, |b| 0.5 * (b.min_mm + b.max_mm));
+        let bounds = shared.to_mesh().bounds().unwrap_or(other.bounds);
+        let middle = rest_from_other.transform_point3(0.5 * (bounds.min_mm + bounds.max_mm));
         let place = format!(
             "shares {volume:.4} mm3 with {} {when}, about ({:.2}, {:.2}, {:.2}); depth",
             other.name, middle.x, middle.y, middle.z
         );
-        let depth = shared.to_mesh().bounds().map_or(0.0, |b| b.size_mm().min_element());
+        let depth = bounds.size_mm().min_element();
         let field = format!("{} or {}", field_of(&self.name), field_of(&other.name));
         Err(PartError::Infeasible { part: self.name.clone(), place, value_mm: depth, limit_mm: 0.0, field })
     }
@@ -171,6 +180,8 @@ struct Spring {
     stretches: Vec<BoundingBox>,
     /// A point within it, at its lower end.
     start_mm: DVec3,
+    /// The tube as a solid; made when a box comes near.
+    thing: OnceLock<Thing>,
 }
 
 impl Spring {
@@ -185,11 +196,16 @@ impl Spring {
             .into_iter()
             .reduce(|a, b| a.union(&b))
             .ok_or(MeshError::Empty { operation: "a spring's tube" })?;
-        Ok(Self { name, tube, bounds, stretches, start_mm })
+        Ok(Self { name, tube, bounds, stretches, start_mm, thing: OnceLock::new() })
     }
 
-    fn thing(&self) -> Result<Option<Thing>, MeshError> {
-        Ok(Thing::new(&self.name, Solid::from_mesh(&self.tube)?))
+    fn thing(&self) -> Result<&Thing, PartError> {
+        if let Some(thing) = self.thing.get() {
+            return Ok(thing);
+        }
+        let solid = Solid::from_mesh(&self.tube).map_err(|e| mesh_error(&self.name, e))?;
+        let thing = Thing { name: self.name.clone(), solid, bounds: self.bounds, surface: OnceLock::new() };
+        Ok(self.thing.get_or_init(|| thing))
     }
 }
 
@@ -226,7 +242,7 @@ impl Scene {
         for list in [&self.fixed, &self.moving] {
             for (i, one) in list.iter().enumerate() {
                 for other in &list[i + 1..] {
-                    one.apart_from(other, "always")?;
+                    one.apart_from(other, [&DAffine3::IDENTITY; 2], "always")?;
                 }
             }
         }
@@ -234,17 +250,11 @@ impl Scene {
     }
 
     fn between_bodies(&self, m: &Measures, when: &str, pose: &Rigid, chord: Chord) -> Result<(), PartError> {
+        let still = &DAffine3::IDENTITY;
         let rest_from_platform = affine(pose);
-        let moved = |thing: &Thing| {
-            let solid = thing.solid.moved(&rest_from_platform).map_err(|e| mesh_error(&thing.name, e))?;
-            Ok(Thing::new(&thing.name, solid))
-        };
-        // Boxes first: most things are far apart, and moving a solid costs.
         for thing in &self.moving {
-            let bounds = thing.bounds.transformed(&rest_from_platform);
-            let near: Vec<&Thing> = self.fixed.iter().filter(|t| !t.bounds.is_apart_from(&bounds)).collect();
-            if let (false, Some(one)) = (near.is_empty(), moved(thing)?) {
-                near.into_iter().try_for_each(|other| one.apart_from(other, when))?;
+            for other in &self.fixed {
+                thing.apart_from(other, [&rest_from_platform, still], when)?;
             }
         }
         let springs = (0..m.spring_axes_mm.len())
@@ -252,22 +262,15 @@ impl Scene {
             .collect::<Result<Vec<_>, _>>()
             .map_err(|e| mesh_error("spring", e))?;
         let platform_from_rest = rest_from_platform.inverse();
-        let whole = |spring: &Spring| spring.thing().map_err(|e| mesh_error(&spring.name, e));
         for (i, spring) in springs.iter().enumerate() {
-            for other in self.fixed.iter().filter(|t| !t.is_clear_of(spring, &DAffine3::IDENTITY)) {
-                if let Some(one) = whole(spring)? {
-                    one.apart_from(other, when)?;
-                }
+            for other in self.fixed.iter().filter(|t| !t.is_clear_of(spring, still)) {
+                spring.thing()?.apart_from(other, [still, still], when)?;
             }
             for other in springs[i + 1..].iter().filter(|s| !s.bounds.is_apart_from(&spring.bounds)) {
-                if let (Some(one), Some(other)) = (whole(spring)?, whole(other)?) {
-                    one.apart_from(&other, when)?;
-                }
+                spring.thing()?.apart_from(other.thing()?, [still, still], when)?;
             }
-            for thing in self.moving.iter().filter(|t| !t.is_clear_of(spring, &platform_from_rest)) {
-                if let (Some(one), Some(other)) = (whole(spring)?, moved(thing)?) {
-                    one.apart_from(&other, when)?;
-                }
+            for other in self.moving.iter().filter(|t| !t.is_clear_of(spring, &platform_from_rest)) {
+                spring.thing()?.apart_from(other, [still, &rest_from_platform], when)?;
             }
         }
         Ok(())

@@ -79,13 +79,13 @@ pub struct Part {
 type Maker = fn(&Measures) -> Result<Blueprint, PartError>;
 
 impl Blueprint {
-    /// Meshes the part and looks at what came out.
-    fn build(&self) -> Result<Part, PartError> {
+    /// Meshes the part, checks its walls, and looks at what came out.
+    fn build(&self, m: &Measures) -> Result<Part, PartError> {
         let construction = self.construction();
-        let solid = construction
-            .solid(self.chord)
-            .map_err(|error| PartError::Mesh { part: self.name.clone(), error })?;
-        let in_f64 = solid.to_mesh();
+        let made = construction.solid(self.chord).map(|solid| solid.to_mesh());
+        // First the walls: they tell better what is wrong with a part that cannot be made.
+        walls::check(self, m, made.as_ref().ok())?;
+        let in_f64 = made.map_err(|error| PartError::Mesh { part: self.name.clone(), error })?;
         let mesh = in_f64.welded_f32();
         let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
@@ -181,11 +181,7 @@ pub fn build(m: &Measures, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
     (0..makers.len() + hits.len())
         .into_par_iter()
         .filter_map(|i| makers.get(i).map(|make| make(m)).or_else(|| jig(i - makers.len())))
-        .map(|blueprint| {
-            let blueprint = blueprint?;
-            walls::check(&blueprint, m)?;
-            blueprint.build()
-        })
+        .map(|blueprint| blueprint?.build(m))
         .collect::<Vec<_>>()
         .into_iter()
         .collect()

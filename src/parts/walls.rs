@@ -10,10 +10,12 @@
 //!   which one is flat, the distance is least at a corner of one of them, so
 //!   none can be missed but by what the facets' own angles add.
 
+use std::collections::HashSet;
+
 use glam::DVec3;
 
 use super::{Blueprint, Feature, Measures, PartError};
-use crate::mesh::{Chord, Construction, MeshError, Piece, RayTarget, Shape, Solid};
+use crate::mesh::{Chord, Construction, MeshError, Piece, RayTarget, Shape, Solid, TriMesh};
 
 /// Walls are looked for on meshes this coarse, in parts of the limit.
 const CHORD_SHARE: f64 = 0.02;
@@ -25,19 +27,24 @@ const OPPOSITE: f64 = -0.95;
 /// How much longer the way along a normal can be than the wall is thick: two
 /// faces within [`OPPOSITE`], each with its chords.
 const SEARCH: f64 = 1.0 / 0.95 + 2.0 * CHORD_SHARE;
+/// A mesh so many times finer than the search needs costs more to look at than a coarse one costs to make.
+const MUCH_FINER: f64 = 4.0;
+/// Normals that agree to one part in so many are those of one plane.
+const SAME_PLANE: f64 = 1e7;
 
-/// Checks every wall of a printed part against the process.
+/// Checks every wall of a printed part against the process. The part's own mesh, where it is at hand, is looked at
+/// if it is fine enough for the search and not much finer.
 ///
 /// # Errors
 /// The thinnest wall below the limit: where, between what, which field.
-pub(super) fn check(b: &Blueprint, m: &Measures) -> Result<(), PartError> {
+pub(super) fn check(b: &Blueprint, m: &Measures, made: Option<&TriMesh>) -> Result<(), PartError> {
     let limit = m.process.min_wall_mm;
     if !b.printed || limit <= 0.0 {
         return Ok(());
     }
     let failed = |error: MeshError| PartError::Mesh { part: b.name.clone(), error };
     distances(b, limit, &failed)?;
-    thicknesses(b, limit, &failed)
+    thicknesses(b, limit, made, &failed)
 }
 
 /// The piece as a solid at a tolerance, whatever tolerance it has of its own.
@@ -143,20 +150,41 @@ struct Wall {
     facet: DVec3,
 }
 
-fn thicknesses(b: &Blueprint, limit: f64, failed: &dyn Fn(MeshError) -> PartError) -> Result<(), PartError> {
+fn thicknesses(
+    b: &Blueprint,
+    limit: f64,
+    made: Option<&TriMesh>,
+    failed: &dyn Fn(MeshError) -> PartError,
+) -> Result<(), PartError> {
     let coarse = Chord::new(CHORD_SHARE * limit).map_err(failed)?;
     let mut construction: Construction = b.construction();
-    for piece in construction.added.iter_mut().chain(&mut construction.cut) {
-        piece.chord = None;
-    }
-    let mesh = construction.solid(coarse).map_err(failed)?.to_mesh();
-    let target = RayTarget::new(&mesh);
+    let own = construction.added.iter().chain(&construction.cut).filter_map(|piece| piece.chord);
+    let serves = |chord: Chord| {
+        let share = coarse.tolerance_mm() / chord.tolerance_mm();
+        (1.0..MUCH_FINER).contains(&share)
+    };
+    let meshed;
+    let mesh = match made.filter(|_| own.chain([b.chord]).all(serves)) {
+        Some(mesh) => mesh,
+        None => {
+            for piece in construction.added.iter_mut().chain(&mut construction.cut) {
+                piece.chord = None;
+            }
+            meshed = construction.solid(coarse).map_err(failed)?.to_mesh();
+            &meshed
+        }
+    };
+    let target = RayTarget::new(mesh);
+    // Facets of one plane share most of their corners: each is looked at from once.
+    let mut looked = HashSet::new();
     let (skin, search) = (1e-3 * limit, SEARCH * limit);
     let mut thinnest: Option<Wall> = None;
-    for [p, q, r] in mesh.iter_mm() {
+    for (indices, [p, q, r]) in mesh.triangles.iter().zip(mesh.iter_mm()) {
         let Some(normal) = (q - p).cross(r - p).try_normalize() else { continue };
         let middle = (p + q + r) / 3.0;
-        for corner in [p, q, r, middle] {
+        let facing = (normal * SAME_PLANE).to_array().map(|x| x.round() as i64);
+        let corners = indices.iter().zip([p, q, r]).filter(|(index, _)| looked.insert((**index, facing)));
+        for corner in corners.map(|(_, corner)| corner).chain([middle]) {
             // A little inside the facet: no ray runs along its neighbours.
             let inwards = middle - corner;
             let point = corner + inwards * (skin / inwards.length().max(skin)).min(0.25);

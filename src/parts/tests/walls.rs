@@ -18,13 +18,26 @@ fn hole(radius_mm: f64) -> Shape {
     Shape::cylinder(radius_mm, -1.0, 6.0, Fit::Outside)
 }
 
-/// Passes a hundredth of a millimetre above the limit, and is refused as much below it.
+/// Passes a hundredth of a millimetre above the limit, and is refused as much below it; by a mesh of its own and by
+/// the part's.
 #[track_caller]
 fn turns_at_the_limit(field: &str, make: impl Fn(f64) -> Blueprint) {
+    turns(field, &make, false);
+    turns(field, &make, true);
+}
+
+#[track_caller]
+fn turns(field: &str, make: &dyn Fn(f64) -> Blueprint, by_the_parts_mesh: bool) {
     let mut m = Measures::of(&thumb24()).unwrap();
     m.process.min_wall_mm = LIMIT_MM;
-    assert_eq!(walls::check(&make(LIMIT_MM + 0.01), &m), Ok(()));
-    match walls::check(&make(LIMIT_MM - 0.01), &m) {
+    let check = |wall_mm: f64| {
+        let mut b = make(wall_mm);
+        b.chord = crate::mesh::Chord::new(0.01).unwrap();
+        let made = by_the_parts_mesh.then(|| b.construction().solid(b.chord).unwrap().to_mesh());
+        walls::check(&b, &m, made.as_ref())
+    };
+    assert_eq!(check(LIMIT_MM + 0.01), Ok(()));
+    match check(LIMIT_MM - 0.01) {
         Err(PartError::Infeasible { value_mm, limit_mm, field: named, .. }) => {
             assert!((value_mm - (LIMIT_MM - 0.01)).abs() < 0.003, "{value_mm}");
             assert_eq!(limit_mm, LIMIT_MM);

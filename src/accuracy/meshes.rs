@@ -111,7 +111,7 @@ fn without_own_chords(construction: &Construction) -> Construction {
 }
 
 /// How far points of the facets are from the nearest of the exact surfaces, mm.
-fn deviations<'a>(mesh: &'a TriMesh, part: &'a Construction) -> impl Iterator<Item = f64> + 'a {
+pub(super) fn deviations<'a>(mesh: &'a TriMesh, part: &'a Construction) -> impl Iterator<Item = f64> + 'a {
     let step = mesh.triangles.len().div_ceil(MOST_FACETS).max(1);
     mesh.iter_mm()
         .step_by(step)

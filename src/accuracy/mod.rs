@@ -14,6 +14,7 @@ mod files;
 mod frames;
 pub mod ladder;
 mod lens;
+mod light;
 mod meshes;
 mod outline;
 mod page;
@@ -38,6 +39,7 @@ use crate::constants;
 use crate::design::{Design, DesignError};
 use crate::layout::report::LayoutReport;
 use crate::layout::{Layout, LayoutSpec};
+use crate::mechanics::{claims_of, suspension_of};
 use crate::parts::{self, PartError};
 use crate::sim::Scene;
 
@@ -95,7 +97,8 @@ pub struct Accuracy {
     pub ladders: Vec<Ladder>,
     /// What the errors come to.
     pub budgets: Vec<Budget>,
-    /// Frames that have to be averaged for the design's `accuracy.force_n`, where it gives one.
+    /// Frames that have to be averaged for the design's `accuracy.force_n`, where it gives one: at rest and under every
+    /// claimed load, twice over.
     pub frames_to_average: Option<u32>,
     /// Dials that this design does not have, with the reason.
     pub left_out: Vec<String>,
@@ -134,7 +137,7 @@ impl fmt::Display for AccuracyError {
 impl std::error::Error for AccuracyError {}
 
 /// Steps of [`measure`], for a progress bar.
-pub const STEPS: u32 = 11;
+pub const STEPS: u32 = 12;
 
 /// Measures a design, and frames and runtime on a scene of it: the one that is given, or a ball pressed onto it;
 /// `step` is told how many of [`STEPS`] are done and what comes next.
@@ -210,7 +213,7 @@ pub fn measure(
         Ok(ladder) => keep(Some(ladder), ""),
         Err(error) => keep(None, &format!("a touch: {error}")),
     }
-    step(8, "frames");
+    step(8, "light");
     let own;
     let scene = match scene {
         Some(scene) => Ok(scene),
@@ -219,26 +222,33 @@ pub fn measure(
             own.as_ref().map_err(ToString::to_string)
         }
     };
+    match scene.clone().and_then(|scene| light::ladders(scene, patience, quick).map_err(|e| e.to_string())) {
+        Ok(found) if found.is_empty() => keep(None, "light: the scene has none of the design's lights"),
+        Ok(found) => found.into_iter().for_each(|ladder| keep(Some(ladder), "")),
+        Err(error) => keep(None, &format!("light: {error}")),
+    }
+    step(9, "frames");
     match scene.and_then(|scene| frames::ladder(scene, quick).map_err(|error| error.to_string())) {
         Ok((ladder, sequence)) => {
             keep(Some(ladder), "");
-            step(9, "the runtime");
+            step(10, "the runtime");
             let tracker = tracking::ladder(&constants, &sequence, patience);
             keep(tracker, "the runtime: the scene draws no frames, or the constants fit no tracker");
         }
         Err(error) => keep(None, &format!("frames and the runtime: {error}")),
     }
-    step(10, "what it comes to");
+    step(11, "what it comes to");
     let budgets: Vec<Budget> =
         [budget::of_dots(design, &layout, &judged, &ladders), budget::of_force(design, &constants, &ladders)]
             .into_iter()
             .flatten()
             .collect();
-    let noise_n = budgets.iter().filter(|budget| budget.unit == "N").flat_map(|b| &b.shares);
-    let noise_n = noise_n.filter(|share| share.source.starts_with("noise.")).map(|share| share.amount);
-    let frames_to_average = force_n
-        .zip(noise_n.reduce(f64::max))
-        .map(|(asked, noise)| (noise / asked).powi(2).ceil().max(1.0) as u32);
+    let frames_to_average = suspension_of(design).ok().and_then(|suspension| {
+        let held = claims_of(design, &suspension);
+        let poses: Vec<_> =
+            held.iter().filter_map(|case| Some(case.equilibrium.as_ref().ok()?.pose)).collect();
+        constants::frames_to_average(design, &suspension, &poses)
+    });
     let mm = |s: &crate::design::settings::Setting<f64>| SettingRecord {
         field: s.field,
         value: s.value,

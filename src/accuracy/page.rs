@@ -38,7 +38,7 @@ pub fn page(accuracy: &Accuracy) -> String {
     if let Some(frames) = accuracy.frames_to_average {
         let _ = writeln!(
             text,
-            "<li><b>Force.</b> Average {frames} frame(s) to reach <code>accuracy.force_n</code>.</li>"
+            "<li><b>Force.</b> Average {frames} frame(s) to reach <code>accuracy.force_n</code> twice over, as far as noise goes.</li>"
         );
     }
     for left in &accuracy.left_out {

@@ -235,37 +235,85 @@ fn long_chosen_settings_keep_what_is_asked_of_random_designs() {
             d["pattern"]["unprintable"] = "drop".into();
         });
         // a design that cannot be is not what is tested here
-        let Ok(design) = made else { continue };
-        let Ok(spec) = LayoutSpec::of_design(&design) else { continue };
-        let Ok(layout) = Layout::new(&spec) else { continue };
-        done += 1;
-        let settings = design.settings();
-        let in_use_mm = settings.outline_tolerance_mm.value;
-        let outlines = outline::ladder(&spec, &layout, in_use_mm, Some(asked[0]), Patience::QUICK).unwrap();
-        let rung = &outlines.rungs[outlines.in_use.unwrap()];
-        assert!(rung.max_error <= asked[0], "{} of {}", rung.max_error, asked[0]);
-        // a dome that is too large or too small by the chord: dots stay within what is asked
-        let chord_mm = settings.optical_chord_tolerance_mm.value;
-        assert!(chord_mm <= asked[2] && settings.chord_tolerance_mm.value <= asked[2]);
-        for dot in &layout.dots {
-            let off = dot.surface_mm + dot.normal * chord_mm;
-            if let Ok(pixel) = design.optics().project(off) {
-                assert!(pixel.distance(dot.image_px) <= asked[1], "{} px", pixel.distance(dot.image_px));
-            }
-        }
-        // the drawn sensors' mean is as certain as asked: by batches of that size
-        let count = settings.samples.value as usize;
-        if count <= 256 {
-            let tolerances = &design.sections().tolerances;
-            let shifts =
-                crate::layout::tolerances::drawn_shifts_px(&spec, &layout, tolerances, 20 * count as u32);
-            let shifts: Vec<f64> = shifts.into_iter().flatten().collect();
-            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-            let all = mean(&shifts);
-            let batches: Vec<f64> =
-                shifts.chunks_exact(count).map(|batch| (mean(batch) - all).powi(2)).collect();
-            assert!(mean(&batches).sqrt() <= asked[1], "{count} sensors");
-        }
+        done += usize::from(made.is_ok_and(|design| keeps_what_is_asked(&design, asked, 256)));
     }
     assert!(done > 40, "{done}");
+}
+
+/// As above, over the random designs that the parts are tried on, whose parts are measured too.
+#[test]
+fn long_chosen_settings_keep_what_is_asked_over_the_sweep_of_the_parts() {
+    let (mut done, mut measured) = (0, 0);
+    for (index, mut d) in crate::parts::tests::sweep::random_designs(220).enumerate() {
+        // all three in turn from crude to fine, each in its own step
+        let step = |period: usize| (index % period) as f64 / (period - 1) as f64;
+        let asked = [
+            10_f64.powf(-3.5 + 2.0 * step(7)),
+            10_f64.powf(-1.0 + 1.5 * step(5)),
+            10_f64.powf(-1.7 + 1.2 * step(3)),
+        ];
+        d["accuracy"] = serde_json::json!(
+            { "dot_placement_mm": asked[0], "image_px": asked[1], "mesh_mm": asked[2], "force_n": 0.05 }
+        );
+        for (section, field) in [
+            ("tolerances", "samples"),
+            ("print", "outline_tolerance_mm"),
+            ("mesh", "chord_tolerance_mm"),
+            ("mesh", "optical_chord_tolerance_mm"),
+        ] {
+            d[section].as_object_mut().unwrap().remove(field);
+        }
+        d["pattern"]["unseen"] = "drop".into();
+        d["pattern"]["unprintable"] = "drop".into();
+        let Ok(design) = crate::design::from_text(&d.to_string()) else { continue };
+        done += usize::from(keeps_what_is_asked(&design, asked, 32));
+        // not of those that a real printer's limits mostly refuse
+        if index % 6 != 1 {
+            continue;
+        }
+        let built = parts::Measures::of(&design).and_then(|m| parts::build(&m, &[]));
+        let Ok(built) = built else { continue };
+        measured += 1;
+        for part in &built {
+            let worst = meshes::deviations(&part.mesh, &part.construction).fold(0.0, f64::max);
+            assert!(worst <= asked[2], "{index}: {} is {worst} mm off", part.name);
+        }
+    }
+    assert!(done > 150 && measured > 10, "{done} {measured}");
+}
+
+/// Whether the design can be laid out; where it can, its chosen settings must keep what is asked: dots mm, image px,
+/// meshes mm. Drawn sensors are tried up to `most` at a time.
+fn keeps_what_is_asked(design: &Design, asked: [f64; 3], most: usize) -> bool {
+    let Ok(spec) = LayoutSpec::of_design(design) else { return false };
+    let Ok(layout) = Layout::new(&spec) else { return false };
+    let settings = design.settings();
+    let in_use_mm = settings.outline_tolerance_mm.value;
+    let Some(outlines) = outline::ladder(&spec, &layout, in_use_mm, Some(asked[0]), Patience::QUICK) else {
+        return false;
+    };
+    let rung = &outlines.rungs[outlines.in_use.unwrap()];
+    assert!(rung.max_error <= asked[0], "{} of {}", rung.max_error, asked[0]);
+    // a dome that is too large or too small by the chord: dots stay within what is asked
+    let chord_mm = settings.optical_chord_tolerance_mm.value;
+    assert!(chord_mm <= asked[2] && settings.chord_tolerance_mm.value <= asked[2]);
+    for dot in &layout.dots {
+        let off = dot.surface_mm + dot.normal * chord_mm;
+        if let Ok(pixel) = design.optics().project(off) {
+            assert!(pixel.distance(dot.image_px) <= asked[1], "{} px", pixel.distance(dot.image_px));
+        }
+    }
+    // the drawn sensors' mean is as certain as asked: by batches of that size
+    let count = settings.samples.value as usize;
+    if count <= most {
+        let tolerances = &design.sections().tolerances;
+        let shifts =
+            crate::layout::tolerances::drawn_shifts_px(&spec, &layout, tolerances, 20 * count as u32);
+        let shifts: Vec<f64> = shifts.into_iter().flatten().collect();
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let all = mean(&shifts);
+        let batches: Vec<f64> = shifts.chunks_exact(count).map(|batch| (mean(batch) - all).powi(2)).collect();
+        assert!(mean(&batches).sqrt() <= asked[1], "{count} sensors");
+    }
+    true
 }

@@ -9,7 +9,8 @@ use crate::track::{Channel, Frame, MarkState, Motion, Steps, Thresholds, TrackOp
 /// The ladder of options; `None` where the frames have no pictures or the constants fit no tracker.
 pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> Option<Ladder> {
     let plain = TrackOptions::default();
-    let ways: [(&str, TrackOptions); 6] = [
+    let flow = |pyramid_levels| TrackOptions { motion: Motion::LucasKanade, pyramid_levels, ..plain };
+    let ways: [(&str, TrackOptions); 8] = [
         (
             "the paper's steps on every frame as a whole",
             TrackOptions {
@@ -22,8 +23,10 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
             },
         ),
         ("every frame searched as a whole", TrackOptions { search_every: 1, ..plain }),
-        ("Lucas-Kanade from the last centroid", TrackOptions { motion: Motion::LucasKanade, ..plain }),
-        ("grey of three channels", TrackOptions { channel: Channel::Luma, ..plain }),
+        ("Lucas-Kanade from the last centroid, 1 level", flow(1)),
+        ("Lucas-Kanade, pyramid of 2 levels", flow(2)),
+        ("Lucas-Kanade, pyramid of 3 levels", flow(3)),
+        ("green alone", TrackOptions { channel: Channel::Green, ..plain }),
         ("points only, searched where one is lost", TrackOptions { search_every: 0, ..plain }),
         ("as it runs", plain),
     ];
@@ -62,7 +65,7 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
             }
         });
         rungs.push(Rung {
-            way: ["paper", "whole", "flow", "grey", "points", "default"][index],
+            way: ["paper", "whole", "flow 1", "flow 2", "flow 3", "green", "points", "default"][index],
             label: label.to_owned(),
             dial: index as f64 + 1.0,
             max_error,

@@ -19,6 +19,7 @@ use std::fmt;
 
 use crate::artwork::{self, FilmLabel, RenderError};
 use crate::constants;
+use crate::design::settings::SAFETY;
 use crate::design::{Design, DesignError};
 use crate::layout::report::LayoutReport;
 use crate::layout::{Layout, LayoutError, LayoutSpec};
@@ -229,7 +230,15 @@ fn make(
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
     let manifest = Manifest::new(record, records, warnings, &tree);
     tree.add(MANIFEST_NAME, pretty(&manifest));
-    Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines: judged.headlines() })
+    let mut headlines = judged.headlines();
+    if let (Some(asked), Some(frames)) = (&design.sections().accuracy, forces.frames_to_average) {
+        headlines.push(format!(
+            "accuracy.force_n = {}: average {frames} frame{}, which keeps it {SAFETY} times over as far as noise goes",
+            asked.force_n,
+            if frames == 1 { "" } else { "s" }
+        ));
+    }
+    Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines })
 }
 
 /// A file for programs.

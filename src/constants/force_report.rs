@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::json;
 
-use super::resolution::{design_choices, resolution_at};
+use super::resolution::{design_choices, frames_to_average, resolution_at};
 use super::sight::markers_of;
 use super::springs::DesignSprings;
 use crate::design::{Design, DesignError};
@@ -44,6 +44,8 @@ pub struct ForceReport {
     pub lines: Vec<EnvelopeLine>,
     /// Border of pushes (N, along x) and presses (N) at the pole, with what ends each.
     pub border: Vec<([f64; 2], Option<Limit>)>,
+    /// Frames to average for the design's `accuracy.force_n`, where it gives one.
+    pub frames_to_average: Option<u32>,
     /// All of it, for programs.
     pub json: serde_json::Value,
 }
@@ -85,12 +87,13 @@ pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceRep
         directions.par_iter().map(|d| line(&reach(&suspension, &limits, &more, d))).collect();
     let border = push_press_border(&suspension, &limits, &more, radius_mm, 0.0, BORDER_POINTS);
 
-    let mut claims = Vec::new();
+    let (mut claims, mut poses) = (Vec::new(), Vec::new());
     let mut hardest: Option<Wrench> = None;
     for claim in &design.sections().loads.claims {
         let [force, moment, point] = [claim.force_n, claim.moment_nmm, claim.point_mm].map(DVec3::from_array);
         let wrench = Wrench::of_load(force, moment, point, suspension.at_mm());
         let case = try_all(&suspension, &limits, &more, &wrench);
+        poses.extend(case.equilibrium.as_ref().ok().map(|e| e.pose));
         let direction = Direction { name: claim.name.clone(), wrench };
         let reached = reach(&suspension, &limits, &more, &direction);
         if hardest.is_none_or(|h| wrench.force_n.z < h.force_n.z) {
@@ -137,6 +140,7 @@ pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceRep
         .as_ref()
         .ok()
         .and_then(|e| resolution_at(design.optics(), &markers, noise_px, &suspension, &e.pose));
+    let frames_to_average = frames_to_average(design, &suspension, &poses);
     let plain = springs.plain.as_ref().map(|fit| {
         json!({
             "left": fit.left, "naive": fit.naive,
@@ -172,10 +176,11 @@ pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceRep
         "centroid_noise_px": noise_px,
         "resolution_at_rest": at_rest,
         "resolution_at_17_n": pressed,
+        "frames_to_average": frames_to_average,
         "design_choices": design_choices(design.optics(), &markers, noise_px, &suspension),
         "plain_runtime_bias": plain,
     });
-    Ok(ForceReport { lines, border, json })
+    Ok(ForceReport { lines, border, frames_to_average, json })
 }
 
 impl ForceReport {

@@ -27,7 +27,9 @@ pub use model::{
 };
 pub use plain::{Bias, PlainError, PlainFit, PlainInput};
 pub use plain_pnp::PlainRuntimeSolver;
-pub use resolution::{DesignChoice, POSE_AXES, Resolution, WRENCH_AXES, design_choices, resolution_at};
+pub use resolution::{
+    DesignChoice, POSE_AXES, Resolution, WRENCH_AXES, design_choices, frames_to_average, resolution_at,
+};
 pub use sight::{MarkerSight, markers_of};
 pub use springs::{
     DesignSprings, claimed_loads, matrix_of, rows, springs_of, stiffness_between, wrench_by_table,

@@ -4,6 +4,9 @@ use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 use serde::Serialize;
 
+use super::sight::markers_of;
+use crate::design::Design;
+use crate::design::settings::SAFETY;
 use crate::mechanics::{Displacement, Suspension};
 use crate::numeric::Rigid;
 use crate::optics::SensorOptics;
@@ -151,4 +154,21 @@ pub fn design_choices(
         all.push(try_with(change, SensorOptics::new(&changed).ok(), markers));
     }
     all
+}
+
+/// Frames whose mean tells a force to the design's `accuracy.force_n`, with the settings' safety, at rest and at every
+/// pose; `None` where nothing is asked or a marker is not seen.
+///
+/// The noise of frames is independent: the spread of a mean falls with the root of their number. What the constants
+/// are off by does not.
+pub fn frames_to_average(design: &Design, suspension: &Suspension, poses: &[Rigid]) -> Option<u32> {
+    let force_n = design.sections().accuracy.as_ref()?.force_n;
+    let (markers, noise_px) = (markers_of(design), design.sections().noise.white_centroid_px);
+    let one_n = |pose: &Rigid| {
+        let found = resolution_at(design.optics(), &markers, noise_px, suspension, pose)?;
+        Some(found.wrench_sd[..3].iter().map(|sd| sd * sd).sum::<f64>().sqrt())
+    };
+    let rest = one_n(&Rigid::identity())?;
+    let worst_n = poses.iter().filter_map(one_n).fold(rest, f64::max);
+    Some((SAFETY * worst_n / force_n).powi(2).ceil().clamp(1.0, f64::from(u32::MAX)) as u32)
 }

@@ -31,7 +31,7 @@ mod view;
 mod walls;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use std::io::{self, Write};
 

@@ -1,7 +1,7 @@
 mod checks;
 mod exactness;
 mod mechanism;
-mod sweep;
+pub(crate) mod sweep;
 mod walls;
 
 use std::path::Path;

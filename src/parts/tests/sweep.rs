@@ -95,13 +95,18 @@ fn random_design(rng: &mut TestRng, index: usize) -> Value {
     d
 }
 
-fn sweep(count: usize) -> (usize, Vec<String>) {
+/// The first designs of the sweep, always the same.
+pub(crate) fn random_designs(count: usize) -> impl Iterator<Item = Value> {
     let mut runner =
         TestRunner::new_with_rng(Config::default(), TestRng::from_seed(RngAlgorithm::ChaCha, &[7; 32]));
     let mut rng = runner.new_rng();
+    (0..count).map(move |index| random_design(&mut rng, index))
+}
+
+fn sweep(count: usize) -> (usize, Vec<String>) {
     let (mut sound, mut refused) = (0, Vec::new());
-    for index in 0..count {
-        let text = random_design(&mut rng, index).to_string();
+    for (index, design) in random_designs(count).enumerate() {
+        let text = design.to_string();
         let design = match crate::design::from_text(&text) {
             Ok(design) => design,
             Err(error) => {

@@ -15,7 +15,7 @@
 //! | Gaussian blur | only before the search of the whole frame | a centroid over a hundred grey pixels is the better filter, and a blur moves none |
 //! | circular mask | its pixels found once, as row spans of the raw frame | the same pixels, without touching a frame |
 //! | sharpen | on request ([`Steps::sharpen`]) | it lifts thresholded edges, but white noise five times (the root of 29); half-height levels need none |
-//! | grey | one channel, green unless asked otherwise ([`Channel`]) | the constants' indices are those of green: grey mixes three images that dispersion holds up to 2 px apart |
+//! | grey | luma unless asked otherwise ([`Channel`]) | colour filters and JPEG blur single channels: with everything on, dots are 0.025 px off in luma, 0.061 px in green. Green alone is free of dispersion, which shifts luma by 0.006 px on average |
 //! | low / high threshold | half way between local ground and mark ([`Thresholds`]); the paper's fixed ones on request | an edge at half height is where the outline is, whatever the light |
 //! | morphology | on request; else blobs are judged by area and fullness | opening eats at the edge of dots that are seven pixels wide |
 //! | components, centroids | the same in the search; then grey-weighted centroids against the local ground | a binary centroid has whole pixels to count; a grey one of a 7 px dot is good to 0.02 px |

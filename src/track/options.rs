@@ -77,6 +77,8 @@ pub struct TrackOptions {
     pub steps: Steps,
     /// How a dot is found again.
     pub motion: Motion,
+    /// Levels of the pyramid of [`Motion::LucasKanade`], 1 to 5: each doubles the way that a dot can be followed.
+    pub pyramid_levels: usize,
     /// Where displacements and wrenches are counted from.
     pub reference: Reference,
     /// Largest rms of the white markers' residuals that is still a pose, px. The constants' own tolerances say above which
@@ -92,13 +94,14 @@ pub struct TrackOptions {
 impl Default for TrackOptions {
     fn default() -> Self {
         Self {
-            channel: Channel::Green,
+            channel: Channel::Luma,
             thresholds: Thresholds::Adaptive,
             steps: Steps::default(),
             motion: Motion::Predicted,
+            pyramid_levels: 3,
             reference: Reference::Constants,
             most_residual_px: 2.0,
-            most_misplaced: 0.25,
+            most_misplaced: 0.5,
             search_every: 30,
         }
     }

@@ -34,6 +34,8 @@ const FIT_REACH_PX: f64 = 4.0;
 const MOST_AGAIN: usize = 8;
 /// Candidates for each marker, and combinations of them that are tried.
 const CANDIDATES: usize = 4;
+/// Places that are tried for them: most are no discs.
+const PLACES: usize = 12;
 const MOST_COMBINATIONS: usize = 96;
 /// Offsets of centroids from centres change with the pose, by a few hundredths of a pixel a millimetre. After a move of
 /// the first length (mm; a turn counts at ten millimetres) each frame finds some of them anew, the oldest first; after
@@ -83,7 +85,54 @@ pub struct Tracker {
     last_number: Option<u64>,
     since_search: u32,
     reference: ReferenceSum,
+    surplus: Surplus,
     result: Tracked,
+}
+
+/// By how much the markers' residuals scatter more than their own deviations say, as a factor of the variance: the
+/// usual a posteriori variance of unit weight, here over many frames, for one frame has few spare equations. Colour
+/// filters, compression and blur make edges rougher than flats, where a marker's own deviation comes from. What a
+/// marker is off by in every frame is no scatter.
+#[derive(Debug, Clone, Default)]
+struct Surplus {
+    frames: f64,
+    means_px: Vec<DVec2>,
+    factor: f64,
+}
+
+/// Frames over which the scatter is taken.
+const SURPLUS_FRAMES: f64 = 60.0;
+
+impl Surplus {
+    /// The residuals of a frame; frames in which a marker is not seen do not count.
+    fn add(&mut self, residuals: impl Iterator<Item = Option<(DVec2, f64)>>) {
+        let frames = (self.frames + 1.0).min(SURPLUS_FRAMES);
+        let (mut square, mut variance, mut count) = (0.0, 0.0, 0.0);
+        for (mean, residual) in self.means_px.iter_mut().zip(residuals) {
+            let Some((residual, sd_px)) = residual else { return };
+            let before = residual - *mean;
+            *mean += before / frames;
+            square += before.dot(residual - *mean);
+            variance += 2.0 * sd_px * sd_px;
+            count += 2.0;
+        }
+        let spare = (count - 6.0) / count;
+        let here = square / (variance * spare);
+        if count > 6.0 && here.is_finite() {
+            self.frames = frames;
+            self.factor += (here - self.factor) / frames;
+        }
+    }
+
+    /// At least one: what the markers' own deviations say is never made smaller.
+    fn factor(&self) -> f64 {
+        self.factor.max(1.0)
+    }
+
+    fn forget(&mut self) {
+        (self.frames, self.factor) = (0.0, 0.0);
+        self.means_px.fill(DVec2::ZERO);
+    }
 }
 
 /// What the reference frames showed.
@@ -132,7 +181,8 @@ impl Tracker {
             meter,
             scan: Scan::new(width, height),
             identifier: Identifier::new(dots, 1 << 15),
-            flow: (options.motion == Motion::LucasKanade).then(|| Flow::new(width, height)),
+            flow: (options.motion == Motion::LucasKanade)
+                .then(|| Flow::new(width, height, options.pyramid_levels)),
             glance: Glance::default(),
             tracks: vec![DotTrack::default(); dots],
             order: Vec::with_capacity(dots),
@@ -148,6 +198,7 @@ impl Tracker {
             next_offset: 0,
             last_number: None,
             since_search: u32::MAX,
+            surplus: Surplus { means_px: vec![DVec2::ZERO; model.markers.len()], ..Surplus::default() },
             reference: ReferenceSum { displacement: vec![(DVec3::ZERO, 0); dots], ..ReferenceSum::default() },
             result,
             model,
@@ -180,6 +231,7 @@ impl Tracker {
         self.forget_last();
         self.pose = None;
         self.last_number = None;
+        self.surplus.forget();
         self.tracks.fill(DotTrack::default());
         self.reference.frames = 0;
         self.reference.wrench = [0.0; 6];
@@ -404,11 +456,14 @@ impl Tracker {
         let mut found: [[Option<Disc>; CANDIDATES]; 4] = [[None; CANDIDATES]; 4];
         for index in 0..4 {
             let view = views[1][index].or(views[0][index])?;
-            let mut places = [(0.0, DVec2::ZERO); CANDIDATES];
+            let mut places = [(0.0, DVec2::ZERO); PLACES];
             let (start, reach) = (self.model.markers_px[index], self.model.markers_reach_px[index]);
             let n = view.candidates(plane, start, reach, self.white(), &mut places);
             let mut next = 0;
             for (_, at) in &places[..n] {
+                if next == CANDIDATES {
+                    break;
+                }
                 let fits = views.iter().filter_map(|views| views[index]?.fit(plane, *at, FIT_REACH_PX, None));
                 if let Some(disc) = fits.min_by(|a, b| a.misfit.total_cmp(&b.misfit)) {
                     found[index][next] = Some(disc);
@@ -737,7 +792,9 @@ impl Tracker {
         }
         let at_mm = self.model.springs.as_ref().map_or(DVec3::ZERO, Springs::at_mm);
         let transfer = displacement_from_motion(&refined.pose, at_mm);
-        let covariance = transfer * refined.covariance * transfer.transpose();
+        let left = |told: &MarkerResult| Some((told.residual_px?, told.sd_px?));
+        self.surplus.add(result.white_markers.iter().map(left));
+        let covariance = transfer * refined.covariance * transfer.transpose() * self.surplus.factor();
         result.pose_sd = deviations(&covariance);
         if let Some(springs) = &self.model.springs {
             let displacement = Displacement::of_pose(&refined.pose, at_mm);

@@ -21,8 +21,11 @@ const MOST_STEPS: u32 = 12;
 const CENTER_STEPS: u32 = 6;
 /// A step below this ends the fit, px; the next one would be a tenth of it.
 const SETTLED_PX: f64 = 4e-3;
-/// Least difference between marker and ground, levels.
-const LEAST_RISE: f64 = 8.0;
+/// Least difference between marker and ground, levels: what quantisation and a small camera's noise leave of the mean
+/// of nine pixels is a tenth of it. Markers that only the dome's own light reaches rise by little more than ten.
+const LEAST_RISE: f64 = 4.0;
+/// And in parts of the noise of one pixel.
+const LEAST_RISE_IN_NOISE: f64 = 3.0;
 /// Largest half of a window, px.
 const MOST_HALF: i32 = 40;
 
@@ -103,9 +106,12 @@ impl View {
         Some([f64::from(middle) / 9.0, f64::from(top[3])])
     }
 
-    /// By how much the middle is brighter than what is around, levels.
-    fn rise(&self, plane: &Plane<'_>, x: i32, y: i32) -> f64 {
-        self.levels(plane, x, y).map_or(0.0, |[middle, around]| middle - around)
+    /// By what part of itself the middle is brighter than what is around; `None` where that is not enough for a marker.
+    ///
+    /// A part, not levels: a dim marker before the dark rises by less than a bright patch between two dots does.
+    fn rise(&self, plane: &Plane<'_>, x: i32, y: i32) -> Option<f64> {
+        let [middle, around] = self.levels(plane, x, y)?;
+        (middle - around >= LEAST_RISE).then(|| (middle - around) / (middle + LEAST_RISE))
     }
 
     /// The middle of what is as bright as a place, in an outline of the marker's size that moves with it.
@@ -168,10 +174,7 @@ impl View {
                 if at.distance(start) > reach_px {
                     continue;
                 }
-                let rise = self.rise(plane, x, y);
-                if rise < LEAST_RISE {
-                    continue;
-                }
+                let Some(rise) = self.rise(plane, x, y) else { continue };
                 let near = out[..count].iter().position(|(_, p)| p.distance(at) < apart);
                 match near {
                     Some(i) if out[i].0 < rise => out[i] = (rise, at),
@@ -243,7 +246,8 @@ impl View {
         let rms = (left / (count - 5.0).max(1.0)).max(1.0 / 12.0).sqrt();
         // What is a disc, perhaps beside a dome brighter than it, leaves a small part of that unexplained.
         let contrast = rise.max(0.5 * levels[2].abs());
-        if !(settled && rise > LEAST_RISE && rms < 0.25 * contrast) {
+        let clear = rise > LEAST_RISE && rise > LEAST_RISE_IN_NOISE * noise;
+        if !(settled && clear && rms < 0.25 * contrast) {
             return None;
         }
         let inverse = with_floor(&normal).cholesky()?.inverse();

@@ -233,7 +233,7 @@ fn manoeuvre(number: u64) -> (Rigid, f64, f64) {
 }
 
 /// So many frames, or as many as the environment's DOMECAST_FRAMES asks for.
-fn frames_or(default: u64) -> u64 {
+pub fn frames_or(default: u64) -> u64 {
     std::env::var("DOMECAST_FRAMES").map_or(default, |n| n.parse().expect("a number of frames"))
 }
 
@@ -241,8 +241,7 @@ fn frames_or(default: u64) -> u64 {
 #[test]
 fn long_none_is_mislabelled_over_thousands_of_frames() {
     let missing = [3, 40, 41, 120];
-    // The whole dome is sheared by up to two thirds of a pitch: by default that looks like another sensor's constants.
-    let mut tracker = tracker(TrackOptions { most_misplaced: 0.9, ..TrackOptions::default() });
+    let mut tracker = tracker(TrackOptions::default());
     let (mut square, mut count, mut wanted) = (0.0, 0.0, 0.0);
     for number in 0..frames_or(3_000) {
         let (pose, shear, twist) = manoeuvre(number);

@@ -2,12 +2,15 @@
 
 use std::path::PathBuf;
 
-use domecast::sim::{Drawn, Plan, Renderer, Scene};
-use domecast::track::{Frame, MarkState, TrackOptions, Tracked};
+use domecast::sim::scene::SceneFile;
+use domecast::sim::{Around, Drawn, Plan, Renderer, Scene, Scratch};
+use domecast::track::{Frame, MarkState, Reference, TrackOptions, Tracked};
 use glam::DVec2;
 use rayon::prelude::*;
+use serde_json::{Value, json};
 
 use super::{names, tracker};
+use crate::sequences::frames_or;
 
 fn scenes() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("designs/scenes")
@@ -57,6 +60,21 @@ impl Told {
         }
     }
 
+    fn join(&mut self, other: &Self) {
+        self.frames += other.frames;
+        self.square += other.square;
+        self.dots += other.dots;
+        self.wanted += other.wanted;
+        self.worst_px = self.worst_px.max(other.worst_px);
+        self.markers_px = self.markers_px.max(other.markers_px);
+        self.wrenches += other.wrenches;
+        for (sums, more) in self.wrench.iter_mut().zip(&other.wrench) {
+            for (sum, more) in sums.iter_mut().zip(more) {
+                *sum += more;
+            }
+        }
+    }
+
     /// On each axis.
     fn rms_px(&self) -> f64 {
         (0.5 * self.square / self.dots.max(1) as f64).sqrt()
@@ -102,8 +120,8 @@ fn frames_of(scene: &Scene, plan: &Plan, numbers: impl IntoParallelIterator<Item
     drawn
 }
 
-fn track_all(drawn: &[Drawn]) -> Told {
-    let mut tracker = tracker(TrackOptions::default());
+fn track_all(drawn: &[Drawn], options: TrackOptions) -> Told {
+    let mut tracker = tracker(options);
     let mut told = Told::default();
     for drawn in drawn {
         let image = drawn.image.as_ref().expect("a picture");
@@ -125,9 +143,98 @@ fn scenes_of_the_tree_are_tracked() {
         let plan = Plan::of(&scene).expect("a plan");
         let count = scene.frame_count();
         let drawn = frames_of(&scene, &plan, 0..count.min(frames));
-        let told = track_all(&drawn);
+        let told = track_all(&drawn, TrackOptions::default());
         println!("{}: {}", scene.name(), told.line());
         assert!(told.rms_px() < 0.05 && told.worst_px < 1.0, "{}: {}", scene.name(), told.line());
         assert!(told.dots as f64 > 0.99 * told.wanted as f64, "{}: {}", scene.name(), told.line());
+    }
+}
+
+/// Frames of one touch.
+const TOUCH: u32 = 60;
+
+/// A ball that comes down somewhere near the pole, presses, shears, twists and lets go, under the sensor's own lights
+/// and before a camera with everything that a camera does.
+fn touch(seed: u64) -> Value {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut random = |low: f64, high: f64| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        low + (high - low) * (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let radius = random(4.0, 8.0);
+    let (azimuth, polar) = (random(0.0, std::f64::consts::TAU), random(0.0, 0.35));
+    let depth = random(0.3, 0.9);
+    let (shear, way, twist) = (random(0.0, 0.8), random(0.0, std::f64::consts::TAU), random(-12.0, 12.0));
+    let normal = DVec2::from_angle(azimuth).extend(0.0) * polar.sin() + glam::DVec3::Z * polar.cos();
+    let aside = DVec2::from_angle(way).extend(0.0) * shear;
+    let key = |time_s: f64, in_mm: f64, shear: f64, twist_deg: f64| {
+        let at = normal * (10.0 + radius - in_mm) + aside * shear;
+        json!({ "time_s": time_s, "position_mm": at.to_array(), "rotation_deg": [0.0, 0.0, twist_deg] })
+    };
+    json!({
+        "version": 1, "name": format!("touch-{seed}"), "design": "../thumb24.json",
+        "frames": { "count": TOUCH, "rate_hz": 30, "colour": true },
+        "tolerance": { "px": 0.25, "grey": 1 },
+        "contact": { "level": "linear", "element_mm": 1.0 },
+        "objects": [{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": radius }, "path": [
+            key(0.0, -0.3, 0.0, 0.0), key(0.4, -0.1, 0.0, 0.0), key(0.8, depth, 0.0, 0.0), key(1.2, depth, 1.0, 0.0),
+            key(1.6, depth, 0.6, twist), key(2.0, -0.2, 0.6, twist),
+        ]}],
+        "light": {
+            "surround_level": 0.02,
+            "leds": { "level_per_mw_mm2": 450, "stray_level": 0.005, "crosstalk": 0.08 },
+        },
+        "ink": { "edge_mm": 0.03 },
+        "electronics": {
+            "vignetting_exponent": 1.0, "focus": { "pupil_diameter_mm": 0.15, "distance_mm": 15.5 },
+            "shutter": { "exposure_s": 0.004, "readout_s": 0.008 }, "bayer": "rggb",
+            "noise": { "full_scale_electrons": 8000, "read_electrons": 4 }, "jpeg_quality": 95,
+        },
+        "seed": seed,
+    })
+}
+
+/// Every frame of a touch with every effect that there is.
+fn drawn_with_everything(file: &Value) -> Vec<Drawn> {
+    let file: SceneFile = domecast::design::from_value(file).expect("a scene's fields");
+    let design = domecast::design::load(&scenes().join("../thumb24.json")).expect("the design");
+    let scene = Scene::new(file, &scenes(), design).expect("a scene");
+    let plan = Plan::everything(&scene).expect("a plan");
+    let renderer = Renderer::new(&scene, &plan).expect("its effects");
+    let mut touches = Vec::new();
+    if let Some(mut stepper) = renderer.stepper().expect("a contact") {
+        for number in 0..scene.frame_count() {
+            let time_s = scene.time_s(number);
+            touches.push(stepper.next(number, time_s, &mut Default::default()).expect("a solved touch"));
+        }
+    }
+    (0..scene.frame_count())
+        .into_par_iter()
+        .map_init(Scratch::default, |scratch, number| {
+            let around = Around::of(&touches, number as usize);
+            renderer.frame_around(number, around.as_ref(), scratch).expect("a frame")
+        })
+        .collect()
+}
+
+// Everything that the simulator can do, noise included. Also run over 10,000 frames.
+#[test]
+fn long_everything_at_once_is_tracked() {
+    let mut all = Told::default();
+    for seed in 0..frames_or(60).div_ceil(TOUCH.into()) {
+        // As a robot does: what it reads before it touches anything counts as nothing.
+        let options = TrackOptions { reference: Reference::Frames(12), ..TrackOptions::default() };
+        let told = track_all(&drawn_with_everything(&touch(seed)), options);
+        println!("touch {seed}: {}", told.line());
+        all.join(&told);
+    }
+    println!("all: {}", all.line());
+    assert!(all.rms_px() < 0.05 && all.worst_px < 1.0, "{}", all.line());
+    assert!(all.dots as f64 > 0.99 * all.wanted as f64, "{}", all.line());
+    for (axis, [mean, sd, said]) in all.wrench().into_iter().enumerate() {
+        let most = if axis < 3 { 0.02 } else { 0.2 };
+        assert!(mean.abs() < most && sd < 1.5 * said, "axis {axis}: {mean} {sd} {said}");
     }
 }

@@ -67,8 +67,9 @@ pub struct TrackArguments {
     /// Raw frames of this size: WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb.
     #[arg(long)]
     raw: Option<RawSize>,
-    /// The channel that marks are measured in.
-    #[arg(long, value_enum, default_value = "green")]
+    /// The channel that marks are measured in: colour filters and JPEG leave luma whole, where they are not, green is
+    /// free of dispersion.
+    #[arg(long, value_enum, default_value = "luma")]
     channel: ChannelName,
     /// The paper's fixed levels, BLACK,WHITE (0 to 255), instead of adaptive ones.
     #[arg(long, value_parser = levels)]
@@ -76,6 +77,9 @@ pub struct TrackArguments {
     /// Follow dots by pyramidal Lucas-Kanade, as the paper does.
     #[arg(long)]
     flow: bool,
+    /// Levels of its pyramid: each doubles the way that a dot can be followed.
+    #[arg(long, default_value_t = 3, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=5), requires = "flow")]
+    pyramid_levels: usize,
     /// Sharpen before the whole frame is searched.
     #[arg(long)]
     sharpen: bool,
@@ -94,6 +98,10 @@ pub struct TrackArguments {
     /// Largest rms of the white markers' residuals that is still a pose, px.
     #[arg(long, default_value_t = 2.0)]
     most_residual_px: f64,
+    /// Share of the dots' spacing by which three quarters of them may be misplaced before the constants are called
+    /// another sensor's.
+    #[arg(long, default_value_t = 0.5)]
+    most_misplaced: f64,
 }
 
 fn levels(text: &str) -> Result<[u8; 2], String> {
@@ -118,10 +126,11 @@ impl TrackArguments {
                 .map_or(Thresholds::Adaptive, |[black, white]| Thresholds::Fixed { black, white }),
             steps: Steps { blur: !self.no_blur, sharpen: self.sharpen, open: self.open },
             motion: if self.flow { Motion::LucasKanade } else { Motion::Predicted },
+            pyramid_levels: self.pyramid_levels,
             reference: self.reference.map_or(Reference::Constants, Reference::Frames),
             search_every: self.search_every,
             most_residual_px: self.most_residual_px,
-            ..TrackOptions::default()
+            most_misplaced: self.most_misplaced,
         }
     }
 }

@@ -7,8 +7,8 @@ use glam::DVec2;
 
 use crate::track::frame::Plane;
 
-/// Levels of the pyramid: the coarsest sees a quarter of the pixels in each direction.
-const LEVELS: usize = 3;
+/// Most levels of the pyramid: the coarsest then sees a sixteenth of the pixels in each direction.
+pub const MOST_LEVELS: usize = 5;
 /// Half of the patch, px: a dot and its ground.
 const HALF: i32 = 7;
 const SIDE: usize = (2 * HALF + 1) as usize;
@@ -60,19 +60,20 @@ impl Level {
 /// Two pyramids, of the last frame and of this one, which change places.
 #[derive(Debug, Clone, Default)]
 pub struct Flow {
-    last: [Level; LEVELS],
-    now: [Level; LEVELS],
+    last: Vec<Level>,
+    now: Vec<Level>,
     has_last: bool,
 }
 
 impl Flow {
-    /// Ready for frames of one size.
-    pub fn new(width: usize, height: usize) -> Self {
+    /// Ready for frames of one size; 1 to [`MOST_LEVELS`] levels, the finest the frame itself.
+    pub fn new(width: usize, height: usize, levels: usize) -> Self {
         let level = |k: usize| {
             let (width, height) = (width.div_ceil(1 << k), height.div_ceil(1 << k));
             Level { width, height, bytes: vec![0; width * height] }
         };
-        Self { last: std::array::from_fn(level), now: std::array::from_fn(level), has_last: false }
+        let pyramid = || (0..levels.clamp(1, MOST_LEVELS)).map(level).collect::<Vec<_>>();
+        Self { last: pyramid(), now: pyramid(), has_last: false }
     }
 
     /// The frame that came before is forgotten.
@@ -92,7 +93,7 @@ impl Flow {
         for (y, row) in self.now[0].bytes.chunks_exact_mut(width).enumerate() {
             plane.row_into(0, y, row);
         }
-        for k in 1..LEVELS {
+        for k in 1..self.now.len() {
             let (fine, coarse) = self.now.split_at_mut(k);
             if let (Some(fine), Some(coarse)) = (fine.last(), coarse.first_mut()) {
                 halve(fine, coarse);
@@ -107,7 +108,7 @@ impl Flow {
             return None;
         }
         let mut shift = DVec2::ZERO;
-        for k in (0..LEVELS).rev() {
+        for k in (0..self.now.len()).rev() {
             let scale = f64::from(1_u32 << k);
             let (last, now) = (&self.last[k], &self.now[k]);
             let start = from / scale;

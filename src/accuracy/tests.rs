@@ -279,7 +279,7 @@ fn long_chosen_settings_keep_what_is_asked_over_the_sweep_of_the_parts() {
             assert!(worst <= asked[2], "{index}: {} is {worst} mm off", part.name);
         }
     }
-    assert!(done > 150 && measured > 10, "{done} {measured}");
+    assert!(done > 150 && measured >= 8, "{done} {measured}");
 }
 
 /// Whether the design can be laid out; where it can, its chosen settings must keep what is asked: dots mm, image px,

@@ -32,6 +32,7 @@ mod shape;
 mod solid;
 mod stl;
 mod threemf;
+mod tree;
 mod triangles;
 
 #[cfg(test)]
@@ -48,4 +49,5 @@ pub use shape::{Construction, Piece, Profile, ProfileEdge, Shape};
 pub use solid::Solid;
 pub use stl::{read_stl, write_stl};
 pub use threemf::write_3mf;
+pub use tree::{BoxTree, Cornered};
 pub use triangles::{BoundingBox, TriMesh};

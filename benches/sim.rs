@@ -121,8 +121,9 @@ fn drawing_s(
     let began = clock_s();
     for k in 0..count {
         let around = Around::of(touches, k as usize);
-        if let Err(error) = renderer.frame_around(k, around.as_ref(), scratch) {
-            println!("frame {k}: {error}");
+        match renderer.frame_around(k, around.as_ref(), scratch) {
+            Ok(drawn) => drawn.image.into_iter().for_each(|image| scratch.give_back(image)),
+            Err(error) => println!("frame {k}: {error}"),
         }
     }
     (clock_s() - began) / f64::from(count)
@@ -141,11 +142,15 @@ fn line(what: &str, seconds: [f64; 2]) {
 fn main() {
     let Some(design) = design_with(|_| {}) else { return };
     let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
-    let parts: [(&str, fn(&Design)); 3] = [("frames", frames), ("effects", effects), ("slopes", slopes)];
-    for (name, part) in parts {
-        if wanted.is_empty() || wanted.iter().any(|word| word == name) {
-            part(&design);
-        }
+    let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
+    if is_wanted("frames") {
+        frames(&design);
+    }
+    if is_wanted("effects") {
+        effects(&design);
+    }
+    if is_wanted("slopes") {
+        slopes(&design);
     }
 }
 

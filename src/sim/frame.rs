@@ -27,8 +27,13 @@ impl Frame {
 
     /// The code of each value: `255 value^(1/gamma)`, rounded, as interleaved bytes.
     pub fn encode(&self, gamma: f64) -> Image8 {
+        self.encode_into(gamma, Vec::new())
+    }
+
+    /// [`Frame::encode`] in room that is there already; what it holds does not matter.
+    pub fn encode_into(&self, gamma: f64, mut bytes: Vec<u8>) -> Image8 {
         let coder = Coder::new(gamma);
-        let mut bytes = vec![0; self.width * self.height * self.planes.len()];
+        bytes.resize(self.width * self.height * self.planes.len(), 0);
         match self.planes.as_slice() {
             [red, green, blue] => {
                 // In runs that stay in the nearest cache: codes first, channel by channel, then woven.

@@ -143,7 +143,8 @@ fn random_scene(dice: &mut Dice) -> Value {
     }
     camera_of(dice, &mut scene);
     if dice.often(0.1) {
-        scene["light"]["leds"] = json!({ "level_per_mw_mm2": dice.between(200.0, 900.0), "stray_level": 0.005 });
+        scene["light"]["leds"] =
+            json!({ "level_per_mw_mm2": dice.between(200.0, 900.0), "stray_level": 0.005 });
     }
     if dice.often(0.15) {
         touched(dice, &mut scene);

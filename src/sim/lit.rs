@@ -258,7 +258,10 @@ impl<const N: usize> Lit<N> {
                         self.samples.push(sample);
                     }
                     if *known != Known::Misses {
-                        self.levels.iter_mut().filter_map(|levels| levels.get_mut(at)).for_each(|level| *level = 0.0);
+                        self.levels
+                            .iter_mut()
+                            .filter_map(|levels| levels.get_mut(at))
+                            .for_each(|level| *level = 0.0);
                     }
                     if self.samples.len() >= BATCH {
                         self.light(surface, work);
@@ -311,7 +314,11 @@ impl<const N: usize> Lit<N> {
             // Written so that a NaN, which no light gives, counts as rough.
             off.iter().all(|off| off.abs() <= tolerance)
         });
-        if smooth || self.foreseen((x, y), half, creased, tolerance) { Verdict::Smooth } else { Verdict::Rough }
+        if smooth || self.foreseen((x, y), half, creased, tolerance) {
+            Verdict::Smooth
+        } else {
+            Verdict::Rough
+        }
     }
 
     /// The nine nodes of a square, or what it is if they do not belong together.

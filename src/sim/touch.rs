@@ -11,7 +11,9 @@ use super::scene::{Held, Scene, State};
 use super::work::Work;
 use crate::design::DesignError;
 use crate::mechanics::Displacement;
-use crate::mechanics::contact::{Contact, ContactError, ContactState, Elastomer, Level, PressStatus, Pressed};
+use crate::mechanics::contact::{
+    Contact, ContactError, ContactState, Elastomer, Level, PressStatus, Pressed,
+};
 use crate::numeric::Rigid;
 
 /// The dome touched at one time.
@@ -112,7 +114,8 @@ fn way_out(error: &ContactError) -> Option<String> {
             (depth_mm - limit_mm).max(0.0)
         )),
         ContactError::BadPose(_) => Some(
-            "let `position_mm` start outside the dome and `press.direction` point from there to the dome".into(),
+            "let `position_mm` start outside the dome and `press.direction` point from there to the dome"
+                .into(),
         ),
         _ => None,
     }

@@ -134,7 +134,8 @@ impl Contact {
         };
         // Loading in steps where the whole force is not found at once.
         let whole = task.run(x.clone(), before.and_then(|pressed| pressed.learnt.as_ref()))?;
-        if !matches!(whole.status, PressStatus::NotBalanced { residual_n } if residual_n > FAR_OFF * force_n) {
+        if !matches!(whole.status, PressStatus::NotBalanced { residual_n } if residual_n > FAR_OFF * force_n)
+        {
             return Ok(whole);
         }
         let (mut best, mut iterations) = (whole, 0);

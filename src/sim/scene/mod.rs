@@ -24,8 +24,8 @@ pub use motion::{Held, Motion, State};
 use object::SceneObject;
 
 use super::SimError;
-use super::touch::Between;
 use super::effect::{EffectChoice, EffectName};
+use super::touch::Between;
 
 /// Points that carry a dot's outline.
 pub const RIM_POINTS: usize = 8;

@@ -209,23 +209,24 @@ fn whole(with: Option<EffectName>) -> Value {
 }
 
 fn effects(design: &Design) {
-    const FEW_ROUNDS: usize = 3;
-    println!("\n== cost of each effect: a frame with everything, less a frame without it");
+    /// Pairs of runs, one right after the other: others may load the machine now more, now less.
+    const PAIRS: usize = 5;
+    println!("\n== cost of each effect: a frame with it, less one without it (median of {PAIRS} pairs)");
     let took = |value: &Value| {
-        let seconds = scene_of(design, value).and_then(|scene| frame_s(&scene, FEW_ROUNDS));
+        let seconds = scene_of(design, value).and_then(|scene| frame_s(&scene, 1));
         seconds.map_or(f64::NAN, |s| s[0] + s[1])
     };
-    let all = took(&whole(None));
-    println!("{:<20} {:>9.3} ms", "everything", 1e3 * all);
+    let all = whole(None);
+    println!("{:<20} {:>9.3} ms", "everything", 1e3 * median((0..PAIRS).map(|_| took(&all)).collect()));
     for effect in EffectName::ALL {
         // Effects of time draw the picture many times over: they are added instead.
-        let cost = if matches!(effect, EffectName::MotionBlur | EffectName::RollingShutter) {
-            took(&whole(Some(effect))) - all
-        } else {
-            let mut value = whole(None);
-            value["effects"][effect.as_str()] = json!("never");
-            all - took(&value)
-        };
+        let added = matches!(effect, EffectName::MotionBlur | EffectName::RollingShutter);
+        let mut less = all.clone();
+        if !added {
+            less["effects"][effect.as_str()] = json!("never");
+        }
+        let more = if added { whole(Some(effect)) } else { all.clone() };
+        let cost = median((0..PAIRS).map(|_| took(&more) - took(&less)).collect());
         println!("{:<20} {:>9.3} ms", effect.as_str(), 1e3 * cost);
     }
 }

@@ -1,5 +1,6 @@
 //! How fast the simulator is on one core: frames a second, the cost of each effect, and how time grows with the size
-//! of the task. Prints tables; `cargo bench --bench sim`.
+//! of the task. Prints tables; `cargo bench --bench sim`, or a part of it: `cargo bench --bench sim -- frames`
+//! (`effects`, `slopes`).
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -120,8 +121,9 @@ fn drawing_s(
     let began = clock_s();
     for k in 0..count {
         let around = Around::of(touches, k as usize);
-        if let Err(error) = renderer.frame_around(k, around.as_ref(), scratch) {
-            println!("frame {k}: {error}");
+        match renderer.frame_around(k, around.as_ref(), scratch) {
+            Ok(drawn) => drawn.image.into_iter().for_each(|image| scratch.give_back(image)),
+            Err(error) => println!("frame {k}: {error}"),
         }
     }
     (clock_s() - began) / f64::from(count)
@@ -139,7 +141,21 @@ fn line(what: &str, seconds: [f64; 2]) {
 
 fn main() {
     let Some(design) = design_with(|_| {}) else { return };
-    if let Some(scene) = scene_of(&design, &push(false, false)) {
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|word| word == name);
+    if is_wanted("frames") {
+        frames(&design);
+    }
+    if is_wanted("effects") {
+        effects(&design);
+    }
+    if is_wanted("slopes") {
+        slopes(&design);
+    }
+}
+
+fn frames(design: &Design) {
+    if let Some(scene) = scene_of(design, &push(false, false)) {
         println!("== frames a second, one core, 640 x 480, {} dots", scene.dots().len());
         let plan = Plan::everything(&scene).and_then(|plan| Ok((Renderer::new(&scene, &plan)?, plan)));
         if let Ok((renderer, _)) = plan {
@@ -162,32 +178,60 @@ fn main() {
         ("direct light, closed-form contact", ball("closed_form", 1.0)),
         ("direct light, linear finite elements", ball("linear", 1.0)),
     ] {
-        if let Some(seconds) = scene_of(&design, &value).and_then(|scene| frame_s(&scene, ROUNDS)) {
+        if let Some(seconds) = scene_of(design, &value).and_then(|scene| frame_s(&scene, ROUNDS)) {
             line(what, seconds);
         }
     }
+}
 
-    println!("\n== cost of each effect: a frame with everything, less a frame without it");
-    let mut whole = ball("geometric", 1.0);
-    whole["effects"] = json!({});
-    whole["frames"]["count"] = json!(3);
-    whole["ink"] = json!({ "edge_mm": 0.05 });
-    whole["electronics"] = json!({
-        "vignetting_exponent": 1.5, "focus": { "pupil_diameter_mm": 0.2, "distance_mm": 15.5 },
-        "shutter": { "exposure_s": 0.005, "readout_s": 0.01 }, "bayer": "rggb",
+/// A lit scene under a ball with every effect that a picture at one instant has, and those of time on request.
+fn whole(with: Option<EffectName>) -> Value {
+    let mut scene = ball("geometric", 1.0);
+    scene["effects"] = json!({});
+    scene["frames"]["count"] = json!(4);
+    scene["ink"] = json!({ "edge_mm": 0.05 });
+    scene["electronics"] = json!({
+        "vignetting_exponent": 1.5, "focus": { "pupil_diameter_mm": 0.2, "distance_mm": 15.5 }, "bayer": "rggb",
         "noise": { "full_scale_electrons": 4000, "read_electrons": 4 }, "jpeg_quality": 90,
     });
-    let all =
-        scene_of(&design, &whole).and_then(|scene| frame_s(&scene, 2)).map_or(f64::NAN, |s| s[0] + s[1]);
-    println!("{:<20} {:>9.3} ms", "everything", 1e3 * all);
-    for effect in EffectName::ALL {
-        let mut value = whole.clone();
-        value["effects"][effect.as_str()] = json!("never");
-        if let Some(seconds) = scene_of(&design, &value).and_then(|scene| frame_s(&scene, 2)) {
-            println!("{:<20} {:>9.3} ms", effect.as_str(), 1e3 * (all - seconds[0] - seconds[1]));
+    match with {
+        Some(EffectName::MotionBlur) => {
+            scene["electronics"]["shutter"] = json!({ "exposure_s": 0.005, "readout_s": 0.0 });
         }
+        Some(EffectName::RollingShutter) => {
+            scene["electronics"]["shutter"] = json!({ "exposure_s": 0.0, "readout_s": 0.01 });
+        }
+        _ => {}
     }
+    // Else the plan's times would be as close as the tolerance of a billionth asks.
+    scene["tolerance"] = json!({ "px": 0.05, "grey": 2 });
+    scene
+}
 
+fn effects(design: &Design) {
+    /// Pairs of runs, one right after the other: others may load the machine now more, now less.
+    const PAIRS: usize = 5;
+    println!("\n== cost of each effect: a frame with it, less one without it (median of {PAIRS} pairs)");
+    let took = |value: &Value| {
+        let seconds = scene_of(design, value).and_then(|scene| frame_s(&scene, 1));
+        seconds.map_or(f64::NAN, |s| s[0] + s[1])
+    };
+    let all = whole(None);
+    println!("{:<20} {:>9.3} ms", "everything", 1e3 * median((0..PAIRS).map(|_| took(&all)).collect()));
+    for effect in EffectName::ALL {
+        // Effects of time draw the picture many times over: they are added instead.
+        let added = matches!(effect, EffectName::MotionBlur | EffectName::RollingShutter);
+        let mut less = all.clone();
+        if !added {
+            less["effects"][effect.as_str()] = json!("never");
+        }
+        let more = if added { whole(Some(effect)) } else { all.clone() };
+        let cost = median((0..PAIRS).map(|_| took(&more) - took(&less)).collect());
+        println!("{:<20} {:>9.3} ms", effect.as_str(), 1e3 * cost);
+    }
+}
+
+fn slopes(design: &Design) {
     println!("\n== slopes");
     for share in [0.5, 1.0, 2.0] {
         let grown = design_with(|value| {
@@ -235,7 +279,7 @@ fn main() {
     }
     for element_mm in [2.0, 1.0, 0.5] {
         if let Some(seconds) =
-            scene_of(&design, &ball("linear", element_mm)).and_then(|scene| frame_s(&scene, ROUNDS))
+            scene_of(design, &ball("linear", element_mm)).and_then(|scene| frame_s(&scene, ROUNDS))
         {
             line(&format!("elements of {element_mm} mm"), seconds);
         }

@@ -8,6 +8,8 @@ pub mod printing {}
 pub mod casting {}
 #[doc = include_str!("guide/force.md")]
 pub mod force {}
+#[doc = include_str!("guide/simulating.md")]
+pub mod simulating {}
 #[doc = include_str!("guide/tracking.md")]
 pub mod tracking {}
 #[doc = include_str!("guide/accuracy.md")]

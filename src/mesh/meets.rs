@@ -3,7 +3,8 @@
 use glam::{DAffine3, DVec3};
 
 use super::BoundingBox;
-use super::rays::{Node, RayTarget};
+use super::rays::RayTarget;
+use super::tree::Node;
 
 /// Room that counts as touching, in parts of the coordinates: rounding.
 const ROUNDING: f64 = 1e-12;
@@ -21,7 +22,7 @@ impl RayTarget {
 
     /// Whether a point is within a closed surface.
     pub fn holds(&self, point_mm: DVec3) -> bool {
-        let Some(root) = self.nodes.first() else { return false };
+        let Some(root) = self.tree.nodes().first() else { return false };
         if (root.low - point_mm).max(point_mm - root.high).max_element() > 0.0 {
             return false;
         }
@@ -35,7 +36,9 @@ impl RayTarget {
     fn touches(&self, other: &Self, self_from_other: &DAffine3) -> bool {
         let mut pairs = vec![(0_u32, 0_u32)];
         while let Some((mine, others)) = pairs.pop() {
-            let (Some(a), Some(b)) = (self.nodes.get(mine as usize), other.nodes.get(others as usize)) else {
+            let (Some(a), Some(b)) =
+                (self.tree.nodes().get(mine as usize), other.tree.nodes().get(others as usize))
+            else {
                 continue;
             };
             let moved = BoundingBox { min_mm: b.low, max_mm: b.high }.transformed(self_from_other);

@@ -33,6 +33,7 @@ mod shape;
 mod solid;
 mod stl;
 mod threemf;
+mod tree;
 mod triangles;
 
 #[cfg(test)]
@@ -49,4 +50,5 @@ pub use shape::{Construction, Piece, Profile, ProfileEdge, Shape};
 pub use solid::Solid;
 pub use stl::{read_stl, write_stl};
 pub use threemf::write_3mf;
+pub use tree::{BoxTree, Cornered};
 pub use triangles::{BoundingBox, TriMesh};

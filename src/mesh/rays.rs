@@ -2,40 +2,22 @@
 
 use glam::DVec3;
 
+use super::tree::{BoxTree, Node, STACK};
 use super::{BoundingBox, TriMesh};
 
 /// A mesh prepared for many rays: a tree of boxes over its triangles.
 #[derive(Debug, Clone)]
 pub struct RayTarget {
     pub(super) triangles: Vec<[DVec3; 3]>,
-    pub(super) nodes: Vec<Node>,
+    pub(super) tree: BoxTree,
 }
-
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Node {
-    pub(super) low: DVec3,
-    pub(super) high: DVec3,
-    /// Triangles `first..first + count` of a leaf; for a branch `count` is 0,
-    /// its first child is the next node, and `first` is its second child.
-    pub(super) first: u32,
-    pub(super) count: u32,
-}
-
-const LEAF: usize = 4;
-/// Deepest way down the tree: every level halves its triangles, whose number fits into 32 bits, and leaves one
-/// sibling waiting.
-const STACK: usize = 36;
 
 impl RayTarget {
     /// Prepares a mesh.
     pub fn new(mesh: &TriMesh) -> Self {
         let mut triangles: Vec<[DVec3; 3]> = mesh.iter_mm().collect();
-        let mut nodes = Vec::with_capacity(triangles.len());
-        let n = triangles.len();
-        if n > 0 {
-            grow(&mut triangles, 0, n, &mut nodes);
-        }
-        Self { triangles, nodes }
+        let tree = BoxTree::over(&mut triangles);
+        Self { triangles, tree }
     }
 
     /// Where the segment from `from_mm` to `to_mm` first meets a triangle: the
@@ -80,7 +62,8 @@ impl RayTarget {
         };
         let mut reach = 1.0_f64;
         let mut stack = [(0_u32, 0.0_f64); STACK];
-        let Some(mut depth) = self.nodes.first().and_then(|root| enters(root, reach)).map(|_| 1) else {
+        let nodes = self.tree.nodes();
+        let Some(mut depth) = nodes.first().and_then(|root| enters(root, reach)).map(|_| 1) else {
             return;
         };
         while depth > 0 {
@@ -89,9 +72,9 @@ impl RayTarget {
             if enter > reach * (1.0 + 1e-12) + 1e-12 {
                 continue;
             }
-            let Some(node) = self.nodes.get(index as usize) else { continue };
+            let Some(node) = nodes.get(index as usize) else { continue };
             if node.count == 0 {
-                let child = |i: u32| Some((i, enters(self.nodes.get(i as usize)?, reach)?));
+                let child = |i: u32| Some((i, enters(nodes.get(i as usize)?, reach)?));
                 let (one, two) = (child(index + 1), child(node.first));
                 let nearer_first = match (one, two) {
                     (Some(p), Some(q)) if p.1 <= q.1 => [two, one],
@@ -120,11 +103,12 @@ impl RayTarget {
         let apart =
             |low: DVec3, high: DVec3| (low - bounds.max_mm).max(bounds.min_mm - high).max_element() > 0.0;
         let mut stack = [0_u32; STACK];
-        let mut depth = usize::from(!self.nodes.is_empty());
+        let nodes = self.tree.nodes();
+        let mut depth = usize::from(!nodes.is_empty());
         while depth > 0 {
             depth -= 1;
             let index = stack[depth];
-            let Some(node) = self.nodes.get(index as usize) else { continue };
+            let Some(node) = nodes.get(index as usize) else { continue };
             if apart(node.low, node.high) {
                 continue;
             }
@@ -141,37 +125,6 @@ impl RayTarget {
             }
         }
         false
-    }
-}
-
-/// Builds the subtree of a range of triangles; splits at the median of the
-/// longest side, which depends on nothing but the triangles.
-fn grow(triangles: &mut [[DVec3; 3]], start: usize, count: usize, nodes: &mut Vec<Node>) {
-    let part = &mut triangles[start..start + count];
-    let corners = || part.iter().flatten().copied();
-    let low = corners().fold(DVec3::splat(f64::INFINITY), DVec3::min);
-    let high = corners().fold(DVec3::splat(f64::NEG_INFINITY), DVec3::max);
-    let here = nodes.len();
-    nodes.push(Node { low, high, first: start as u32, count: count as u32 });
-    if count <= LEAF {
-        return;
-    }
-    let size = high - low;
-    let axis = if size.x >= size.y.max(size.z) {
-        0
-    } else if size.y >= size.z {
-        1
-    } else {
-        2
-    };
-    let middle = |t: &[DVec3; 3]| t[0][axis] + t[1][axis] + t[2][axis];
-    let half = count / 2;
-    part.select_nth_unstable_by(half, |a, b| middle(a).total_cmp(&middle(b)));
-    grow(triangles, start, half, nodes);
-    let second = nodes.len() as u32;
-    grow(triangles, start + half, count - half, nodes);
-    if let Some(node) = nodes.get_mut(here) {
-        *node = Node { low, high, first: second, count: 0 };
     }
 }
 

@@ -249,15 +249,19 @@ impl SensorOptics {
         Ok(self.surface_point(pixel, field_angle_rad, &hit))
     }
 
-    /// [`SensorOptics::trace`] and the ray's unit direction inside the dome, away from the camera.
+    /// Where a pixel's chief ray meets the dome, and its unit direction inside, away from the camera. Here the sphere goes on
+    /// below the dome's base: a ray that comes up beside the base is followed back to it. What lies on
+    /// the dome then goes on smoothly for a way beyond its outline in the image.
     ///
     /// # Errors
-    /// As `trace`.
-    pub fn trace_inside(&self, pixel: DVec2) -> Result<(SurfacePoint, DVec3), Limit> {
+    /// As `trace`, less the rays that pass the base but not the sphere.
+    #[inline]
+    pub fn trace_continued(&self, pixel: DVec2) -> Result<(DVec3, DVec3), Limit> {
         let ray = self.lens.unproject(pixel)?;
-        let field_angle_rad = Lens::field_angle_rad(ray);
-        let hit = self.meet(ray, field_angle_rad)?;
-        Ok((self.surface_point(pixel, field_angle_rad, &hit), hit.inside))
+        // Only a pupil that moves asks for the angle.
+        let field_angle_rad = if self.lens.is_central() { 0.0 } else { Lens::field_angle_rad(ray) };
+        let (hit, _) = self.meet_sphere(ray, field_angle_rad)?;
+        Ok((hit.point, hit.inside))
     }
 
     pub(super) fn surface_point(&self, pixel: DVec2, field_angle_rad: f64, hit: &Hit) -> SurfacePoint {
@@ -272,6 +276,16 @@ impl SensorOptics {
     /// A ray of the camera, through the layers and on to the dome.
     #[inline]
     pub(super) fn meet(&self, ray: DVec3, field_angle_rad: f64) -> Result<Hit, Limit> {
+        match self.meet_sphere(ray, field_angle_rad)? {
+            (hit, false) => Ok(hit),
+            (_, true) => Err(Limit::MissesDome),
+        }
+    }
+
+    /// [`Self::meet`]; a ray that comes up beside the dome's base is followed back to the sphere below, and said to be
+    /// so.
+    #[inline]
+    fn meet_sphere(&self, ray: DVec3, field_angle_rad: f64) -> Result<(Hit, bool), Limit> {
         let direction = self.sensor_from_camera.vector(ray);
         let origin = if self.lens.is_central() {
             self.sensor_from_camera.translation_mm
@@ -290,29 +304,36 @@ impl SensorOptics {
             DVec2::new(origin.x, origin.y) + p * (gap_mm / direction.z + travel(&self.plates, direction.z));
         let radius = self.dome_radius_mm;
         let distance = base.length();
-        // Also refuses NaN, from a ray so grazing that its travel overflowed.
-        if distance.is_nan() || distance > radius * (1.0 + RIM_ROUNDING) {
+        // From a ray so grazing that its travel overflowed.
+        if !distance.is_finite() {
             return Err(Limit::MissesDome);
         }
+        let beside = distance > radius * (1.0 + RIM_ROUNDING);
         let n = self.fill.index;
         let up = (self.fill.excess + direction.z * direction.z).sqrt() / n;
         let sideways = p / n;
         // |base + s (sideways, up)| = radius: s^2 + 2 b s - c = 0.
         let b = base.dot(sideways);
-        let c = ((radius - distance) * (radius + distance)).max(0.0);
+        let mut c = (radius - distance) * (radius + distance);
+        if !beside {
+            c = c.max(0.0);
+        } else if b <= 0.0 || b * b + c <= 0.0 {
+            return Err(Limit::MissesDome);
+        }
         let root = (b * b + c).sqrt();
         // The root that does not cancel.
         let s = if b > 0.0 { c / (b + root) } else { root - b };
         let flat = base + sideways * s;
         let point = DVec3::new(flat.x, flat.y, up * s);
-        Ok(Hit {
+        let hit = Hit {
             direction,
             gap_mm,
             inside: DVec3::new(sideways.x, sideways.y, up),
             inside_mm: s,
             // Onto the sphere to the last bit that the arithmetic has.
             point: point * (radius / point.length()),
-        })
+        };
+        Ok((hit, beside))
     }
 
     /// The pixel that sees a point of the sensor frame (millimetres): on the

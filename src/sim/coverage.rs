@@ -1,5 +1,7 @@
 //! How much of each pixel a polygon covers, exactly.
 
+use std::ops::Range;
+
 use glam::DVec2;
 
 /// Coverage of the pixels of a box by a polygon, 0 to 1.
@@ -11,6 +13,9 @@ pub struct Coverage {
     height: usize,
     values: Vec<f32>,
 }
+
+/// Less of a share is rounding: what the running sum leaves behind a polygon.
+pub const LEAST_SHARE: f32 = 1e-4;
 
 /// No polygon covers a wider box; a larger one is clipped first.
 const LARGEST_BOX_PX: f64 = 20_000.0;
@@ -106,6 +111,19 @@ impl Coverage {
             clamp(self.left + self.width as i64, width),
             clamp(self.top + self.height as i64, height),
         ]
+    }
+
+    /// By row of a picture, the columns between the first and last pixel with a share worth the name.
+    pub fn spans(&self, width: usize, height: usize, spans: &mut Vec<Range<usize>>) {
+        spans.clear();
+        spans.resize(height, 0..0);
+        for (y, x, part) in self.rows(width, height) {
+            let first = part.iter().position(|share| *share > LEAST_SHARE);
+            let last = part.iter().rposition(|share| *share > LEAST_SHARE);
+            if let (Some(first), Some(last), Some(span)) = (first, last, spans.get_mut(y)) {
+                *span = x + first..x + last + 1;
+            }
+        }
     }
 
     /// Pixels of the box.

@@ -8,7 +8,7 @@
 //! About the pressed part the nodes lie close; where the rest of the dome moves as well, it does so smoothly, and a wide
 //! chart with fewer nodes serves.
 
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use super::touch::Between;
 
@@ -42,7 +42,8 @@ struct Chart {
     half_mm: f64,
     nodes: usize,
     per_step: f64,
-    moved: Vec<DVec3>,
+    /// Displacements, mm; the fourth number is nothing.
+    moved: Vec<Vec4>,
 }
 
 /// A point of the deformed membrane.
@@ -88,39 +89,69 @@ impl Dent {
         Some((dent, nodes))
     }
 
-    /// The deformed membrane at a point of the undeformed dome; `None` outside the charts, where it does not move.
-    pub fn at(&self, rest_mm: DVec3) -> Option<Dented> {
-        let close = self.close.as_ref().and_then(|chart| chart.at(rest_mm));
-        close.or_else(|| self.wide.as_ref()?.at(rest_mm))
+    /// The place of a chart that serves a point of the undeformed dome best.
+    fn near(&self, rest_mm: DVec3) -> Option<(&Chart, [f64; 2], Moved)> {
+        [&self.close, &self.wide].into_iter().flatten().find_map(|chart| {
+            let place = chart.place(rest_mm);
+            Some((chart, place, chart.at(place)?))
+        })
     }
 
     /// Where a ray that meets the undeformed dome at `rest_mm` along the unit direction `inside` meets the deformed
-    /// one: the undeformed place of that point, and how it moved. `None` where the membrane does not move.
+    /// one: the undeformed place of that point, and how it moved. `None` where the membrane does not move. `near_mm` is how
+    /// a point nearby moved, or zero: there the search begins.
     ///
-    /// The point sought is `p` with `p + u(p)` on the ray: `p` is where the ray, moved back by `u`, meets the
-    /// sphere. Repeating that shrinks the error by the slope of `u`, which is below 1 for a membrane that does
-    /// not fold.
-    pub fn meet(&self, rest_mm: DVec3, inside: DVec3) -> Option<(DVec3, Dented)> {
-        let radius_mm = rest_mm.length();
-        let mut place = rest_mm;
-        let mut dented = self.at(place)?;
-        for _ in 0..MOST_STEPS {
-            let base = rest_mm - dented.displacement_mm;
-            // |base + s inside| = R; the root near zero.
-            let b = base.dot(inside);
-            let c = radius_mm * radius_mm - base.length_squared();
-            let root = (b * b + c).max(0.0).sqrt();
-            let s = if b > 0.0 { c / (b + root) } else { root - b };
-            let next = base + inside * s;
-            let step = (next - place).length_squared();
-            place = next * (radius_mm / next.length().max(1e-12));
-            dented = self.at(place)?;
-            if step < CLOSE_MM * CLOSE_MM {
-                break;
+    /// Newton's method on the chart: the ray meets the tangent plane of the moved membrane, and the way there along the
+    /// plane is the next step. A step that does not shrink gives way to the plain one, the point of the sphere on the
+    /// ray moved back by the displacement, which does as long as the membrane does not fold.
+    pub fn meet(&self, rest_mm: DVec3, inside: DVec3, near_mm: DVec3) -> Option<(DVec3, Dented)> {
+        let mut place =
+            if near_mm == DVec3::ZERO { rest_mm } else { back_on_sphere(rest_mm, inside, near_mm) };
+        let mut last = f64::INFINITY;
+        for step in 1..=MOST_STEPS {
+            let (chart, [x, y], moved) = self.near(place)?;
+            let normal = moved.along_x.cross(moved.along_y);
+            let surface = place + moved.displacement_mm;
+            let along = (surface - rest_mm).dot(normal) / inside.dot(normal);
+            let miss = rest_mm + inside * along - surface;
+            let miss2 = miss.length_squared();
+            if miss2 < CLOSE_MM * CLOSE_MM || step == MOST_STEPS {
+                let normal = normal.try_normalize().unwrap_or(place / chart.radius_mm);
+                return Some((place, Dented { displacement_mm: moved.displacement_mm, normal }));
             }
+            // NaN, of a ray along the plane, is no smaller either.
+            place = if miss2 < 0.25 * last && miss2 < FARTHEST_MM * FARTHEST_MM {
+                let per = normal.length_squared().recip();
+                let (a, b) = (miss.cross(moved.along_y).dot(normal), moved.along_x.cross(miss).dot(normal));
+                chart.point(x + a * per, y + b * per)
+            } else {
+                back_on_sphere(rest_mm, inside, moved.displacement_mm)
+            };
+            last = miss2;
         }
-        Some((place, dented))
+        None
     }
+}
+
+/// Where a ray moved back by a displacement meets the sphere that it met at `rest_mm`.
+fn back_on_sphere(rest_mm: DVec3, inside: DVec3, displacement_mm: DVec3) -> DVec3 {
+    let radius_mm = rest_mm.length();
+    let base = rest_mm - displacement_mm;
+    // |base + s inside| = R; the root near zero.
+    let b = base.dot(inside);
+    let c = radius_mm * radius_mm - base.length_squared();
+    let root = (b * b + c).max(0.0).sqrt();
+    let s = if b > 0.0 { c / (b + root) } else { root - b };
+    let next = base + inside * s;
+    next * (radius_mm / next.length().max(1e-12))
+}
+
+/// The membrane at a place of a chart.
+struct Moved {
+    displacement_mm: DVec3,
+    /// Tangents of the moved membrane: its derivatives by the chart's coordinates.
+    along_x: DVec3,
+    along_y: DVec3,
 }
 
 impl Chart {
@@ -141,7 +172,8 @@ impl Chart {
                 at_mm.push(chart.point(place(column), place(row)));
             }
         }
-        chart.moved = between.displacements_mm(&at_mm);
+        let moved = between.displacements_mm(&at_mm);
+        chart.moved = moved.into_iter().map(|u| u.as_vec3().extend(0.0)).collect();
         chart
     }
 
@@ -151,52 +183,61 @@ impl Chart {
         self.middle * (self.radius_mm * (1.0 - 0.5 * s)) + (self.side * x + self.up * y) * k
     }
 
-    /// As [`Dent::at`], of this chart.
-    fn at(&self, rest_mm: DVec3) -> Option<Dented> {
+    /// Coordinates of a point of the undeformed dome, mm.
+    #[inline]
+    fn place(&self, rest_mm: DVec3) -> [f64; 2] {
         let along = rest_mm.dot(self.middle) / self.radius_mm;
         let stretch = (2.0 / (1.0 + along).max(1e-9)).sqrt();
-        let (x, y) = (rest_mm.dot(self.side) * stretch, rest_mm.dot(self.up) * stretch);
+        [rest_mm.dot(self.side) * stretch, rest_mm.dot(self.up) * stretch]
+    }
+
+    /// The membrane at a place; `None` outside the chart.
+    #[inline]
+    fn at(&self, [x, y]: [f64; 2]) -> Option<Moved> {
         let (gx, gy) = ((x + self.half_mm) * self.per_step, (y + self.half_mm) * self.per_step);
         let last = self.nodes as f64 - 2.0;
         if !(gx >= 1.0 && gy >= 1.0 && gx < last && gy < last) {
             return None;
         }
         let (i, j) = (gx as usize, gy as usize);
-        let (wx, dx) = cubic(gx - i as f64);
-        let (wy, dy) = cubic(gy - j as f64);
-        let (mut u, mut by_x, mut by_y) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
-        for (row, (wy, dy)) in wy.into_iter().zip(dy).enumerate() {
+        let (wx, dx) = cubic((gx - i as f64) as f32);
+        let (wy, dy) = cubic((gy - j as f64) as f32);
+        let (mut u, mut by_x, mut by_y) = (Vec4::ZERO, Vec4::ZERO, Vec4::ZERO);
+        for row in 0..4 {
             let start = (j - 1 + row) * self.nodes + i - 1;
-            let four = self.moved.get(start..start + 4)?;
-            let (mut across, mut slope) = (DVec3::ZERO, DVec3::ZERO);
-            for (node, (wx, dx)) in four.iter().zip(wx.into_iter().zip(dx)) {
-                across += *node * wx;
-                slope += *node * dx;
-            }
-            u += across * wy;
-            by_x += slope * wy;
-            by_y += across * dy;
+            let [a, b, c, d] = *self.moved.get(start..start + 4)? else { return None };
+            let across = (a * wx[0] + b * wx[1]) + (c * wx[2] + d * wx[3]);
+            let slope = (a * dx[0] + b * dx[1]) + (c * dx[2] + d * dx[3]);
+            u += across * wy[row];
+            by_x += slope * wy[row];
+            by_y += across * dy[row];
         }
         // Tangents of the chart, then of the moved surface.
         let r2 = self.radius_mm * self.radius_mm;
         let k = (1.0 - (x * x + y * y) / (4.0 * r2)).max(1e-12).sqrt();
         let bend = 1.0 / (4.0 * r2 * k);
         let (side, up) = (self.side, self.up);
-        let tangent_x = side * (k - x * x * bend) - up * (x * y * bend) - self.middle * (x / self.radius_mm);
-        let tangent_y = up * (k - y * y * bend) - side * (x * y * bend) - self.middle * (y / self.radius_mm);
-        let normal = (tangent_x + by_x * self.per_step).cross(tangent_y + by_y * self.per_step);
-        let rest_normal = rest_mm / self.radius_mm;
-        Some(Dented { displacement_mm: u, normal: normal.try_normalize().unwrap_or(rest_normal) })
+        let per_radius = 1.0 / self.radius_mm;
+        let tangent_x = side * (k - x * x * bend) - up * (x * y * bend) - self.middle * (x * per_radius);
+        let tangent_y = up * (k - y * y * bend) - side * (x * y * bend) - self.middle * (y * per_radius);
+        let wide = |v: Vec4| v.truncate().as_dvec3();
+        Some(Moved {
+            displacement_mm: wide(u),
+            along_x: tangent_x + wide(by_x) * self.per_step,
+            along_y: tangent_y + wide(by_y) * self.per_step,
+        })
     }
 }
 
 /// Repetitions of [`Dent::meet`]; a slope of 0.5 leaves a thousandth after ten.
 const MOST_STEPS: u32 = 10;
-/// A step this short ends it, mm: a hundredth of a pixel.
-const CLOSE_MM: f64 = 1e-3;
+/// A step this short ends it, mm: hundredths of a pixel.
+const CLOSE_MM: f64 = 3e-4;
+/// A step longer than this is none of Newton's, mm.
+const FARTHEST_MM: f64 = 1.0;
 
 /// Weights of the four nodes around a place between the middle two, and their derivatives.
-fn cubic(t: f64) -> ([f64; 4], [f64; 4]) {
+fn cubic(t: f32) -> ([f32; 4], [f32; 4]) {
     let (t2, t3) = (t * t, t * t * t);
     let weights = [
         0.5 * (2.0 * t2 - t - t3),

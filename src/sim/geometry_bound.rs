@@ -3,10 +3,12 @@
 use glam::DVec2;
 
 use super::SimError;
+use super::effects::contact::level_named;
 use super::eye::Eye;
 use super::instant::Instant;
 use super::pipeline::{Geometry, Pipeline};
-use super::scene::{Scene, State};
+use super::scene::file::LevelName;
+use super::scene::{LookedAt, Scene};
 use super::spots::Points;
 use super::touch::{Between, Stepper};
 use super::work::Work;
@@ -42,11 +44,22 @@ fn frames(scene: &Scene) -> Vec<u32> {
     (0..MOST_FRAMES).map(|k| (u64::from(k) * last / u64::from(MOST_FRAMES - 1)) as u32).collect()
 }
 
-/// The sensor's states at some frames; under an object by the geometric level, which answers at once.
-fn states(scene: &Scene, frames: &[u32]) -> Result<Vec<(u32, State, Option<Between>)>, SimError> {
+/// A level of contact that answers at once: the geometric one. Under a body with edges its forces have steps, on which a
+/// balance is long in coming, if it comes; there the finite elements are quicker, and where the scene asks for
+/// them anyway they cost nothing more to prepare.
+fn quickest_level(scene: &Scene) -> Level {
+    let edged = scene.objects().iter().any(|object| object.indenter.solid.is_mesh());
+    match scene.file().contact.level {
+        LevelName::Linear | LevelName::NeoHookean if edged => level_named(scene, LevelName::Linear),
+        _ => Level::Geometric,
+    }
+}
+
+/// The sensor's states at some frames; under an object by a quick level.
+fn states(scene: &Scene, frames: &[u32]) -> Result<Vec<LookedAt>, SimError> {
     let mut uncounted = Work::default();
     let mut stepper =
-        if scene.objects().is_empty() { None } else { Some(Stepper::new(scene, Level::Geometric)?) };
+        if scene.objects().is_empty() { None } else { Some(Stepper::new(scene, quickest_level(scene))?) };
     let mut out = Vec::new();
     for frame in frames {
         let time_s = scene.time_s(*frame);
@@ -90,8 +103,8 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
     let colours = if a_eye.channels() == 1 && b_eye.channels() == 1 { 1 } else { scene.planes() };
     let mut last: Vec<DVec2> = Vec::new();
     let (mut worst, mut change): (f64, f64) = (0.0, 0.0);
-    for (frame, state, touch) in states(scene, &frames)? {
-        let time_s = scene.time_s(frame);
+    for (frame, state, touch) in scene.looked_at(|| states(scene, &frames))? {
+        let time_s = scene.time_s(*frame);
         let mut at = |eye: &Eye, geometry: Geometry| {
             Instant::new(scene, eye, geometry, time_s, state.clone(), touch.clone(), None, &mut uncounted)
         };

@@ -94,6 +94,21 @@ fn camera_of(dice: &mut Dice, scene: &mut Value) {
     }
 }
 
+/// A ball that is pressed into the dome, at one of the levels; now and then under lights.
+fn touched(dice: &mut Dice, scene: &mut Value) {
+    scene.as_object_mut().unwrap().remove("motion");
+    if dice.often(0.4) {
+        scene["light"]["leds"] = json!({ "level_per_mw_mm2": 450, "stray_level": 0.005 });
+    }
+    let level = ["geometric", "closed_form", "linear"][(dice.next() * 3.0) as usize];
+    scene["contact"] = json!({ "level": level, "element_mm": 2.0 });
+    let depth = dice.log(0.01, 0.8);
+    scene["objects"] = json!([{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 }, "path": [
+        { "time_s": 0, "position_mm": [0, 0, 14] },
+        { "time_s": 0.06, "position_mm": [dice.between(-1.0, 1.0), 0, 14.0 - depth] },
+    ]}]);
+}
+
 fn random_scene(dice: &mut Dice) -> Value {
     let images = dice.often(0.8);
     let mut scene = json!({
@@ -127,18 +142,12 @@ fn random_scene(dice: &mut Dice) -> Value {
         ]});
     }
     camera_of(dice, &mut scene);
-    let what = dice.next();
-    if what < 0.06 {
-        scene["light"]["leds"] = json!({ "level_per_mw_mm2": 450, "stray_level": 0.005 });
-    } else if what < 0.14 {
-        scene.as_object_mut().unwrap().remove("motion");
-        let level = if dice.often(0.5) { "geometric" } else { "closed_form" };
-        scene["contact"] = json!({ "level": level });
-        let depth = dice.log(0.01, 0.8);
-        scene["objects"] = json!([{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 }, "path": [
-            { "time_s": 0, "position_mm": [0, 0, 14] },
-            { "time_s": 0.06, "position_mm": [dice.between(-1.0, 1.0), 0, 14.0 - depth] },
-        ]}]);
+    if dice.often(0.1) {
+        scene["light"]["leds"] =
+            json!({ "level_per_mw_mm2": dice.between(200.0, 900.0), "stray_level": 0.005 });
+    }
+    if dice.often(0.15) {
+        touched(dice, &mut scene);
     }
     if dice.often(0.3) {
         scene["ink"]["broken"] =

@@ -46,4 +46,6 @@ pub use work::Work;
 #[cfg(test)]
 mod honesty;
 #[cfg(test)]
+mod lit_tests;
+#[cfg(test)]
 mod tests;

@@ -9,7 +9,7 @@ use super::effect::EffectName;
 use super::field::{LensField, cap_box, inside, rim_polygon};
 use super::frame::Frame;
 use super::instant::{Instant, units};
-use super::lit::{Lit, LitSurface, PixelBox};
+use super::lit::{Lit, LitSurface};
 use super::pipeline::Pipeline;
 use super::scene::Scene;
 use super::shading::Shading;
@@ -34,6 +34,7 @@ pub struct Parts<'a> {
 #[derive(Debug, Clone, Default)]
 pub struct Painter {
     coverage: Coverage,
+    spans: Vec<Range<usize>>,
     one: Lit<1>,
     three: Lit<3>,
 }
@@ -69,10 +70,12 @@ impl Painter {
         let (width, height) = (frame.width(), frame.height());
         for plane in &mut frame.planes {
             for (y, row) in plane.chunks_exact_mut(width).enumerate().skip(rows.start).take(rows.len()) {
-                row.fill(0.0);
-                if let Some(seen) = row.get_mut(parts.field.row(y)) {
-                    seen.fill(surround);
-                }
+                let seen = parts.field.row(y);
+                let (dark, rest) = row.split_at_mut(seen.start.min(width));
+                let (seen, beyond) = rest.split_at_mut(seen.len().min(rest.len()));
+                dark.fill(0.0);
+                seen.fill(surround);
+                beyond.fill(0.0);
             }
             work.add_base((rows.len() * width) as u64 * units::PIXEL);
         }
@@ -135,7 +138,11 @@ impl Painter {
     ) {
         let (width, height) = (frame.width(), frame.height());
         let [left, top, right, bottom] = self.coverage.bounds(width, height);
-        let within = PixelBox { left, top: top.max(rows.start), right, bottom: bottom.min(rows.end) };
+        self.coverage.spans(width, height, &mut self.spans);
+        for (y, span) in self.spans.iter_mut().enumerate() {
+            let seen = parts.field.row(y);
+            *span = if rows.contains(&y) { span.start.max(seen.start)..span.end.min(seen.end) } else { 0..0 };
+        }
         let surface = LitSurface {
             optics,
             dent: instant.dent.as_ref(),
@@ -156,11 +163,11 @@ impl Painter {
         });
         let center = DVec2::new((left + right) as f64, (top + bottom) as f64) * 0.5;
         if channels.len() == 3 {
-            self.three.fill(&surface, (width, height), within, pressed, work);
-            blend(&self.three, &self.coverage, parts.field, center, rows, frame, channels.start);
+            self.three.fill(&surface, (width, height), &self.spans, pressed, work);
+            blend(&mut self.three, &self.coverage, parts.field, center, rows, frame, channels.start);
         } else {
-            self.one.fill(&surface, (width, height), within, pressed, work);
-            blend(&self.one, &self.coverage, parts.field, center, rows, frame, channels.start);
+            self.one.fill(&surface, (width, height), &self.spans, pressed, work);
+            blend(&mut self.one, &self.coverage, parts.field, center, rows, frame, channels.start);
         }
         work.add_base(self.coverage.area() as u64 * units::PIXEL * channels.len() as u64);
     }
@@ -264,7 +271,7 @@ const PRESSED_MARGIN_MM: f64 = 0.6;
 
 /// Lays the lit membrane over the ground.
 fn blend<const N: usize>(
-    lit: &Lit<N>,
+    lit: &mut Lit<N>,
     coverage: &Coverage,
     field: &LensField,
     center: DVec2,
@@ -275,19 +282,12 @@ fn blend<const N: usize>(
     let (width, height) = (frame.width(), frame.height());
     for (y, x, part) in coverage.rows(width, height).filter(|(y, ..)| rows.contains(y)) {
         let (seen, part) = inside(field.row(y), x, part);
+        lit.complete(y, seen.clone(), part, center);
         // A picture has one plane or three.
-        let mut planes = frame.planes.iter_mut().skip(first);
-        let mut rows_of: [&mut [f32]; N] = std::array::from_fn(|_| {
-            planes
-                .next()
-                .and_then(|p| p.get_mut(y * width + seen.start..y * width + seen.end))
-                .unwrap_or_default()
-        });
-        for (k, (share, level)) in part.iter().zip(lit.row(y, seen.clone(), part, center)).enumerate() {
-            for (lane, values) in rows_of.iter_mut().enumerate() {
-                if let Some(value) = values.get_mut(k) {
-                    *value += share * (level[lane] - *value);
-                }
+        for (lane, plane) in frame.planes.iter_mut().skip(first).take(N).enumerate() {
+            let Some(values) = plane.get_mut(y * width + seen.start..y * width + seen.end) else { continue };
+            for ((value, share), level) in values.iter_mut().zip(part).zip(lit.row(lane, y, seen.clone())) {
+                *value += share * (level - *value);
             }
         }
     }

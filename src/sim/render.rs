@@ -43,6 +43,14 @@ pub struct Scratch {
     painter: Painter,
     frame: Option<Frame>,
     part: Option<Frame>,
+    bytes: Vec<u8>,
+}
+
+impl Scratch {
+    /// Takes back a picture that is not needed any more: the next one is coded in its place.
+    pub fn give_back(&mut self, image: Image8) {
+        self.bytes = image.bytes;
+    }
 }
 
 /// A frame with its truth and the work that it took.
@@ -299,7 +307,8 @@ impl<'a> Renderer<'a> {
         for pass in self.pipeline.passes.iter().filter(|pass| pass.stage() > Stage::Focus) {
             pass.run(&mut frame, &context, work);
         }
-        let mut image = frame.encode(scene.file().electronics.gamma);
+        let bytes = std::mem::take(&mut scratch.bytes);
+        let mut image = frame.encode_into(scene.file().electronics.gamma, bytes);
         for pass in &self.pipeline.coded_passes {
             pass.run(&mut image, &context, work);
         }

@@ -205,7 +205,8 @@ fn an_object_in_the_sheet_is_named_with_its_frame() {
     match drawn.map(|_| ()) {
         Err(SimError::Input(error)) => {
             assert_eq!(error.field, "objects[0].path");
-            assert!(error.problem.contains("frame 0"), "{error}");
+            assert!(error.problem.contains("frame 0, `o`: the object reaches 2.000 mm"), "{error}");
+            assert!(error.help.as_ref().is_some_and(|help| help.contains("at least 2.000 mm")), "{error}");
         }
         other => panic!("{other:?}"),
     }

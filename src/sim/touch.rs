@@ -11,7 +11,9 @@ use super::scene::{Held, Scene, State};
 use super::work::Work;
 use crate::design::DesignError;
 use crate::mechanics::Displacement;
-use crate::mechanics::contact::{Contact, ContactState, Elastomer, Level, PressStatus, Pressed};
+use crate::mechanics::contact::{
+    Contact, ContactError, ContactState, Elastomer, Level, PressStatus, Pressed,
+};
 use crate::numeric::Rigid;
 
 /// The dome touched at one time.
@@ -70,12 +72,16 @@ impl<'a> Stepper<'a> {
             }
         };
         let pressed = solved.map_err(|error| {
-            SimError::from(DesignError::at(
+            let fault = DesignError::at(
                 "objects[0].path",
                 "",
-                format!("frame {frame}: {error}"),
+                format!("frame {frame}, `{}`: {error}", object.name),
                 "an object outside the sheet and no deeper in the dome than the contact's level goes",
-            ))
+            );
+            SimError::from(match way_out(&error) {
+                Some(help) => fault.with_help(help),
+                None => fault,
+            })
         })?;
         work.add(EffectName::Contact, pressed.state.work.max(0.0) as u64);
         let held = match pressed.status {
@@ -93,6 +99,25 @@ impl<'a> Stepper<'a> {
         let contact = (!pressed.state.nodes.is_empty()).then(|| Arc::new(pressed.state.clone()));
         self.last = Some(pressed);
         Ok(Touch { state, contact })
+    }
+}
+
+/// What can be done about an object that cannot be where it is.
+fn way_out(error: &ContactError) -> Option<String> {
+    match error {
+        ContactError::InsideSheet { depth_mm } => Some(format!(
+            "keep all of it at z >= 0: raise `position_mm` by at least {depth_mm:.3} mm, or turn it; at z = 0 lies the sheet that \
+             the dome stands on"
+        )),
+        ContactError::TooDeep { depth_mm, limit_mm } => Some(format!(
+            "move `position_mm` away from the dome by at least {:.3} mm, or leave the depth to a force (`press`)",
+            (depth_mm - limit_mm).max(0.0)
+        )),
+        ContactError::BadPose(_) => Some(
+            "let `position_mm` start outside the dome and `press.direction` point from there to the dome"
+                .into(),
+        ),
+        _ => None,
     }
 }
 

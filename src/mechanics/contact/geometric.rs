@@ -6,6 +6,8 @@
 //! that it changes smoothly: then a ball gets Hertz' force exactly (its push-out is a paraboloid of radius
 //! sqrt(2 Re d)), a cone Sneddon's to 5 %, a flat punch its own to 19 %.
 
+use std::sync::LazyLock;
+
 use glam::DVec3;
 
 use super::solid::Solid;
@@ -22,13 +24,32 @@ const MOST_STEPS: usize = 64;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Placed {
     pub solid: Solid,
-    pub sensor_from_object: Rigid,
+    sensor_from_object: Rigid,
+    object_from_sensor: Rigid,
 }
 
 impl Placed {
+    pub fn new(solid: Solid, sensor_from_object: Rigid) -> Self {
+        Self { solid, sensor_from_object, object_from_sensor: sensor_from_object.inverse() }
+    }
+
+    /// Puts the object to another pose.
+    pub fn move_to(&mut self, sensor_from_object: Rigid) {
+        self.sensor_from_object = sensor_from_object;
+        self.object_from_sensor = sensor_from_object.inverse();
+    }
+
+    pub fn sensor_from_object(&self) -> Rigid {
+        self.sensor_from_object
+    }
+
+    pub fn object_from_sensor(&self) -> Rigid {
+        self.object_from_sensor
+    }
+
     /// Signed distance and outward direction, sensor frame.
     pub fn distance(&self, at_mm: DVec3) -> (f64, DVec3) {
-        let found = self.solid.distance(self.sensor_from_object.inverse().point(at_mm));
+        let found = self.solid.distance(self.object_from_sensor.point(at_mm));
         (found.value_mm, self.sensor_from_object.vector(found.outward))
     }
 
@@ -38,7 +59,17 @@ impl Placed {
     /// Newton's steps along the way; where the surface turns away, the distance itself is a safe step, since no
     /// point of the surface is nearer than that.
     pub fn walk_out(&self, from_mm: DVec3, along: DVec3, most_mm: f64) -> Option<(f64, DVec3)> {
-        let (mut value, mut outward) = self.distance(from_mm);
+        self.walk_on(self.distance(from_mm), from_mm, along, most_mm)
+    }
+
+    /// [`Self::walk_out`] from where the distance is known.
+    fn walk_on(
+        &self,
+        (mut value, mut outward): (f64, DVec3),
+        from_mm: DVec3,
+        along: DVec3,
+        most_mm: f64,
+    ) -> Option<(f64, DVec3)> {
         if value >= 0.0 {
             return Some((0.0, outward));
         }
@@ -94,17 +125,26 @@ pub(super) struct Overlap {
 }
 
 /// Scattered directions over the hemisphere (a golden-angle spiral), for the first look.
-fn spiral(count: usize) -> impl Iterator<Item = DVec3> {
-    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    (0..count).map(move |i| {
-        let z = 1.0 - (i as f64 + 0.5) / count as f64;
-        let (sine, cosine) = (golden * i as f64).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        DVec3::new(r * cosine, r * sine, z)
-    })
+fn first_looks() -> impl Iterator<Item = DVec3> {
+    static SPIRAL: LazyLock<Vec<DVec3>> = LazyLock::new(|| {
+        let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+        let place = |i: usize| {
+            let z = 1.0 - (i as f64 + 0.5) / FIRST_LOOK as f64;
+            let (sine, cosine) = (golden * i as f64).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            DVec3::new(r * cosine, r * sine, z)
+        };
+        (0..FIRST_LOOK).map(place).collect()
+    });
+    SPIRAL.iter().copied()
 }
 
 const FIRST_LOOK: usize = 400;
+
+/// Distance of the first looks, rad: side of a look's share of the hemisphere.
+fn look_spacing() -> f64 {
+    (std::f64::consts::TAU / FIRST_LOOK as f64).sqrt()
+}
 const RINGS: usize = 24;
 const SPOKES: usize = 48;
 const STARTS: usize = 3;
@@ -132,11 +172,23 @@ pub(super) fn deepest(placed: &Placed, radius: f64) -> (DVec3, f64, usize) {
     if nearest_possible > 0.0 {
         return (towards * radius, nearest_possible, queries);
     }
-    let mut looks: Vec<(f64, DVec3)> = spiral(FIRST_LOOK)
-        .chain([towards])
-        .map(|direction| (placed.distance(direction * radius).0, direction))
-        .collect();
-    queries += looks.len();
+    if placed.solid.is_ball() {
+        return (towards * radius, placed.distance(towards * radius).0, queries);
+    }
+    // The deepest place lies within a look's own room of one of them, and no distance changes by more than the way.
+    let room = radius * look_spacing();
+    let mut best = placed.distance(towards * radius).0;
+    let mut looks = vec![(best, towards)];
+    for direction in first_looks() {
+        let at = direction * radius;
+        if at.distance(center) - reach < best + room {
+            let value = placed.distance(at).0;
+            best = best.min(value);
+            looks.push((value, direction));
+            queries += 1;
+        }
+    }
+    looks.retain(|look| look.0 <= best + room);
     looks.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut starts: Vec<(f64, DVec3)> = Vec::new();
     for look in looks {
@@ -197,21 +249,30 @@ pub(super) fn overlap(placed: &Placed, radius: f64) -> Overlap {
     if distance_mm >= 0.0 {
         return found;
     }
-    let axis = deepest_mm / radius;
+    if placed.solid.is_mesh() {
+        found.deepest_mm = pressed_middle(placed, radius);
+        found.queries += FIRST_LOOK;
+    }
+    let axis = found.deepest_mm / radius;
     let (u, v) = frame_of(axis);
-    let place =
-        |angle: f64, azimuth: f64| axis * angle.cos() + (u * azimuth.cos() + v * azimuth.sin()) * angle.sin();
+    let azimuths: [(f64, f64); SPOKES] =
+        std::array::from_fn(|k| ((k as f64 + 0.5) * std::f64::consts::TAU / SPOKES as f64).sin_cos());
+    let spokes = azimuths.map(|(sine, cosine)| u * cosine + v * sine);
     // The cap that holds every touched look, then the same cap looked at closely.
-    let spacing = (2.0 * std::f64::consts::PI / FIRST_LOOK as f64).sqrt();
-    let coarse = spiral(FIRST_LOOK)
-        .filter(|d| placed.distance(*d * radius).0 < 0.0)
-        .map(|d| d.dot(axis).clamp(-1.0, 1.0).acos())
-        .fold(0.0, f64::max)
-        + 1.5 * spacing;
-    let azimuth = |k: usize| (k as f64 + 0.5) * std::f64::consts::TAU / SPOKES as f64;
+    let (center, reach) = placed.solid.bounding_sphere();
+    let center = placed.sensor_from_object().point(center);
+    let coarse = first_looks()
+        .filter(|d| (*d * radius).distance(center) < reach && placed.distance(*d * radius).0 < 0.0)
+        .chain([deepest_mm / radius])
+        .map(|d| d.dot(axis))
+        .fold(1.0, f64::min)
+        .clamp(-1.0, 1.0)
+        .acos()
+        + 1.5 * look_spacing();
     let touched = |angle: f64| {
-        (0..SPOKES / 2).any(|k| {
-            let d = place(angle, azimuth(2 * k));
+        let (sine, cosine) = angle.sin_cos();
+        spokes.iter().step_by(2).any(|spoke| {
+            let d = axis * cosine + *spoke * sine;
             d.z >= 0.0 && placed.distance(d * radius).0 < 0.0
         })
     };
@@ -230,20 +291,23 @@ pub(super) fn overlap(placed: &Placed, radius: f64) -> Overlap {
         // Rings of equal width; each sample stands for its exact share of the sphere.
         let (low, high) = (cap * ring as f64 / RINGS as f64, cap * (ring + 1) as f64 / RINGS as f64);
         let area = radius * radius * (low.cos() - high.cos()) * std::f64::consts::TAU / SPOKES as f64;
-        let angle = 0.5 * (low + high);
-        for spoke in 0..SPOKES {
-            let direction = place(angle, azimuth(spoke));
+        let (sine, cosine) = (0.5 * (low + high)).sin_cos();
+        for spoke in &spokes {
+            let direction = axis * cosine + *spoke * sine;
             if direction.z < 0.0 {
                 continue;
             }
             let at = direction * radius;
             found.queries += 1;
-            if placed.distance(at).0 >= 0.0 {
+            let here = placed.distance(at);
+            let inside_mm = -here.0;
+            if inside_mm <= 0.0 {
                 continue;
             }
             found.queries += 4;
-            match placed.walk_out(at, -direction, radius) {
+            match placed.walk_on(here, at, -direction, radius) {
                 Some((way, outward)) => {
+                    let way = way.min(STEEPEST * inside_mm);
                     found.samples.push((at, area, way, outward));
                     first += way * area;
                     second += way * way * area;
@@ -256,7 +320,29 @@ pub(super) fn overlap(placed: &Placed, radius: f64) -> Overlap {
     if second > 0.0 {
         found.area_mm2 = 4.0 / 3.0 * first * first / second;
     }
+    if placed.solid.is_mesh() {
+        found.distance_mm = -found.samples.iter().map(|(_, _, way, _)| *way).fold(0.0, f64::max);
+    }
     found
+}
+
+/// What presses on a sample is at most this often its distance from the object's surface. A face that is met head on
+/// never comes near that; beside a steep wall, where a sample would enter the object at its whole depth, the
+/// pressure rises over a quarter of the depth instead: forces then have no steps in the object's pose, on which no
+/// search for a balance could end.
+const STEEPEST: f64 = 4.0;
+
+/// Middle of what is pressed by a body with edges. Its deepest point may jump from edge to edge with the least turn, and
+/// the samples about it would with it; this one moves smoothly: the looks' mean, the deeper ones
+/// counted more.
+fn pressed_middle(placed: &Placed, radius: f64) -> DVec3 {
+    /// Depth over which a look loses its weight, as a part of the radius.
+    const SOFTNESS: f64 = 0.02;
+    let looks: Vec<(f64, DVec3)> =
+        first_looks().map(|d| (placed.distance(d * radius).0 / (SOFTNESS * radius), d)).collect();
+    let least = looks.iter().map(|look| look.0).fold(f64::INFINITY, f64::min);
+    let mean: DVec3 = looks.iter().map(|(value, d)| *d * (least - value).exp()).sum();
+    mean.normalize_or(DVec3::Z) * radius
 }
 
 /// Pressures on the samples for a foundation of the modulus `k_mpa_per_mm`.

@@ -23,8 +23,8 @@ pub(super) enum Feature {
 
 /// The feature of an object nearest to a place (sensor frame), or why it has no closed form.
 pub(super) fn feature_at(placed: &Placed, at_mm: DVec3) -> Result<Feature, &'static str> {
-    let p = placed.sensor_from_object.inverse().point(at_mm);
-    let direction = |v: DVec3| placed.sensor_from_object.vector(v);
+    let p = placed.object_from_sensor().point(at_mm);
+    let direction = |v: DVec3| placed.sensor_from_object().vector(v);
     let radial = p.truncate().length();
     let away = if radial > 0.0 { (p.truncate() / radial).extend(0.0) } else { DVec3::X };
     let flat =

@@ -36,7 +36,7 @@ impl<'a> Solver<'a> {
         indenter: &Indenter,
         before: Option<&'a ContactState>,
     ) -> Self {
-        let placed = Placed { solid: indenter.solid.clone(), sensor_from_object: Rigid::identity() };
+        let placed = Placed::new(indenter.solid.clone(), Rigid::identity());
         let touch = Touch::new(elastomer, placed, 1.0 + indenter.yield_ratio(elastomer));
         Self { elastomer, compliance, before, touch, looked: None }
     }
@@ -49,7 +49,7 @@ impl<'a> Solver<'a> {
         settled_mm: f64,
         whole: bool,
     ) -> Result<ContactState, ContactError> {
-        self.touch.placed.sensor_from_object = *sensor_from_object;
+        self.touch.placed.move_to(*sensor_from_object);
         let mut state = ContactState::free(sensor_from_object);
         let near = self.is_near(sensor_from_object);
         if !near && !self.look_anew()? {
@@ -112,7 +112,7 @@ impl<'a> Solver<'a> {
             return Err(ContactError::TooDeep { depth_mm: -distance_mm, limit_mm: DEEPEST * radius });
         }
         let spacing = radius * std::f64::consts::FRAC_PI_2 / self.compliance.grid.elements as f64;
-        self.looked = Some((placed.sensor_from_object, deepest_mm, spacing));
+        self.looked = Some((placed.sensor_from_object(), deepest_mm, spacing));
         if distance_mm >= 0.0 {
             self.looked = None;
             self.touch.candidates.clear();

@@ -24,7 +24,7 @@ pub(super) fn geometric(
     before: Option<&History>,
 ) -> Result<ContactState, ContactError> {
     let radius = elastomer.dome_radius_mm;
-    let placed = Placed { solid: indenter.solid.clone(), sensor_from_object: *sensor_from_object };
+    let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
     let found = overlap(&placed, radius);
     let depth_mm = -found.distance_mm;
     if depth_mm > DEEPEST * radius || !found.all_out {
@@ -125,7 +125,7 @@ pub(super) fn closed_form(
     before: Option<&History>,
 ) -> Result<ContactState, ContactError> {
     let radius = elastomer.dome_radius_mm;
-    let placed = Placed { solid: indenter.solid.clone(), sensor_from_object: *sensor_from_object };
+    let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
     let (at_mm, distance_mm, queries) = deepest(&placed, radius);
     let depth_mm = -distance_mm;
     if depth_mm <= 0.0 {

@@ -5,43 +5,55 @@
 //! weighted pseudonormal, IEEE TVCG 11(3), 2005), which is right for every closed manifold mesh.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::DVec3;
 
 use super::error::ContactError;
 use super::solid::Distance;
-use crate::mesh::{TriMesh, inspect};
+use crate::mesh::{BoxTree, Cornered, TriMesh, inspect};
 
 /// A mesh prepared for distances.
 #[derive(Debug)]
 pub(super) struct MeshDistance {
-    faces: Vec<Face>,
-    nodes: Vec<Node>,
+    corners: Vec<[DVec3; 3]>,
+    normals: Vec<Pseudonormals>,
+    tree: BoxTree,
     vertices_mm: Vec<DVec3>,
     center_mm: DVec3,
     radius_mm: f64,
+    /// The face that was nearest last: where points are asked for one beside the other it is near again, and the search
+    /// starts with its distance. Only the time of an answer depends on it.
+    last: AtomicU32,
 }
 
+/// Pseudonormals of a face, of its edges (0-1, 1-2, 2-0), of its corners.
 #[derive(Debug, Clone)]
+struct Pseudonormals {
+    face: DVec3,
+    edges: [DVec3; 3],
+    corners: [DVec3; 3],
+}
+
+/// A face, on its way into the tree.
 struct Face {
     corners: [DVec3; 3],
-    /// Pseudonormals: of the face, of the edges (0-1, 1-2, 2-0), of the corners.
-    normal: DVec3,
-    edges: [DVec3; 3],
-    vertices: [DVec3; 3],
+    normals: Pseudonormals,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Node {
-    low: DVec3,
-    high: DVec3,
-    /// As in a tree laid out in order: a leaf holds faces `first..first + count`; a branch has `count` 0, its
-    /// first child next to it and its second at `first`.
-    first: u32,
-    count: u32,
+impl Cornered for Face {
+    fn corners(&self) -> [DVec3; 3] {
+        self.corners
+    }
 }
 
-const LEAF: usize = 4;
+/// What of a triangle is nearest to a point.
+#[derive(Clone, Copy)]
+enum Feature {
+    Face,
+    Edge(usize),
+    Corner(usize),
+}
 
 impl MeshDistance {
     pub(super) fn new(mesh: &TriMesh) -> Result<Self, ContactError> {
@@ -68,14 +80,14 @@ impl MeshDistance {
             return Err(ContactError::InsideOut { volume_mm3: found.volume_mm3 });
         }
         let mut faces = faces_of(&mesh);
-        let mut nodes = Vec::new();
-        let count = faces.len();
-        grow(&mut faces, 0, count, &mut nodes);
-        let (center_mm, radius_mm) = nodes.first().map_or((DVec3::ZERO, 0.0), |root| {
-            let center = 0.5 * (root.low + root.high);
+        let tree = BoxTree::over(&mut faces);
+        let (center_mm, radius_mm) = tree.bounds().map_or((DVec3::ZERO, 0.0), |(low, high)| {
+            let center = 0.5 * (low + high);
             (center, mesh.vertices_mm.iter().map(|v| v.distance(center)).fold(0.0, f64::max))
         });
-        Ok(Self { faces, nodes, vertices_mm: mesh.vertices_mm, center_mm, radius_mm })
+        let (corners, normals) = faces.into_iter().map(|face| (face.corners, face.normals)).unzip();
+        let last = AtomicU32::new(0);
+        Ok(Self { corners, normals, tree, vertices_mm: mesh.vertices_mm, center_mm, radius_mm, last })
     }
 
     pub(super) fn bounding_sphere(&self) -> (DVec3, f64) {
@@ -88,45 +100,32 @@ impl MeshDistance {
     }
 
     pub(super) fn distance(&self, point: DVec3) -> Distance {
-        let (mut best, mut nearest, mut normal) = (f64::INFINITY, point, DVec3::Z);
-        let mut stack: Vec<(u32, f64)> = Vec::with_capacity(64);
-        stack.push((0, 0.0));
-        while let Some((index, reach)) = stack.pop() {
-            let Some(node) = self.nodes.get(index as usize) else { continue };
-            if reach >= best {
-                continue;
-            }
-            if node.count == 0 {
-                let (left, right) = (index + 1, node.first);
-                let (a, b) = (self.box_distance2(left, point), self.box_distance2(right, point));
-                // The nearer child is looked at first.
-                if a < b {
-                    stack.extend([(right, b), (left, a)]);
-                } else {
-                    stack.extend([(left, a), (right, b)]);
-                }
-                continue;
-            }
-            let range = node.first as usize..(node.first + node.count) as usize;
-            for face in self.faces.get(range).unwrap_or_default() {
-                let (at, pseudonormal) = face.nearest(point);
+        // Of faces at one distance the first is taken, whatever the search began with.
+        let mut best = (f64::INFINITY, u32::MAX, point, Feature::Face);
+        let mut look = |index: u32| {
+            if let Some(corners) = self.corners.get(index as usize) {
+                let (at, feature) = nearest(corners, point);
                 let distance2 = at.distance_squared(point);
-                if distance2 < best {
-                    (best, nearest, normal) = (distance2, at, pseudonormal);
+                if distance2 < best.0 || (distance2 == best.0 && index < best.1) {
+                    best = (distance2, index, at, feature);
                 }
             }
-        }
+            best.0
+        };
+        let within = look(self.last.load(Ordering::Relaxed));
+        self.tree.nearest(point, within, |index| look(index as u32));
+        let (_, index, nearest, feature) = best;
+        self.last.store(index, Ordering::Relaxed);
+        let normal = self.normals.get(index as usize).map_or(DVec3::Z, |normals| match feature {
+            Feature::Face => normals.face,
+            Feature::Edge(k) => normals.edges[k],
+            Feature::Corner(k) => normals.corners[k],
+        });
         let away = point - nearest;
         let length = away.length();
         let sign = if away.dot(normal) < 0.0 { -1.0 } else { 1.0 };
         let outward = if length > 0.0 { away * (sign / length) } else { normal.normalize_or(DVec3::Z) };
         Distance { value_mm: sign * length, outward }
-    }
-
-    fn box_distance2(&self, index: u32, point: DVec3) -> f64 {
-        self.nodes.get(index as usize).map_or(f64::INFINITY, |node| {
-            (node.low - point).max(point - node.high).max(DVec3::ZERO).length_squared()
-        })
     }
 }
 
@@ -185,70 +184,45 @@ fn faces_of(mesh: &TriMesh) -> Vec<Face> {
         .iter()
         .map(|&triangle| {
             let points = corners(triangle);
-            Face {
-                corners: points,
-                normal: normal(points),
+            let normals = Pseudonormals {
+                face: normal(points),
                 edges: edges_of(triangle).map(|edge| edges.get(&edge).copied().unwrap_or_default()),
-                vertices: triangle.map(|v| vertices.get(v as usize).copied().unwrap_or_default()),
-            }
+                corners: triangle.map(|v| vertices.get(v as usize).copied().unwrap_or_default()),
+            };
+            Face { corners: points, normals }
         })
         .collect()
 }
 
-impl Face {
-    /// Nearest point of the triangle and the pseudonormal of the feature it lies on (C. Ericson, Real-Time
-    /// Collision Detection, 5.1.5).
-    fn nearest(&self, p: DVec3) -> (DVec3, DVec3) {
-        let [a, b, c] = self.corners;
-        let (ab, ac, ap) = (b - a, c - a, p - a);
-        let (d1, d2) = (ab.dot(ap), ac.dot(ap));
-        if d1 <= 0.0 && d2 <= 0.0 {
-            return (a, self.vertices[0]);
-        }
-        let bp = p - b;
-        let (d3, d4) = (ab.dot(bp), ac.dot(bp));
-        if d3 >= 0.0 && d4 <= d3 {
-            return (b, self.vertices[1]);
-        }
-        let vc = d1 * d4 - d3 * d2;
-        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-            return (a + ab * (d1 / (d1 - d3)), self.edges[0]);
-        }
-        let cp = p - c;
-        let (d5, d6) = (ab.dot(cp), ac.dot(cp));
-        if d6 >= 0.0 && d5 <= d6 {
-            return (c, self.vertices[2]);
-        }
-        let vb = d5 * d2 - d1 * d6;
-        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-            return (a + ac * (d2 / (d2 - d6)), self.edges[2]);
-        }
-        let va = d3 * d6 - d5 * d4;
-        if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-            return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), self.edges[1]);
-        }
-        let sum = va + vb + vc;
-        if sum > 0.0 { (a + ab * (vb / sum) + ac * (vc / sum), self.normal) } else { (a, self.vertices[0]) }
+/// Nearest point of a triangle and what of it that is (C. Ericson, Real-Time Collision Detection, 5.1.5).
+fn nearest(&[a, b, c]: &[DVec3; 3], p: DVec3) -> (DVec3, Feature) {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return (a, Feature::Corner(0));
     }
-}
-
-/// Splits at the median of the longest side, which depends on nothing but the triangles.
-fn grow(faces: &mut [Face], start: usize, count: usize, nodes: &mut Vec<Node>) {
-    let part = &mut faces[start..start + count];
-    let corners = || part.iter().flat_map(|face| face.corners);
-    let low = corners().fold(DVec3::splat(f64::INFINITY), DVec3::min);
-    let high = corners().fold(DVec3::splat(f64::NEG_INFINITY), DVec3::max);
-    let here = nodes.len();
-    nodes.push(Node { low, high, first: start as u32, count: count as u32 });
-    if count <= LEAF {
-        return;
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return (b, Feature::Corner(1));
     }
-    let size = high - low;
-    let axis = (0..3).max_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(0);
-    let middle = |face: &Face| face.corners.iter().map(|c| c[axis]).sum::<f64>();
-    part.select_nth_unstable_by(count / 2, |a, b| middle(a).total_cmp(&middle(b)));
-    grow(faces, start, count / 2, nodes);
-    let second = nodes.len() as u32;
-    grow(faces, start + count / 2, count - count / 2, nodes);
-    nodes[here] = Node { low, high, first: second, count: 0 };
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return (a + ab * (d1 / (d1 - d3)), Feature::Edge(0));
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return (c, Feature::Corner(2));
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return (a + ac * (d2 / (d2 - d6)), Feature::Edge(2));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        return (b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6))), Feature::Edge(1));
+    }
+    let sum = va + vb + vc;
+    if sum > 0.0 { (a + ab * (vb / sum) + ac * (vc / sum), Feature::Face) } else { (a, Feature::Corner(0)) }
 }

@@ -7,6 +7,7 @@
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
+use super::geometric::{Placed, deepest, deepest_from};
 use super::trials::Task;
 use super::{Contact, ContactError, ContactState, Indenter};
 use crate::mechanics::{Displacement, Suspension, Wrench};
@@ -61,6 +62,11 @@ fn start(suspension: &Suspension, before: Option<&Pressed>, unknowns: usize) -> 
     }
     x
 }
+
+/// An object counts as met when it is this near, as a part of the radius: closer than a search along its edges comes.
+const MET: f64 = 1e-4;
+/// A load missed by more than this part of it is tried in steps.
+const FAR_OFF: f64 = 1e-3;
 
 impl Contact {
     /// The object held at a pose of the rest frame: where the platform comes to rest on its springs.
@@ -128,7 +134,8 @@ impl Contact {
         };
         // Loading in steps where the whole force is not found at once.
         let whole = task.run(x.clone(), before.and_then(|pressed| pressed.learnt.as_ref()))?;
-        if !matches!(whole.status, PressStatus::NotBalanced { .. }) {
+        if !matches!(whole.status, PressStatus::NotBalanced { residual_n } if residual_n > FAR_OFF * force_n)
+        {
             return Ok(whole);
         }
         let (mut best, mut iterations) = (whole, 0);
@@ -156,20 +163,26 @@ impl Contact {
         way: DVec3,
     ) -> Result<f64, ContactError> {
         let radius = self.elastomer().dome_radius_mm;
-        let mut gone = 0.0;
+        let (mut gone, mut near_mm) = (0.0, None);
         // The distance is a safe step forwards; from inside, its depth is one backwards.
         for _ in 0..64 {
             let mut object = *rest_from_object;
             object.translation_mm += way * gone;
-            let placed = super::geometric::Placed {
-                solid: indenter.solid.clone(),
-                sensor_from_object: platform.inverse().compose(&object),
+            let placed = Placed::new(indenter.solid.clone(), platform.inverse().compose(&object));
+            let (at_mm, distance_mm, _) = match near_mm {
+                // From one step to the next the nearest place hardly moves; what it is taken for is checked at last.
+                Some(near_mm) => deepest_from(&placed, radius, near_mm),
+                None => deepest(&placed, radius),
             };
-            let (_, distance_mm, _) = super::geometric::deepest(&placed, radius);
             gone += distance_mm;
-            if distance_mm.abs() < 1e-6 * radius {
-                return Ok(gone);
+            if distance_mm.abs() < MET * radius {
+                if near_mm.is_none() {
+                    return Ok(gone);
+                }
+                near_mm = None;
+                continue;
             }
+            near_mm = Some(at_mm);
             if gone.abs() > 1e3 * radius {
                 break;
             }

@@ -121,6 +121,16 @@ impl Solid {
         }
     }
 
+    /// Whether it is a ball.
+    pub(super) fn is_ball(&self) -> bool {
+        matches!(self.0, Form::Sphere { .. })
+    }
+
+    /// Whether it is a mesh, with edges and corners anywhere.
+    pub fn is_mesh(&self) -> bool {
+        matches!(self.0, Form::Mesh(_))
+    }
+
     /// Centre and radius of a ball round the solid, object frame, mm.
     pub fn bounding_sphere(&self) -> (DVec3, f64) {
         match &self.0 {

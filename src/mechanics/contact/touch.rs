@@ -73,14 +73,14 @@ impl<'a> Way<'a> {
         let then = match history.and_then(|history| history.sensor_from_object) {
             Some(pose) => pose,
             None => {
-                let mut pose = placed.sensor_from_object;
+                let mut pose = placed.sensor_from_object();
                 pose.translation_mm += at_mm.normalize_or(DVec3::Z) * -distance_mm;
                 pose
             }
         };
         Self {
-            then: Placed { solid: placed.solid.clone(), sensor_from_object: then },
-            moved: placed.sensor_from_object.compose(&then.inverse()),
+            then: Placed::new(placed.solid.clone(), then),
+            moved: placed.sensor_from_object().compose(&then.inverse()),
             before,
             memory: history
                 .map(|history| history.nodes.iter().map(|memory| (memory.node, *memory)).collect())

@@ -21,6 +21,9 @@ const TOLERANCE: f64 = 1e-7;
 /// Loads below this one are balanced as closely as it is, N.
 const LEAST_SCALE_N: f64 = 0.05;
 
+/// Contact solves without any gain after which a search ends.
+const MOST_WITHOUT_GAIN: u32 = 20;
+
 /// How much closer than the balance a trial's contact is solved.
 const CLOSER: f64 = 1e-2;
 /// Starts that are tried where the models refuse the first.
@@ -252,8 +255,9 @@ impl Task<'_> {
             Some(jacobian) => jacobian,
             None => self.jacobian(&search.x, &trial)?,
         };
-        let mut best_size = trial.size;
-        while search.count < MOST_SOLVES {
+        let (mut best_size, mut best_count) = (trial.size, search.count);
+        // A contact whose forces have steps has no balance to be found.
+        while search.count < MOST_SOLVES.min(best_count + MOST_WITHOUT_GAIN) {
             if trial.size <= 0.3 * TOLERANCE * self.scale(trial.wrench.force_n.length()) {
                 break;
             }
@@ -286,7 +290,9 @@ impl Task<'_> {
             let miss = &found.residual - &trial.residual - &jacobian * &moved;
             jacobian += &miss * moved.transpose() / moved.norm_squared().max(f64::MIN_POSITIVE);
             fresh = false;
-            best_size = best_size.min(found.size);
+            if found.size < best_size {
+                (best_size, best_count) = (found.size, search.count);
+            }
             (search.x, trial) = (there, found);
         }
         search.jacobian = Some(jacobian);

@@ -33,8 +33,9 @@ impl Effect for InkEdge {
             let share = ink.edge_mm / dot.diameter_mm;
             let radius_px = WIDER * 0.5 * dot.image_outline.widths().1;
             // Half of the ramp's width, px, and what the nested outlines' unlike areas do to the centroid: its
-            // distance from the centre, at most a tenth of the radius, times the square of the share.
-            (share * radius_px, 0.1 * radius_px * share * share)
+            // distance from the centre times two thirds of the square of the share. A whole dot's lies near its
+            // centre, but that of one that is broken, or ends at the picture's edge, may lie at its rim.
+            (share * radius_px, radius_px * share * share)
         };
         let edges = scene.layout().dots.iter().map(edge);
         let (width_px, shift_px) = edges.fold((0.0_f64, 0.0_f64), |(w, s), (a, b)| (w.max(a), s.max(b)));

@@ -106,6 +106,12 @@ pub fn disc_from_direction(direction: DVec3) -> DVec2 {
     direction.truncate() / (1.0 + direction.z.max(0.0)).sqrt()
 }
 
+/// [`disc_from_direction`], continued some degrees below the rim.
+#[inline]
+pub fn disc_continued(direction: DVec3) -> DVec2 {
+    direction.truncate() / (1.0 + direction.z.max(-0.25)).sqrt()
+}
+
 /// The unit direction of a point of the disc, radius at most 1.
 pub fn direction_from_disc(disc: DVec2) -> DVec3 {
     let square = disc.length_squared().min(1.0);

@@ -5,11 +5,11 @@
 //! for those points there are tables of the *vector* irradiance on three shells inside the dome, whose product
 //! with the normal is the irradiance.
 
-use glam::{DVec3, Vec3A, Vec4};
+use glam::{DVec2, DVec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::direct::EmitterRule;
-use super::dome_map::{DomeGrid, bicubic, direction_from_disc, disc_from_direction};
+use super::dome_map::{DomeGrid, bicubic, direction_from_disc, disc_continued};
 use super::radiosity::Rings;
 use super::tables::{Prepared, SHELLS, Tables, Ways};
 
@@ -101,13 +101,14 @@ impl LightField {
 
     fn set_still(&mut self, grid: &DomeGrid, table: &[[f64; 3]], own: Option<&OwnLight>) {
         let fine = DomeGrid::with_cells(grid.cells() * FINE);
-        let node = |i: usize| {
-            let place = fine.place(i % fine.nodes, i / fine.nodes);
+        let inside = |place: DVec2| -> [f64; 3] {
             let direct = bicubic(grid, table, grid.coordinates_of_disc(place));
-            let onto = direction_from_disc(place / place.length().max(1.0));
-            let more = own.map_or([0.0; 3], |own| own.at(onto));
-            let [r, g, b]: [f32; 3] = std::array::from_fn(|c| (direct[c].max(0.0) + more[c]) as f32);
-            Vec4::new(r, g, b, 0.0)
+            let more = own.map_or([0.0; 3], |own| own.at(direction_from_disc(place)));
+            std::array::from_fn(|c| direct[c].max(0.0) + more[c])
+        };
+        let node = |i: usize| {
+            let [r, g, b] = continued(fine.place(i % fine.nodes, i / fine.nodes), inside);
+            Vec4::new(r as f32, g as f32, b as f32, 0.0)
         };
         self.still = (0..fine.nodes * fine.nodes).into_par_iter().map(node).collect();
         self.grid = fine;
@@ -134,15 +135,15 @@ impl LightField {
                         }
                     }
                 }
+                let inside = |place: DVec2| -> [f64; 12] {
+                    let v = bicubic(&grid, &flux, grid.coordinates_of_disc(place));
+                    let more = own.map_or([0.0; 3], |own| own.at(direction_from_disc(place)));
+                    std::array::from_fn(|k| if k < 9 { v[k] } else { more[k - 9] })
+                };
                 let node = |i: usize| {
-                    let place = fine.place(i % fine.nodes, i / fine.nodes);
-                    let v = bicubic(&grid, &flux, grid.coordinates_of_disc(place)).map(|v| v as f32);
-                    let onto = direction_from_disc(place / place.length().max(1.0));
-                    let more = own.map_or([0.0; 3], |own| own.at(onto)).map(|v| v as f32);
-                    ShellNode {
-                        flux: std::array::from_fn(|c| Vec3A::new(v[3 * c], v[3 * c + 1], v[3 * c + 2])),
-                        own: Vec3A::from_array(more),
-                    }
+                    let v = continued(fine.place(i % fine.nodes, i / fine.nodes), inside).map(|v| v as f32);
+                    let three = |k: usize| Vec3A::new(v[3 * k], v[3 * k + 1], v[3 * k + 2]);
+                    ShellNode { flux: std::array::from_fn(three), own: three(3) }
                 };
                 (0..fine.nodes * fine.nodes).into_par_iter().map(node).collect()
             })
@@ -235,6 +236,19 @@ impl LightField {
     }
 }
 
+/// A function of the disc at a place, beyond its rim as the parabola through the rim and two places inside goes on, as
+/// far apart as the place lies outside.
+fn continued<const K: usize>(place: DVec2, inside: impl Fn(DVec2) -> [f64; K]) -> [f64; K] {
+    let radius = place.length();
+    if radius <= 1.0 {
+        return inside(place);
+    }
+    // The square's corners lie far out, where nothing is looked up.
+    let beyond = (radius - 1.0).min(0.45);
+    let [rim, near, deep] = [1.0, 1.0 - beyond, 1.0 - 2.0 * beyond].map(|r| inside(place * (r / radius)));
+    std::array::from_fn(|k| 3.0 * (rim[k] - near[k]) + deep[k])
+}
+
 /// The lights' tables as the channels see them together.
 fn channels(ways: &Ways, tables: &Tables<1>) -> Vec<[f64; 3]> {
     let mut sum = vec![[0.0; 3]; tables.grid.nodes * tables.grid.nodes];
@@ -300,7 +314,7 @@ fn shell_weights(part: f64) -> [f32; 3] {
 /// Index of the lower corner of the cell of a direction, and the place in it.
 #[inline]
 fn cell_of(grid: &DomeGrid, direction: DVec3) -> (usize, f32, f32) {
-    let at = grid.coordinates_of_disc(disc_from_direction(direction));
+    let at = grid.coordinates_of_disc(disc_continued(direction));
     let last = (grid.nodes - 2) as f64;
     let (x, y) = (at.x.clamp(0.0, last), at.y.clamp(0.0, last));
     let (column, row) = (x as usize, y as usize);

@@ -9,6 +9,7 @@ pub mod objects;
 mod resolve;
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
@@ -24,6 +25,7 @@ use object::SceneObject;
 
 use super::SimError;
 use super::effect::{EffectChoice, EffectName};
+use super::touch::Between;
 
 /// Points that carry a dot's outline.
 pub const RIM_POINTS: usize = 8;
@@ -53,7 +55,11 @@ pub struct Scene {
     markers: Vec<Marker>,
     motion: Motion,
     objects: Vec<SceneObject>,
+    looked_at: OnceLock<Vec<LookedAt>>,
 }
+
+/// A frame that stands for others where bounds are sought: its number, the sensor's state, the touched dome.
+pub(super) type LookedAt = (u32, State, Option<Between>);
 
 impl Scene {
     /// Reads and resolves a scene file, with the design that it names.
@@ -92,6 +98,7 @@ impl Scene {
                 );
             }
             self.file.frames.count = count;
+            self.looked_at = OnceLock::new();
         }
         self.file.seed = seed.unwrap_or(self.file.seed);
         Ok(())
@@ -154,6 +161,18 @@ impl Scene {
     pub fn state_at(&self, frame: u32, time_s: f64) -> Result<State, SimError> {
         let state = self.motion.at(&self.suspension, time_s);
         state.map_err(|error| SimError::Frame { frame, problem: error.to_string() })
+    }
+
+    /// The states that bounds look at: every effect's, found once.
+    pub(super) fn looked_at(
+        &self,
+        find: impl FnOnce() -> Result<Vec<LookedAt>, SimError>,
+    ) -> Result<&[LookedAt], SimError> {
+        if let Some(known) = self.looked_at.get() {
+            return Ok(known);
+        }
+        let found = find()?;
+        Ok(self.looked_at.get_or_init(|| found))
     }
 
     /// The objects that may touch the dome.

@@ -1,6 +1,7 @@
 //! From the file as written to a scene in which the rules between fields hold.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
@@ -64,6 +65,7 @@ pub(super) fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<
         markers,
         motion,
         objects,
+        looked_at: OnceLock::new(),
     })
 }
 

@@ -69,7 +69,7 @@ pub(super) fn neo_hookean(
     linearised: bool,
 ) -> Result<ContactState, ContactError> {
     let radius = elastomer.dome_radius_mm;
-    let placed = Placed { solid: indenter.solid.clone(), sensor_from_object: *sensor_from_object };
+    let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
     let (deepest_mm, distance_mm, queries) = deepest(&placed, radius);
     let mut state = ContactState::free(sensor_from_object);
     state.work = 30.0 * queries as f64;

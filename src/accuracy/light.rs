@@ -16,7 +16,8 @@ const USED: usize = 4;
 /// The reference: the error of Gauss's rule falls faster than any power where nothing stands in the way, and as a power
 /// along the edge of a shadow.
 const REFERENCE: usize = 96;
-const QUICK_REFERENCE: usize = 48;
+const QUICK_REFERENCE: usize = 24;
+const QUICK_PLACES: [usize; 3] = [1, 2, 4];
 /// Directions at which the light is looked at.
 const LOOKED: Rings = Rings { rings: 5, patches: 9 };
 const QUICK_LOOKED: Rings = Rings { rings: 3, patches: 5 };
@@ -62,7 +63,8 @@ fn samples(ways: &Ways, patience: Patience, quick: bool) -> Ladder {
         let label = format!("{count} x {count} places");
         Rung::of(("", label), *count as f64, errors, (time(patience, || look(*count)), items), "dark places")
     };
-    let rungs: Vec<Rung> = PLACES.iter().map(rung).collect();
+    let counts: &[usize] = if quick { &QUICK_PLACES } else { &PLACES };
+    let rungs: Vec<Rung> = counts.iter().map(rung).collect();
     Ladder {
         name: "light-samples",
         title: "Light straight from the LEDs".into(),
@@ -76,7 +78,7 @@ fn samples(ways: &Ways, patience: Patience, quick: bool) -> Ladder {
         law: Law::Falls,
         observed: None,
         rungs,
-        in_use: PLACES.iter().position(|count| *count == USED),
+        in_use: counts.iter().position(|count| *count == USED),
         asked: None,
         meets: None,
         says: "A light is small beside its distance: a few places carry all of it, and the platform's shadow is cut \

@@ -4,15 +4,14 @@ use glam::DVec3;
 
 use super::clock::{Patience, time};
 use super::ladder::{Ladder, Law, Rung};
-use crate::sim::light::direct::EmitterRule;
+use crate::sim::light::direct::{self, EmitterRule};
 use crate::sim::light::radiosity::{DomeRoom, Rings, Underside};
 use crate::sim::light::tables::Ways;
 use crate::sim::light::{LightUse, lit_by_leds, setup};
 use crate::sim::{Scene, SimError};
 
-/// Places across an emitter, each way, on the rungs; the third is the simulator's.
+/// Places across an emitter, each way, on the rungs; the simulator's among them.
 const PLACES: [usize; 5] = [1, 2, 4, 8, 16];
-const USED: usize = 4;
 /// The reference: the error of Gauss's rule falls faster than any power where nothing stands in the way, and as a power
 /// along the edge of a shadow.
 const REFERENCE: usize = 96;
@@ -23,14 +22,6 @@ const LOOKED: Rings = Rings { rings: 5, patches: 9 };
 const QUICK_LOOKED: Rings = Rings { rings: 3, patches: 5 };
 /// Bounces that the rungs sum.
 const BOUNCES: [u32; 6] = [1, 2, 4, 8, 16, 32];
-const ALL: LightUse = LightUse {
-    direct: true,
-    falloff: true,
-    diffuser: true,
-    fresnel: true,
-    platform_shadow: true,
-    interreflection: true,
-};
 
 /// The ladders of samples and of bounces; empty where the scene has none of the design's lights.
 ///
@@ -40,7 +31,7 @@ pub fn ladders(scene: &Scene, patience: Patience, quick: bool) -> Result<Vec<Lad
     if !lit_by_leds(scene) {
         return Ok(Vec::new());
     }
-    let ways = setup::ways(scene, &ALL)?;
+    let ways = setup::ways(scene, &LightUse::ALL)?;
     Ok(vec![samples(&ways, patience, quick), bounces(scene, &ways, patience)])
 }
 
@@ -56,13 +47,13 @@ fn samples(ways: &Ways, patience: Patience, quick: bool) -> Ladder {
     let items = ways.sources.len() * places.len();
     let rung = |count: &usize| {
         let found = look(*count);
-        let errors = found.iter().zip(&truth).flat_map(|(found, truth)| {
-            let most = truth.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-            found.iter().zip(truth).map(move |(a, b)| (a - b).abs() / most).collect::<Vec<_>>()
-        });
+        let errors = differences(&found, &truth);
         let label = format!("{count} x {count} places");
         Rung::of(("", label), *count as f64, errors, (time(patience, || look(*count)), items), "dark places")
     };
+    // A hundredth of what the reference changes by when its places are doubled: errors up to that change are not told
+    // apart.
+    let floor = (0.01 * differences(&look(finest / 2), &truth).fold(0.0, f64::max)).max(1e-16);
     let counts: &[usize] = if quick { &QUICK_PLACES } else { &PLACES };
     let rungs: Vec<Rung> = counts.iter().map(rung).collect();
     Ladder {
@@ -73,12 +64,12 @@ fn samples(ways: &Ways, patience: Patience, quick: bool) -> Ladder {
         unit: "of the largest",
         item: "point and light",
         items,
-        reference: format!("{finest} x {finest} places, which differ from half as many by less than the floor"),
-        floor: floor_of(&look(finest / 2), &truth),
+        reference: format!("{finest} x {finest} places; what they differ by from half as many is not told apart"),
+        floor,
         law: Law::Falls,
         observed: None,
         rungs,
-        in_use: counts.iter().position(|count| *count == USED),
+        in_use: counts.iter().position(|count| *count == direct::PLACES),
         asked: None,
         meets: None,
         says: "A light is small beside its distance: a few places carry all of it, and the platform's shadow is cut \
@@ -88,14 +79,12 @@ fn samples(ways: &Ways, patience: Patience, quick: bool) -> Ladder {
     .finish()
 }
 
-/// A hundredth of what the reference changes by when its places are doubled: errors up to that change are not told
-/// apart.
-fn floor_of(half: &[Vec<f64>], whole: &[Vec<f64>]) -> f64 {
-    let change = half.iter().zip(whole).flat_map(|(half, whole)| {
-        let most = whole.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        half.iter().zip(whole).map(move |(a, b)| (a - b).abs() / most)
-    });
-    (0.01 * change.fold(0.0, f64::max)).max(1e-16)
+/// By what the light of each source differs at each point, in parts of that source's largest.
+fn differences<'a>(found: &'a [Vec<f64>], truth: &'a [Vec<f64>]) -> impl Iterator<Item = f64> + 'a {
+    found.iter().zip(truth).flat_map(|(found, truth)| {
+        let most = truth.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        found.iter().zip(truth).map(move |(a, b)| (a - b).abs() / most)
+    })
 }
 
 fn bounces(scene: &Scene, ways: &Ways, patience: Patience) -> Ladder {

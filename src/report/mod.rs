@@ -71,13 +71,10 @@ fn chapters(subject: &Subject<'_>) -> Vec<(&'static str, &'static str, String)> 
         ("loads", "Springs and load envelope", forces::loads(subject)),
         ("resolution", "What the sensor can resolve", forces::resolution(subject)),
         ("constants", "Constants at a glance", constants(subject)),
-        ("making", "Making it", making_list(subject)),
-        ("files", "All files", files(subject)),
     ];
-    if let Some(measured) = measured::chapter(subject) {
-        let before_making = all.len() - 2;
-        all.insert(before_making, ("accuracy", "What accuracy costs in time", measured));
-    }
+    let measured = measured::chapter(subject);
+    all.extend(measured.map(|content| ("accuracy", "What accuracy costs in time", content)));
+    all.extend([("making", "Making it", making_list(subject)), ("files", "All files", files(subject))]);
     all
 }
 

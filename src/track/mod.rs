@@ -38,6 +38,7 @@ mod report;
 mod result;
 mod springs;
 mod status;
+mod surplus;
 mod tracker;
 mod undistort;
 mod whites;

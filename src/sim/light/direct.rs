@@ -15,7 +15,7 @@ use crate::optics::SensorOptics;
 
 /// Places across the emitter, each way. The emitter is small against its distance from the dome: with four,
 /// the rule's error is below 1e-5 (tested against 64).
-const PLACES: usize = 4;
+pub const PLACES: usize = 4;
 
 /// Places at which a line of the emitter is looked at to find the pieces of it that are in sight.
 const LOOKS: usize = 5;

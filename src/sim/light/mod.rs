@@ -46,6 +46,18 @@ pub struct LightUse {
     pub interreflection: bool,
 }
 
+impl LightUse {
+    /// All of them.
+    pub const ALL: Self = Self {
+        direct: true,
+        falloff: true,
+        diffuser: true,
+        fresnel: true,
+        platform_shadow: true,
+        interreflection: true,
+    };
+}
+
 /// Whether a scene shows the membrane under the design's lights.
 pub fn lit_by_leds(scene: &Scene) -> bool {
     scene.draws() && scene.file().light.leds.is_some() && !scene.design().sections().leds.list.is_empty()

@@ -334,14 +334,7 @@ fn scene(more: &str) -> crate::sim::Scene {
     crate::sim::Scene::from_text(&text, &folder).unwrap()
 }
 
-const ALL: LightUse = LightUse {
-    direct: true,
-    falloff: true,
-    diffuser: true,
-    fresnel: true,
-    platform_shadow: true,
-    interreflection: true,
-};
+const ALL: LightUse = LightUse::ALL;
 
 fn ways_of(optics: &SensorOptics, source: Emitter) -> Ways {
     Ways {

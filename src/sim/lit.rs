@@ -69,16 +69,34 @@ pub struct Lit<const N: usize> {
 
 /// The membrane that is lit.
 pub struct LitSurface<'a> {
-    /// Camera, layers and dome at the instant, for the channel.
-    pub optics: &'a SensorOptics,
-    /// The deformed part.
-    pub dent: Option<&'a Dent>,
+    /// Slices of rows that see it at times of their own, from the first row; not empty.
+    pub slices: &'a [LitSlice<'a>],
     /// The light.
     pub shading: &'a dyn Shading,
     /// The first channel whose brightness is wanted, 0 to 2.
     pub channel: usize,
     /// How far a middle may be from what the corners promise, full scales.
     pub tolerance: f32,
+}
+
+/// The membrane as some rows see it.
+pub struct LitSlice<'a> {
+    /// The row after the last.
+    pub end: usize,
+    /// Camera, layers and dome, for the channel.
+    pub optics: &'a SensorOptics,
+    /// The deformed part.
+    pub dent: Option<&'a Dent>,
+}
+
+impl<'a> LitSurface<'a> {
+    /// As a row sees it; the nodes below the picture belong to the last slice.
+    fn at(&self, y: usize) -> Option<&LitSlice<'a>> {
+        match self.slices {
+            [only] => Some(only),
+            slices => slices.get(slices.partition_point(|slice| slice.end <= y)).or(slices.last()),
+        }
+    }
 }
 
 /// A box of pixels, ends excluded.
@@ -95,6 +113,16 @@ pub struct PixelBox {
 }
 
 impl PixelBox {
+    /// The box around both.
+    pub fn with(&self, other: &Self) -> Self {
+        Self {
+            left: self.left.min(other.left),
+            top: self.top.min(other.top),
+            right: self.right.max(other.right),
+            bottom: self.bottom.max(other.bottom),
+        }
+    }
+
     fn meets(&self, x: usize, y: usize, side: usize) -> bool {
         x < self.right && y < self.bottom && x + side >= self.left && y + side >= self.top
     }
@@ -241,17 +269,17 @@ impl<const N: usize> Lit<N> {
         let mut moved_mm = DVec3::ZERO;
         for (x, y) in pixels.drain(..) {
             let at = y * self.width + x;
-            match self.known.get_mut(at) {
-                Some(known @ Known::Nothing) => {
+            match (self.known.get_mut(at), surface.at(y)) {
+                (Some(known @ Known::Nothing), Some(seen)) => {
                     *known = Known::Misses;
                     let pixel = DVec2::new(x as f64, y as f64);
-                    let rays = match surface.optics.trace_continued(pixel) {
+                    let rays = match seen.optics.trace_continued(pixel) {
                         Ok(ray) => [Some((ray, 1.0)), None],
-                        Err(_) => continued(surface.optics, pixel),
+                        Err(_) => continued(seen.optics, pixel),
                     };
                     for ((surface_mm, inside), weight) in rays.into_iter().flatten() {
                         self.places.push((at, weight));
-                        let sample = sample(surface, surface_mm, inside, moved_mm, work);
+                        let sample = sample(seen, surface_mm, inside, moved_mm, work);
                         moved_mm = sample.point_mm - sample.rest_mm;
                         let moved = moved_mm.length_squared() > STILL_MM * STILL_MM;
                         *known = if moved { Known::Moved } else { Known::Still };
@@ -470,14 +498,14 @@ fn continued(optics: &SensorOptics, pixel: DVec2) -> [Option<((DVec3, DVec3), f3
 
 /// What a ray that meets the undeformed dome shows; a point nearby moved by `near_mm`.
 fn sample(
-    surface: &LitSurface<'_>,
+    seen: &LitSlice<'_>,
     surface_mm: DVec3,
     inside: DVec3,
     near_mm: DVec3,
     work: &mut Work,
 ) -> SurfaceSample {
-    let radius_mm = surface.optics.dome_radius_mm();
-    if let Some(dent) = surface.dent {
+    let radius_mm = seen.optics.dome_radius_mm();
+    if let Some(dent) = seen.dent {
         work.add(EffectName::Contact, units::DENT);
         if let Some((rest_mm, dented)) = dent.meet(surface_mm, inside, near_mm) {
             return SurfaceSample {

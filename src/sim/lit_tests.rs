@@ -8,7 +8,8 @@ use super::coverage::{Coverage, LEAST_SHARE, clip_to_image};
 use super::eye::Eye;
 use super::field::{LensField, cap_box, rim_polygon};
 use super::instant::dent_step_mm;
-use super::lit::{Lit, LitSurface};
+use super::lit::{Lit, LitSlice, LitSurface};
+use super::shapes::Shape;
 use super::touch::Between;
 use super::*;
 use crate::design;
@@ -42,22 +43,23 @@ fn levels(scene: &Scene, frame: u32, tolerance: f32) -> (Vec<[f32; 3]>, u64, Vec
     let around = Between::at_frame(touches.last().unwrap().clone());
     let state = around.state(scene.suspension().at_mm());
     let step = Some(dent_step_mm(Some(level)));
+    let shape = Shape::of(Some(around), scene.optics().dome_radius_mm(), step, &mut work);
     let time_s = scene.time_s(frame);
-    let instant =
-        Instant::new(scene, &eye, pipeline.geometry, time_s, state, Some(around), step, &mut work).unwrap();
+    let instant = Instant::new(&eye, pipeline.geometry, time_s, state, shape, &mut work).unwrap();
     let optics = instant.eye.optics(1).unwrap();
     let (width, height) = scene.image_size();
     let mut coverage = Coverage::default();
     coverage.fill(&clip_to_image(&rim_polygon(optics), width, height));
     let field = LensField::new(optics.lens(), width, height);
-    let mut spans = Vec::new();
-    coverage.spans(width, height, &mut spans);
+    let mut spans = vec![0..0; height];
+    coverage.spans(width, height, &(0..height), &mut spans);
     for (y, span) in spans.iter_mut().enumerate() {
         *span = span.start.max(field.row(y).start)..span.end.min(field.row(y).end);
     }
     let shading = pipeline.shading.as_deref().unwrap();
-    let surface = LitSurface { optics, dent: instant.dent.as_ref(), shading, channel: 0, tolerance };
-    let pressed = instant.touch.as_ref().unwrap().pressed_cap();
+    let slices = [LitSlice { end: height, optics, dent: instant.shape.dent.as_ref() }];
+    let surface = LitSurface { slices: &slices, shading, channel: 0, tolerance };
+    let pressed = instant.shape.touch.as_ref().unwrap().pressed_cap();
     let dented = pressed.map(|(middle, angle)| cap_box(optics, middle, angle + 0.06, width, height));
     let mut lit = Lit::<3>::default();
     let mut spent = Work::default();

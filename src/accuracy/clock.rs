@@ -47,7 +47,8 @@ pub fn time<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing {
     let once = first.elapsed().max(Duration::from_nanos(20));
     let batch = (SHORTEST.as_secs_f64() / once.as_secs_f64()).ceil().clamp(1.0, 1e6) as u32;
     let began = Instant::now();
-    let mut seconds = Vec::new();
+    // A run that is long enough for the clock counts.
+    let mut seconds = if batch == 1 { vec![once.as_secs_f64()] } else { Vec::new() };
     while seconds.len() < patience.least_runs
         || (began.elapsed() < patience.per_rung && seconds.len() < patience.most_runs)
     {

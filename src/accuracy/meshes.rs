@@ -11,7 +11,7 @@ use crate::parts::Part;
 
 /// Chord tolerances, mm.
 const RUNGS_MM: [f64; 6] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001];
-const QUICK_MM: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
+const QUICK_MM: [f64; 3] = [0.1, 0.03, 0.01];
 /// Bytes of a binary STL: its head, and each triangle.
 const STL_HEAD: f64 = 84.0;
 const STL_TRIANGLE: f64 = 50.0;

@@ -6,6 +6,7 @@
 
 mod coverage;
 mod dent;
+pub mod edges;
 mod effect;
 mod effects;
 mod error;

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::SimError;
+use super::edges::EDGE_GREY;
 use super::effect::EffectName;
 use super::effects;
 use super::eye::Eye;
@@ -22,9 +23,6 @@ use super::truth::{EffectTruth, FrameTruth, Seen, dot_truth, effects_of, marker_
 use super::work::Work;
 use crate::mechanics::contact::ContactState;
 use crate::numeric::Rigid;
-
-/// How far the drawn outlines of dots may be from the exact ones, grey levels at the edge.
-const OUTLINE_GREY: f64 = 0.5;
 
 /// Draws the frames of a scene with the effects of a plan.
 pub struct Renderer<'a> {
@@ -89,7 +87,7 @@ impl<'a> Renderer<'a> {
         let pipeline = plan.pipeline(scene, &mut setup)?;
         let eye = Eye::new(scene, pipeline.geometry)?;
         let contrast = (255.0 * scene.file().light.membrane_level).max(1.0);
-        let points = Points::new(scene, &pipeline, &eye, OUTLINE_GREY / contrast, &mut setup);
+        let points = Points::new(scene, &pipeline, &eye, EDGE_GREY / contrast, &mut setup);
         let (width, height) = scene.image_size();
         let at_rest = eye.at(&Rigid::identity())?;
         let lens = at_rest.optics(eye.reference()).filter(|_| scene.draws()).map(|optics| optics.lens());

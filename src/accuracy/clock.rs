@@ -42,6 +42,11 @@ const SHORTEST: Duration = Duration::from_micros(200);
 /// Times `work`: once to warm up, then until the patience ends; work too short for the clock is timed in batches.
 pub fn time<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing {
     black_box(work());
+    time_again(patience, work)
+}
+
+/// [`time`] of work that has just been done.
+pub fn time_again<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing {
     let first = Instant::now();
     black_box(work());
     let once = first.elapsed().max(Duration::from_nanos(20));

@@ -56,7 +56,14 @@ fn levels(scene: &Scene, frame: u32, tolerance: f32) -> (Vec<[f32; 3]>, u64, Vec
         *span = span.start.max(field.row(y).start)..span.end.min(field.row(y).end);
     }
     let shading = pipeline.shading.as_deref().unwrap();
-    let surface = LitSurface { optics, dent: instant.dent.as_ref(), shading, channel: 0, tolerance };
+    let surface = LitSurface {
+        optics,
+        dent: instant.dent.as_ref(),
+        rays: Some(field.rays()),
+        shading,
+        channel: 0,
+        tolerance,
+    };
     let pressed = instant.touch.as_ref().unwrap().pressed_cap();
     let dented = pressed.map(|(middle, angle)| cap_box(optics, middle, angle + 0.06, width, height));
     let mut lit = Lit::<3>::default();
@@ -94,7 +101,7 @@ fn what_is_filled_in_is_what_each_ray_shows() {
             .collect();
         let worst = off.iter().copied().fold(0.0, f32::max);
         let above = |grey: f32| off.iter().filter(|off| **off > grey).count();
-        for (at, off) in places.iter().zip(&off).filter(|(_, off)| **off > 4.0).take(10) {
+        for (at, off) in places.iter().zip(&off).filter(|(_, off)| **off > 3.0).take(400) {
             println!("{at:?}: {off}");
         }
         let mean = off.iter().sum::<f32>() / off.len() as f32;

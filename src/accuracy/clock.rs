@@ -42,12 +42,18 @@ const SHORTEST: Duration = Duration::from_micros(200);
 /// Times `work`: once to warm up, then until the patience ends; work too short for the clock is timed in batches.
 pub fn time<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing {
     black_box(work());
+    time_again(patience, work)
+}
+
+/// [`time`] of work that has just been done.
+pub fn time_again<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing {
     let first = Instant::now();
     black_box(work());
     let once = first.elapsed().max(Duration::from_nanos(20));
     let batch = (SHORTEST.as_secs_f64() / once.as_secs_f64()).ceil().clamp(1.0, 1e6) as u32;
     let began = Instant::now();
-    let mut seconds = Vec::new();
+    // A run that is long enough for the clock counts.
+    let mut seconds = if batch == 1 { vec![once.as_secs_f64()] } else { Vec::new() };
     while seconds.len() < patience.least_runs
         || (began.elapsed() < patience.per_rung && seconds.len() < patience.most_runs)
     {

@@ -8,10 +8,15 @@ use super::clock::{Patience, time};
 use super::ladder::{Ladder, Law, Rung, sizes};
 use crate::design::Design;
 use crate::layout::Layout;
-use crate::mechanics::contact::{Contact, ContactError, ContactState, Elastomer, Indenter, Level, Solid};
+use crate::mechanics::contact::{
+    Contact, ContactError, ContactState, Elastomer, Indenter, Level, OnPole, Solid,
+};
 use crate::numeric::Rigid;
 
-/// Elements along the meridian of the linear rungs, and of their reference.
+/// Elements along the meridian of the reference.
+const FINEST: usize = 512;
+const QUICK_FINEST: usize = 256;
+/// Elements along the meridian of the linear rungs.
 const ELEMENTS: [u32; 3] = [8, 16, 32];
 const QUICK_ELEMENTS: [u32; 2] = [8, 16];
 /// The ball and how deep it goes, in parts of the dome's radius: a fingertip on a pea.
@@ -39,10 +44,17 @@ pub fn ladder(
     let moved = |state: &ContactState| -> Vec<DVec3> {
         places.iter().map(|place| state.displacement_mm(*place)).collect()
     };
-    let counts: &[u32] = if quick { &QUICK_ELEMENTS } else { &ELEMENTS };
-    let finest = 2 * counts.last().copied().unwrap_or(8);
-    let solved = Contact::new(elastomer, linear(finest))?.solve(&ball, &at, None)?;
-    let (truth, true_force_n) = (moved(&solved), solved.wrench.force_n.length());
+    let (counts, finest): (&[u32], usize) =
+        if quick { (&QUICK_ELEMENTS, QUICK_FINEST) } else { (&ELEMENTS, FINEST) };
+    // Straight onto the pole everything is the same at every azimuth: there elements may be as fine as one likes.
+    let fine = |elements: usize| OnPole::new(&elastomer, BALL * radius_mm, DEPTH * radius_mm, elements);
+    let (solved, coarser) = (fine(finest)?, fine(finest / 2)?);
+    let truth: Vec<DVec3> = places.iter().map(|place| solved.displacement_mm(*place)).collect();
+    let true_force_n = solved.force_n.abs();
+    // The last halving of the elements moved it by this; its own error, of the second order, is a third of that.
+    let halved =
+        places.iter().zip(&truth).map(|(place, fine)| coarser.displacement_mm(*place).distance(*fine));
+    let (_, floor, _) = sizes(halved.map(|off| off / 3.0));
 
     let mut levels = vec![(Level::Geometric, "pushed out of the object".to_owned(), 1.0)];
     levels.push((Level::ClosedForm, "Hertz, with the bonded base".to_owned(), 2.0));
@@ -75,8 +87,6 @@ pub fn ladder(
             dominated: false,
         });
     }
-    // two halvings of the elements leave what the last one changed, by half or less
-    let last = rungs.last().map_or(0.0, |rung: &Rung| rung.rms_error);
     let in_use = rungs.iter().position(|rung| rung.way == "linear" && rung.dial == 32.0);
     Ok(Ladder {
         name: "contact",
@@ -87,10 +97,12 @@ pub fn ladder(
         item: "solve",
         items: 1,
         reference: format!(
-            "linear elements of {} mm; that is twice as fine as the last rung, no more: the tables grow with the cube",
-            super::sparse(arc_mm / f64::from(finest))
+            "the same ball and dome by linear elements of {} mm, which a load that is the same at every azimuth allows; \
+             known to {} mm",
+            super::sparse(arc_mm / finest as f64),
+            super::sparse(floor)
         ),
-        floor: 0.005 * last,
+        floor,
         law: Law::Falls,
         observed: None,
         rungs,

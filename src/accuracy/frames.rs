@@ -100,41 +100,35 @@ pub fn ladder(scene: &Scene, quick: bool) -> Result<(Ladder, Sequence), SimError
     let count = own.frame_count();
     let everything = Plan::everything(&own)?;
     let mut scratch = Scratch::default();
-    let truth = draw(&own, &Renderer::new(&own, &everything)?, &mut scratch)?;
-    let mut rungs = Vec::new();
-    let mut add = |label: String, dial: f64, scene: &Scene, plan: &Plan| -> Result<(), SimError> {
-        let renderer = Renderer::new(scene, plan)?;
-        let sequence = draw(scene, &renderer, &mut scratch)?;
-        let (max_error, rms_error) = difference(&sequence, &truth);
+    let renderer = Renderer::new(&own, &everything)?;
+    // To warm up: the reference is a rung, too.
+    renderer.frame_around(0, None, &mut scratch)?;
+    let truth = draw(&own, &renderer, &mut scratch)?;
+    let rung = |label: String, dial: f64, plan: &Plan, sequence: &Sequence| {
+        let (max_error, rms_error) = difference(sequence, &truth);
         // the tables were made with the renderer; what frames differ by is the spread
-        let mut timing = clock::of(sequence.seconds);
-        let per_item_s = timing.median_s;
-        for seconds in [&mut timing.median_s, &mut timing.lower_quartile_s, &mut timing.upper_quartile_s] {
+        let mut time = clock::of(sequence.seconds.clone());
+        let per_item_s = time.median_s;
+        for seconds in [&mut time.median_s, &mut time.lower_quartile_s, &mut time.upper_quartile_s] {
             *seconds *= f64::from(count);
         }
         let used = plan.entries.iter().filter(|entry| entry.used).count();
-        rungs.push(Rung {
-            way: "",
-            label,
-            dial,
-            max_error,
-            rms_error,
-            time: timing,
-            per_item_s,
-            notes: vec![("effects used".into(), used as f64)],
-            dominated: false,
-        });
-        Ok(())
+        let notes = vec![("effects used".into(), used as f64)];
+        Rung { way: "", label, dial, max_error, rms_error, time, per_item_s, notes, dominated: false }
     };
+    let mut rungs = Vec::new();
     let parts: &[f64] = if quick { &QUICK_PARTS } else { &PARTS };
     for &part in parts {
         let scene = changed(scene, part, frames)?;
         let tolerance = &scene.file().tolerance;
-        let (px, grey) = (tolerance.px, tolerance.grey);
-        let label = format!("{} px, {} grey levels", super::sparse(px), super::sparse(grey));
-        add(label, grey, &scene, &Plan::of(&scene)?)?;
+        let label =
+            format!("{} px, {} grey levels", super::sparse(tolerance.px), super::sparse(tolerance.grey));
+        let plan = Plan::of(&scene)?;
+        let sequence = draw(&scene, &Renderer::new(&scene, &plan)?, &mut scratch)?;
+        rungs.push(rung(label, tolerance.grey, &plan, &sequence));
     }
-    add("every effect".into(), 0.0, &own, &everything)?;
+    // The reference itself, with what it took.
+    rungs.push(rung("every effect".into(), 0.0, &everything, &truth));
     let tolerance = &own.file().tolerance;
     let ladder = Ladder {
         name: "frames",

@@ -3,15 +3,16 @@
 use std::time::Instant;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
-use super::clock::{Patience, time};
+use super::clock::{Patience, time_again};
 use super::ladder::{Ladder, Law, Rung};
 use crate::mesh::{Chord, Construction, MeshError, TriMesh, inspect};
 use crate::parts::Part;
 
 /// Chord tolerances, mm.
 const RUNGS_MM: [f64; 6] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001];
-const QUICK_MM: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
+const QUICK_MM: [f64; 3] = [0.1, 0.03, 0.01];
 /// Bytes of a binary STL: its head, and each triangle.
 const STL_HEAD: f64 = 84.0;
 const STL_TRIANGLE: f64 = 50.0;
@@ -47,19 +48,22 @@ pub fn ladder(
     for &tolerance_mm in &tolerances {
         let chord = Chord::new(tolerance_mm)?;
         let meshes = make(chord)?;
+        let off_by_part: Vec<Vec<f64>> = meshes
+            .par_iter()
+            .zip(&plain)
+            .map(|(mesh, part): (&TriMesh, _)| deviations(mesh, part).collect())
+            .collect();
         let (mut max_error, mut squares, mut count) = (0.0_f64, 0.0, 0_usize);
-        for (mesh, part) in meshes.iter().zip(&plain) {
-            for off in deviations(mesh, part) {
-                max_error = max_error.max(off);
-                squares += off * off;
-                count += 1;
-            }
+        for off in off_by_part.into_iter().flatten() {
+            max_error = max_error.max(off);
+            squares += off * off;
+            count += 1;
         }
         let triangles: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
         let by_volume =
             meshes.iter().zip(&limit).map(|(mesh, limit)| (mesh.volume_mm3() / limit - 1.0).abs());
         let check = once(|| meshes.iter().filter(|mesh| inspect(mesh).is_one_solid()).count());
-        let time = time(patience, || make(chord).map(|meshes| meshes.len()).unwrap_or_default());
+        let time = time_again(patience, || make(chord).map(|meshes| meshes.len()).unwrap_or_default());
         rungs.push(Rung {
             way: "",
             label: format!("chord tolerance {} mm", super::sparse(tolerance_mm)),

@@ -20,6 +20,7 @@ mod outline;
 mod page;
 mod placement;
 mod pose;
+mod supersampling;
 #[cfg(test)]
 mod tests;
 mod touch_scene;
@@ -228,6 +229,12 @@ pub fn measure(
         Err(error) => keep(None, &format!("light: {error}")),
     }
     step(9, "frames");
+    let grey = scene.as_ref().ok().map(|scene| scene.file().tolerance.grey);
+    let image = design.optics().lens().spec();
+    keep(
+        supersampling::ladder(&layout, (image.width as usize, image.height as usize), grey, patience, quick),
+        "edges of dots: the pattern has none",
+    );
     match scene.and_then(|scene| frames::ladder(scene, quick).map_err(|error| error.to_string())) {
         Ok((ladder, sequence)) => {
             keep(Some(ladder), "");

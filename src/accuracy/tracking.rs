@@ -1,6 +1,6 @@
 //! The runtime: what its options cost in time and give in exactness, on the scene's frames.
 
-use super::clock::{Patience, time};
+use super::clock::{Patience, time_again};
 use super::frames::Sequence;
 use super::ladder::{Ladder, Law, Rung, sizes};
 use crate::constants::Constants;
@@ -54,7 +54,7 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
             }
         }
         let (max_error, rms_error, _) = sizes(errors.into_iter());
-        let timing = time(patience, || {
+        let timing = time_again(patience, || {
             tracker.restart();
             for (number, drawn) in (0_u64..).zip(&frames.drawn) {
                 if let Some(image) = &drawn.image

@@ -120,11 +120,10 @@ impl Coverage {
         ]
     }
 
-    /// By row of a picture, the columns between the first and last pixel with a share worth the name.
-    pub fn spans(&self, width: usize, height: usize, spans: &mut Vec<Range<usize>>) {
-        spans.clear();
-        spans.resize(height, 0..0);
-        for (y, x, part) in self.rows(width, height) {
+    /// Writes for some rows of a picture the columns between the first and last pixel with a share worth the name; rows
+    /// that the box does not reach are left alone.
+    pub fn spans(&self, width: usize, height: usize, rows: &Range<usize>, spans: &mut [Range<usize>]) {
+        for (y, x, part) in self.rows(width, height).filter(|(y, ..)| rows.contains(y)) {
             let first = part.iter().position(|share| *share > LEAST_SHARE);
             let last = part.iter().rposition(|share| *share > LEAST_SHARE);
             if let (Some(first), Some(last), Some(span)) = (first, last, spans.get_mut(y)) {

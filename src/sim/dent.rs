@@ -11,6 +11,7 @@
 use glam::{DVec3, Vec4};
 
 use super::touch::Between;
+use crate::mechanics::contact::Extent;
 
 /// Fewest and most nodes along a side.
 const NODES: [usize; 2] = [12, 160];
@@ -55,16 +56,26 @@ pub struct Dented {
     pub normal: DVec3,
 }
 
-impl Dent {
-    /// The tables of a touched dome, with nodes no further apart than `step_mm` about the pressed part where their
-    /// number allows; `None` where nothing moves. The second value is the number of nodes.
-    pub fn new(between: &Between, radius_mm: f64, step_mm: f64) -> Option<(Self, u64)> {
-        let extents = between.extents();
+/// Where the nodes of the tables lie: one for all the times that are to be mixed.
+#[derive(Debug, Clone)]
+pub struct DentLayout {
+    close: Option<Chart>,
+    wide: Chart,
+}
+
+impl DentLayout {
+    /// For domes that move in `extents` and bear loads in a cap (direction of its middle, half its angle), with nodes
+    /// no further apart than `step_mm` about that cap where their number allows; `None` where nothing moves.
+    pub fn new(
+        extents: &[Extent],
+        pressed: Option<(DVec3, f64)>,
+        radius_mm: f64,
+        step_mm: f64,
+    ) -> Option<Self> {
         let middle = extents.iter().map(|e| e.direction).sum::<DVec3>().normalize_or_zero();
         // Each extent, seen from the common middle.
-        let angle_of = |e: &crate::mechanics::contact::Extent| {
-            e.angle_rad + middle.dot(e.direction.normalize_or(middle)).clamp(-1.0, 1.0).acos()
-        };
+        let angle_of =
+            |e: &Extent| e.angle_rad + middle.dot(e.direction.normalize_or(middle)).clamp(-1.0, 1.0).acos();
         let angle = extents.iter().map(angle_of).fold(0.0, f64::max);
         if middle == DVec3::ZERO || angle.is_nan() || angle <= 0.0 {
             return None;
@@ -73,20 +84,50 @@ impl Dent {
         let whole = |middle: DVec3| middle.z.clamp(-1.0, 1.0).acos() + std::f64::consts::FRAC_PI_2;
         let far = extents.iter().any(|e| e.beyond_mm > STILL_MM);
         let angle = if far { whole(middle) } else { angle.min(whole(middle)) };
-        let pressed = between
-            .pressed_cap()
+        let pressed = pressed
             .map(|(at, half)| (at, (half + CLOSE_MARGIN_MM / radius_mm).min(whole(at))))
             .filter(|(_, half)| *half < 0.7 * angle);
-        let chart = |middle, angle, step_mm| Chart::new(between, radius_mm, middle, angle, step_mm);
-        let dent = match pressed {
+        let chart = |middle, angle, step_mm| Chart::new(radius_mm, middle, angle, step_mm);
+        Some(match pressed {
             Some((at, half)) => Self {
                 close: Some(chart(at, half, step_mm)),
-                wide: Some(chart(middle, angle, step_mm.max(WIDE_STEP_MM))),
+                wide: chart(middle, angle, step_mm.max(WIDE_STEP_MM)),
             },
-            None => Self { close: None, wide: Some(chart(middle, angle, step_mm)) },
-        };
-        let nodes = dent.close.iter().chain(&dent.wide).map(|chart| chart.moved.len() as u64).sum();
+            None => Self { close: None, wide: chart(middle, angle, step_mm) },
+        })
+    }
+
+    /// The tables of a dome; zero where it does not move.
+    pub fn dent(&self, between: &Between) -> Dent {
+        Dent {
+            close: self.close.as_ref().map(|chart| chart.filled(between)),
+            wide: Some(self.wide.filled(between)),
+        }
+    }
+}
+
+impl Dent {
+    /// The tables of a touched dome, with nodes no further apart than `step_mm` about the pressed part where their
+    /// number allows; `None` where nothing moves. The second value is the number of nodes.
+    pub fn new(between: &Between, radius_mm: f64, step_mm: f64) -> Option<(Self, u64)> {
+        let layout = DentLayout::new(&between.extents(), between.pressed_cap(), radius_mm, step_mm)?;
+        let dent = layout.dent(between);
+        let nodes = dent.node_count();
         Some((dent, nodes))
+    }
+
+    /// Nodes of the tables.
+    pub fn node_count(&self) -> u64 {
+        self.close.iter().chain(&self.wide).map(|chart| chart.moved.len() as u64).sum()
+    }
+
+    /// The tables a part of the way from these to others of the same layout.
+    pub fn towards(&self, to: &Self, part: f64) -> Self {
+        let mix = |a: &Option<Chart>, b: &Option<Chart>| match (a, b) {
+            (Some(a), Some(b)) => Some(a.towards(b, part as f32)),
+            _ => None,
+        };
+        Self { close: mix(&self.close, &to.close), wide: mix(&self.wide, &to.wide) }
     }
 
     /// The place of a chart that serves a point of the undeformed dome best.
@@ -177,8 +218,8 @@ struct Moved {
 }
 
 impl Chart {
-    /// The chart of a cap.
-    fn new(between: &Between, radius_mm: f64, middle: DVec3, angle: f64, step_mm: f64) -> Self {
+    /// The empty chart of a cap.
+    fn new(radius_mm: f64, middle: DVec3, angle: f64, step_mm: f64) -> Self {
         let side = middle.any_orthonormal_vector();
         let up = middle.cross(side);
         let reach_mm = 2.0 * radius_mm * (0.5 * angle).sin();
@@ -186,17 +227,25 @@ impl Chart {
         // Two nodes beyond the edge on each side, for the cubics.
         let half_mm = reach_mm * (nodes as f64 + 4.0) / nodes as f64;
         let per_step = (nodes as f64 - 1.0) / (2.0 * half_mm);
-        let mut chart = Self { middle, side, up, radius_mm, half_mm, nodes, per_step, moved: Vec::new() };
-        let mut at_mm = Vec::with_capacity(nodes * nodes);
-        for row in 0..nodes {
-            for column in 0..nodes {
-                let place = |i: usize| i as f64 / per_step - half_mm;
-                at_mm.push(chart.point(place(column), place(row)));
+        Self { middle, side, up, radius_mm, half_mm, nodes, per_step, moved: Vec::new() }
+    }
+
+    /// The chart with its displacements.
+    fn filled(&self, between: &Between) -> Self {
+        let mut at_mm = Vec::with_capacity(self.nodes * self.nodes);
+        for row in 0..self.nodes {
+            for column in 0..self.nodes {
+                let place = |i: usize| i as f64 / self.per_step - self.half_mm;
+                at_mm.push(self.point(place(column), place(row)));
             }
         }
         let moved = between.displacements_mm(&at_mm);
-        chart.moved = moved.into_iter().map(|u| u.as_vec3().extend(0.0)).collect();
-        chart
+        Self { moved: moved.into_iter().map(|u| u.as_vec3().extend(0.0)).collect(), ..*self }
+    }
+
+    fn towards(&self, to: &Self, part: f32) -> Self {
+        let moved = self.moved.iter().zip(&to.moved).map(|(a, b)| a.lerp(*b, part)).collect();
+        Self { moved, ..*self }
     }
 
     fn point(&self, x: f64, y: f64) -> DVec3 {

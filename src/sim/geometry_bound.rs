@@ -9,6 +9,7 @@ use super::instant::Instant;
 use super::pipeline::{Geometry, Pipeline};
 use super::scene::file::LevelName;
 use super::scene::{LookedAt, Scene};
+use super::shapes::Shape;
 use super::spots::Points;
 use super::touch::{Between, Stepper};
 use super::work::Work;
@@ -106,7 +107,8 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
     for (frame, state, touch) in scene.looked_at(|| states(scene, &frames))? {
         let time_s = scene.time_s(*frame);
         let mut at = |eye: &Eye, geometry: Geometry| {
-            Instant::new(scene, eye, geometry, time_s, state.clone(), touch.clone(), None, &mut uncounted)
+            let shape = Shape { touch: touch.clone(), ..Shape::default() };
+            Instant::new(eye, geometry, time_s, state.clone(), shape, &mut uncounted)
         };
         let (a, b) = (at(&a_eye, with)?, at(&b_eye, without)?);
         let mut now = Vec::new();

@@ -1,12 +1,11 @@
 //! The sensor at one time: its pose, its shape, and the camera over it.
 
 use super::SimError;
-use super::dent::Dent;
 use super::effect::EffectName;
 use super::eye::{Eye, PlacedEye};
 use super::pipeline::Geometry;
-use super::scene::{Scene, State};
-use super::touch::Between;
+use super::scene::State;
+use super::shapes::Shape;
 use super::work::Work;
 use crate::mechanics::contact::Level;
 use crate::numeric::Rigid;
@@ -27,8 +26,6 @@ pub(super) mod units {
     pub const PIXEL: u64 = 2;
     /// A balance of the springs.
     pub const BALANCE: u64 = 20_000;
-    /// A node of the dent's table.
-    pub const NODE: u64 = 150;
 }
 
 /// The sensor at one time.
@@ -40,26 +37,21 @@ pub struct Instant {
     pub state: State,
     /// The camera over it.
     pub eye: PlacedEye,
-    /// The touched dome; `None` where contact takes no part.
-    pub touch: Option<Between>,
-    /// The deformed membrane as a table; only where light falls on it.
-    pub dent: Option<Dent>,
+    /// The touched dome.
+    pub shape: Shape,
 }
 
 impl Instant {
-    /// The sensor in a state; a dent is laid out as a table where its nodes' distance is given.
+    /// The sensor in a state.
     ///
     /// # Errors
     /// A pose that cannot be.
-    #[expect(clippy::too_many_arguments, reason = "what an instant is made of")]
     pub fn new(
-        scene: &Scene,
         eye: &Eye,
         geometry: Geometry,
         time_s: f64,
         state: State,
-        touch: Option<Between>,
-        dent_step_mm: Option<f64>,
+        shape: Shape,
         work: &mut Work,
     ) -> Result<Self, SimError> {
         let pose = if geometry.sheet_motion {
@@ -69,12 +61,7 @@ impl Instant {
             Rigid::identity()
         };
         let eye = eye.at(&pose)?;
-        let dent = touch.as_ref().filter(|between| between.is_dented()).and_then(|between| {
-            let (dent, nodes) = Dent::new(between, scene.optics().dome_radius_mm(), dent_step_mm?)?;
-            work.add(EffectName::Contact, nodes * units::NODE);
-            Some(dent)
-        });
-        Ok(Self { time_s, state, eye, touch, dent })
+        Ok(Self { time_s, state, eye, shape })
     }
 }
 

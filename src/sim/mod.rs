@@ -6,6 +6,7 @@
 
 mod coverage;
 mod dent;
+pub mod edges;
 mod effect;
 mod effects;
 mod error;
@@ -21,9 +22,11 @@ mod picture;
 pub mod pipeline;
 mod plan;
 mod render;
+mod rolled;
 pub mod run;
 pub mod scene;
 mod shading;
+mod shapes;
 mod spots;
 mod touch;
 mod truth;
@@ -47,5 +50,7 @@ pub use work::Work;
 mod honesty;
 #[cfg(test)]
 mod lit_tests;
+#[cfg(test)]
+mod rolled_tests;
 #[cfg(test)]
 mod tests;

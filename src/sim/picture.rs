@@ -1,4 +1,4 @@
-//! The picture of one instant: membrane, dots and markers in linear light.
+//! The picture of one instant, or of rows exposed one after the other: membrane, dots and markers in linear light.
 
 use std::ops::Range;
 
@@ -8,14 +8,16 @@ use super::coverage::{Coverage, LEAST_SHARE, clip, clip_to_image};
 use super::effect::EffectName;
 use super::field::{LensField, cap_box, inside, rim_polygon};
 use super::frame::Frame;
-use super::instant::{Instant, units};
-use super::lit::{Lit, LitSurface};
+use super::instant::units;
+use super::lit::{Lit, LitSlice, LitSurface, PixelBox};
 use super::pipeline::Pipeline;
+use super::rolled::Slice;
 use super::scene::Scene;
 use super::shading::Shading;
+use super::shapes::Shape;
 use super::spots::{Points, Spots};
+use super::touch::Between;
 use super::work::Work;
-use crate::optics::SensorOptics;
 
 /// What a picture is made from.
 #[derive(Clone, Copy)]
@@ -34,89 +36,87 @@ pub struct Parts<'a> {
 #[derive(Debug, Clone, Default)]
 pub struct Painter {
     coverage: Coverage,
+    /// The dome's by slice.
+    domes: Vec<Coverage>,
+    /// Rows whose surround is laid with the membrane.
+    later: Vec<bool>,
     spans: Vec<Range<usize>>,
     one: Lit<1>,
     three: Lit<3>,
 }
 
 impl Painter {
-    /// Draws some rows of an instant over what is there.
+    /// Draws the sensor as slices of rows see it, over what is there; the slices hold all rows.
     pub fn draw(
         &mut self,
         parts: Parts<'_>,
-        instant: &Instant,
+        slices: &[Slice<'_>],
         spots: &Spots,
-        rows: Range<usize>,
         frame: &mut Frame,
         work: &mut Work,
     ) {
-        self.ground(parts, instant, &rows, frame, work);
+        self.ground(parts, slices, frame, work);
         if parts.pipeline.ink.dots {
-            self.dots(parts, spots, &rows, frame, work);
+            self.dots(parts, spots, frame, work);
         }
-        self.markers(parts, spots, &rows, frame, work);
+        self.markers(parts, spots, frame, work);
     }
 
     /// Surround and membrane.
-    fn ground(
-        &mut self,
-        parts: Parts<'_>,
-        instant: &Instant,
-        rows: &Range<usize>,
-        frame: &mut Frame,
-        work: &mut Work,
-    ) {
+    fn ground(&mut self, parts: Parts<'_>, slices: &[Slice<'_>], frame: &mut Frame, work: &mut Work) {
         let (width, height) = (frame.width(), frame.height());
         // Channels with rays of their own are drawn one by one, the others together.
         let planes = frame.planes.len();
-        let own = instant.eye.channels() == planes;
+        let own = slices.first().is_some_and(|slice| slice.instant.eye.channels() == planes);
         // Under a membrane that is drawn at once a row's surround is laid when its turn comes: it is at hand then.
         let at_once = parts.pipeline.shading.is_some() && !own;
-        let later = if at_once { self.rim_rows(instant, rows, (width, height)) } else { 0..0 };
+        self.later.clear();
+        self.later.resize(height, false);
+        self.domes.resize_with(slices.len(), Coverage::default);
+        if at_once {
+            self.find_domes(slices, 0, (width, height));
+            for (dome, slice) in self.domes.iter().zip(slices) {
+                for (y, ..) in dome.rows(width, height).filter(|(y, ..)| slice.rows().contains(y)) {
+                    self.later.get_mut(y).into_iter().for_each(|later| *later = true);
+                }
+            }
+        }
         let surround = Surround::of(parts);
         for plane in &mut frame.planes {
-            let lines = plane.chunks_exact_mut(width).enumerate().skip(rows.start).take(rows.len());
-            lines.filter(|(y, _)| !later.contains(y)).for_each(|(y, row)| surround.lay(y, row, 0..width));
-            work.add_base((rows.len() * width) as u64 * units::PIXEL);
+            let rows = plane.chunks_exact_mut(width).zip(&self.later).enumerate();
+            for (y, (row, _)) in rows.filter(|(_, (_, later))| !**later) {
+                surround.lay(y, row, 0..width);
+            }
+            work.add_base((height * width) as u64 * units::PIXEL);
         }
         for channel in 0..if own { planes } else { 1 } {
-            let Some(optics) = instant.eye.optics(channel) else { continue };
             if !at_once {
-                let rim = clip_to_image(&rim_polygon(optics), width, height);
-                self.coverage.fill(&clip_to_rows(rim, rows, height));
+                self.find_domes(slices, channel, (width, height));
             }
             let together = if own { channel..channel + 1 } else { 0..planes };
             let mut extra = Work::default();
             let spent = if channel == 0 { &mut *work } else { &mut extra };
             match &parts.pipeline.shading {
-                None => self.flat(parts, rows, frame, together, spent),
-                Some(shading) => {
-                    self.lit(parts, instant, optics, shading.as_ref(), rows, frame, together, spent)
-                }
+                None => self.flat(parts, slices, frame, together, spent),
+                Some(shading) => self.lit(parts, slices, shading.as_ref(), frame, together, spent),
             }
             work.add(EffectName::Dispersion, extra.total());
         }
     }
 
-    /// The rows that the rim's outline meets in the first channel; the coverage is then the rim's.
-    fn rim_rows(
-        &mut self,
-        instant: &Instant,
-        rows: &Range<usize>,
-        (width, height): (usize, usize),
-    ) -> Range<usize> {
-        let Some(optics) = instant.eye.optics(0) else { return 0..0 };
-        let rim = clip_to_image(&rim_polygon(optics), width, height);
-        self.coverage.fill(&clip_to_rows(rim, rows, height));
-        let mut met = self.coverage.rows(width, height).map(|(y, ..)| y);
-        let first = met.next();
-        first.map_or(0..0, |first| first..met.last().unwrap_or(first) + 1)
+    /// The domes' coverage by slice, in a channel.
+    fn find_domes(&mut self, slices: &[Slice<'_>], channel: usize, (width, height): (usize, usize)) {
+        for (dome, slice) in self.domes.iter_mut().zip(slices) {
+            let rim = slice.instant.eye.optics(channel).map(rim_polygon).unwrap_or_default();
+            let rim = clip_to_image(&rim, width, height);
+            dome.fill(&clip_to_rows(rim, &slice.rows(), height));
+        }
     }
 
     fn flat(
         &mut self,
         parts: Parts<'_>,
-        rows: &Range<usize>,
+        slices: &[Slice<'_>],
         frame: &mut Frame,
         channels: Range<usize>,
         work: &mut Work,
@@ -124,78 +124,84 @@ impl Painter {
         let (width, height) = (frame.width(), frame.height());
         let light = &parts.scene.file().light;
         let rise = (light.membrane_level - light.surround_level) as f32;
-        for plane in frame.planes.iter_mut().skip(channels.start).take(channels.len()) {
-            for (y, x, part) in self.coverage.rows(width, height).filter(|(y, ..)| rows.contains(y)) {
-                let (seen, part) = inside(parts.field.row(y), x, part);
-                let Some(values) = plane.get_mut(y * width + seen.start..y * width + seen.end) else {
-                    continue;
-                };
-                for (value, share) in values.iter_mut().zip(part) {
-                    *value += share * rise;
+        for (dome, slice) in self.domes.iter().zip(slices) {
+            for plane in frame.planes.iter_mut().skip(channels.start).take(channels.len()) {
+                for (y, x, part) in dome.rows(width, height).filter(|(y, ..)| slice.rows().contains(y)) {
+                    let (seen, part) = inside(parts.field.row(y), x, part);
+                    let Some(values) = plane.get_mut(y * width + seen.start..y * width + seen.end) else {
+                        continue;
+                    };
+                    for (value, share) in values.iter_mut().zip(part) {
+                        *value += share * rise;
+                    }
                 }
+                work.add_base(dome.area() as u64 * units::PIXEL);
             }
-            work.add_base(self.coverage.area() as u64 * units::PIXEL);
         }
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one step of ground(), taken out to be read")]
     fn lit(
         &mut self,
         parts: Parts<'_>,
-        instant: &Instant,
-        optics: &SensorOptics,
+        slices: &[Slice<'_>],
         shading: &dyn Shading,
-        rows: &Range<usize>,
         frame: &mut Frame,
         channels: Range<usize>,
         work: &mut Work,
     ) {
         let (width, height) = (frame.width(), frame.height());
-        let [left, top, right, bottom] = self.coverage.bounds(width, height);
-        self.coverage.spans(width, height, &mut self.spans);
+        self.spans.clear();
+        self.spans.resize(height, 0..0);
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        let mut pressed: Option<PixelBox> = None;
+        let mut seen = Vec::with_capacity(slices.len());
+        for (dome, slice) in self.domes.iter().zip(slices) {
+            let Some(optics) = slice.instant.eye.optics(channels.start) else { continue };
+            let [left, top, right, bottom] = dome.bounds(width, height);
+            low = [low[0].min(left), low[1].min(top)];
+            high = [high[0].max(right), high[1].max(bottom)];
+            dome.spans(width, height, &slice.rows(), &mut self.spans);
+            let Shape { touch, dent, .. } = &slice.instant.shape;
+            let cap = touch.as_ref().filter(|_| dent.is_some()).and_then(Between::pressed_cap);
+            if let Some((middle, angle_rad)) = cap {
+                let angle_rad = angle_rad + PRESSED_MARGIN_MM / optics.dome_radius_mm();
+                let cap = cap_box(optics, middle, angle_rad, width, height);
+                pressed = Some(pressed.map_or(cap, |pressed| pressed.with(&cap)));
+            }
+            seen.push(LitSlice { end: slice.end, optics, dent: dent.as_ref() });
+        }
         for (y, span) in self.spans.iter_mut().enumerate() {
-            let seen = parts.field.row(y);
-            *span = if rows.contains(&y) { span.start.max(seen.start)..span.end.min(seen.end) } else { 0..0 };
+            let shown = parts.field.row(y);
+            *span = span.start.max(shown.start)..span.end.min(shown.end);
         }
         let surface = LitSurface {
-            optics,
-            dent: instant.dent.as_ref(),
+            slices: &seen,
             rays: Some(parts.field.rays()),
             shading,
             channel: channels.start,
             tolerance: (SMOOTH_GREY / 255.0 / parts.scene.file().electronics.steepest_code(DARK_LEVEL))
                 as f32,
         };
-        let pressed = instant.touch.as_ref().filter(|_| instant.dent.is_some()).and_then(|touch| {
-            let (middle, angle_rad) = touch.pressed_cap()?;
-            Some(cap_box(
-                optics,
-                middle,
-                angle_rad + PRESSED_MARGIN_MM / optics.dome_radius_mm(),
-                width,
-                height,
-            ))
-        });
-        let center = DVec2::new((left + right) as f64, (top + bottom) as f64) * 0.5;
+        let at = |k: usize| 0.5 * (low[k].min(high[k]) + high[k]) as f64;
+        let center = DVec2::new(at(0), at(1));
         if channels.len() == 3 {
             self.three.fill(&surface, (width, height), &self.spans, pressed, work);
-            let surround = (instant.eye.channels() != frame.planes.len()).then(|| Surround::of(parts));
-            blend(&mut self.three, &self.coverage, (parts.field, surround), center, rows, frame, 0);
         } else {
             self.one.fill(&surface, (width, height), &self.spans, pressed, work);
-            blend(&mut self.one, &self.coverage, (parts.field, None), center, rows, frame, channels.start);
         }
-        work.add_base(self.coverage.area() as u64 * units::PIXEL * channels.len() as u64);
+        for (dome, slice) in self.domes.iter().zip(slices) {
+            let over = (dome, &slice.rows());
+            if channels.len() == 3 {
+                let ground = (parts.field, Some(Surround::of(parts)));
+                blend(&mut self.three, over, ground, center, frame, channels.start);
+            } else {
+                blend(&mut self.one, over, (parts.field, None), center, frame, channels.start);
+            }
+            work.add_base(dome.area() as u64 * units::PIXEL * channels.len() as u64);
+        }
     }
 
-    fn dots(
-        &mut self,
-        parts: Parts<'_>,
-        spots: &Spots,
-        rows: &Range<usize>,
-        frame: &mut Frame,
-        work: &mut Work,
-    ) {
+    fn dots(&mut self, parts: Parts<'_>, spots: &Spots, frame: &mut Frame, work: &mut Work) {
         let (width, height) = (frame.width(), frame.height());
         let taken = 1.0 - parts.scene.file().ink.reflectance as f32;
         let channels = spots.channels();
@@ -203,7 +209,7 @@ impl Painter {
             let rings = parts.points.rings(index);
             for (channel, plane) in frame.planes.iter_mut().enumerate() {
                 if channel < channels {
-                    let Some(spot) = spots.dot(index, channel).filter(|spot| spot.meets(rows)) else {
+                    let Some(spot) = spots.dot(index, channel) else {
                         self.coverage.fill(&[]);
                         continue;
                     };
@@ -214,7 +220,7 @@ impl Painter {
                     work.add(owner, effort);
                     work.add(EffectName::InkEdge, (rings.len() as u64 - 1) * outline);
                 }
-                for (y, x, part) in self.coverage.rows(width, height).filter(|(y, ..)| rows.contains(y)) {
+                for (y, x, part) in self.coverage.rows(width, height) {
                     let start = y * width + x;
                     let Some(row) = plane.get_mut(start..start + part.len()) else { continue };
                     for (value, share) in row.iter_mut().zip(part) {
@@ -225,14 +231,7 @@ impl Painter {
         }
     }
 
-    fn markers(
-        &mut self,
-        parts: Parts<'_>,
-        spots: &Spots,
-        rows: &Range<usize>,
-        frame: &mut Frame,
-        work: &mut Work,
-    ) {
+    fn markers(&mut self, parts: Parts<'_>, spots: &Spots, frame: &mut Frame, work: &mut Work) {
         let Parts { scene, pipeline, .. } = parts;
         let (width, height) = (frame.width(), frame.height());
         let flat = [scene.file().light.marker_level as f32; 3];
@@ -243,7 +242,7 @@ impl Painter {
             };
             for (channel, plane) in frame.planes.iter_mut().enumerate() {
                 if channel < spots.channels() {
-                    let Some(spot) = spots.marker(index, channel).filter(|spot| spot.meets(rows)) else {
+                    let Some(spot) = spots.marker(index, channel) else {
                         self.coverage.fill(&[]);
                         continue;
                     };
@@ -254,7 +253,7 @@ impl Painter {
                     );
                 }
                 let level = level[channel.min(2)];
-                for (y, x, part) in self.coverage.rows(width, height).filter(|(y, ..)| rows.contains(y)) {
+                for (y, x, part) in self.coverage.rows(width, height) {
                     let (seen, part) = inside(parts.field.row(y), x, part);
                     let Some(row) = plane.get_mut(y * width + seen.start..y * width + seen.end) else {
                         continue;
@@ -313,10 +312,9 @@ impl<'a> Surround<'a> {
 /// Lays the lit membrane over the ground.
 fn blend<const N: usize>(
     lit: &mut Lit<N>,
-    coverage: &Coverage,
+    (coverage, rows): (&Coverage, &Range<usize>),
     (field, surround): (&LensField, Option<Surround<'_>>),
     center: DVec2,
-    rows: &Range<usize>,
     frame: &mut Frame,
     first: usize,
 ) {

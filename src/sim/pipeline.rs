@@ -1,7 +1,5 @@
 //! The parts that the used effects have put together, in the order in which light meets them.
 
-use std::ops::Range;
-
 use super::effect::EffectName;
 use super::frame::{Frame, Image8};
 use super::light::LightUse;
@@ -82,7 +80,7 @@ pub struct Ink {
 pub struct Timing {
     /// Exposure of each row, in `samples` equal parts whose pictures are averaged; `None`: an instant.
     pub exposure: Option<Exposure>,
-    /// Bands of rows, each drawn at the time of its middle row; `None`: all rows at the frame's time.
+    /// Rows exposed one after the other; `None`: all rows at the frame's time.
     pub rolling: Option<Rolling>,
 }
 
@@ -100,8 +98,8 @@ pub struct Exposure {
 pub struct Rolling {
     /// From the first row to the last, s; the middle of the picture is at the frame's time.
     pub readout_s: f64,
-    /// Bands of rows that are drawn at one time.
-    pub bands: u32,
+    /// Slices of rows: the sensor is worked out at the time of each one's middle row.
+    pub slices: u32,
 }
 
 /// Where on the way from light to bytes a pass stands.
@@ -126,8 +124,6 @@ pub struct PassContext {
     pub frame: u32,
     /// Seed of the run; random numbers depend on seed, frame and place only, never on threads.
     pub seed: u64,
-    /// Rows that are drawn now (all of them after averaging); a pass before that may leave the others alone.
-    pub rows: Range<usize>,
 }
 
 /// A pass over the picture.

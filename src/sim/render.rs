@@ -4,25 +4,25 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::SimError;
+use super::edges::EDGE_GREY;
 use super::effect::EffectName;
 use super::effects;
 use super::eye::Eye;
 use super::field::LensField;
 use super::frame::{Frame, Image8};
-use super::instant::{Instant, count_points, dent_step_mm};
+use super::instant::{Instant, count_points, dent_step_mm, units};
 use super::picture::{Painter, Parts};
 use super::pipeline::{PassContext, Pipeline, Stage};
 use super::plan::Plan;
+use super::rolled::{Rolled, Slice};
 use super::scene::Scene;
+use super::shapes::{Shape, Shapes};
 use super::spots::{Points, Spots};
-use super::touch::{Between, Stepper, Touch};
+use super::touch::{Stepper, Touch};
 use super::truth::{EffectTruth, FrameTruth, Seen, dot_truth, effects_of, marker_truth};
 use super::work::Work;
 use crate::mechanics::contact::ContactState;
 use crate::numeric::Rigid;
-
-/// How far the drawn outlines of dots may be from the exact ones, grey levels at the edge.
-const OUTLINE_GREY: f64 = 0.5;
 
 /// Draws the frames of a scene with the effects of a plan.
 pub struct Renderer<'a> {
@@ -77,15 +77,6 @@ pub struct Around {
     pub after: Touch,
 }
 
-/// By band of rows, what was seen at each of its times.
-type SeenInBands = Vec<(Range<usize>, Vec<Spots>)>;
-
-/// Rows that are drawn at one set of times.
-struct Band {
-    rows: Range<usize>,
-    times_s: Vec<f64>,
-}
-
 impl<'a> Renderer<'a> {
     /// Puts the plan's effects together; tables are made here.
     ///
@@ -96,7 +87,7 @@ impl<'a> Renderer<'a> {
         let pipeline = plan.pipeline(scene, &mut setup)?;
         let eye = Eye::new(scene, pipeline.geometry)?;
         let contrast = (255.0 * scene.file().light.membrane_level).max(1.0);
-        let points = Points::new(scene, &pipeline, &eye, OUTLINE_GREY / contrast, &mut setup);
+        let points = Points::new(scene, &pipeline, &eye, EDGE_GREY / contrast, &mut setup);
         let (width, height) = scene.image_size();
         let at_rest = eye.at(&Rigid::identity())?;
         let lens = at_rest.optics(eye.reference()).filter(|_| scene.draws()).map(|optics| optics.lens());
@@ -104,9 +95,7 @@ impl<'a> Renderer<'a> {
         let timing = &pipeline.timing;
         let gathered_s =
             timing.exposure.map_or(0.0, |e| e.exposure_s) + timing.rolling.map_or(0.0, |r| r.readout_s);
-        // A dome that is touched or let go moves at once.
-        let sudden = if scene.objects().is_empty() { 0.0 } else { 0.25 * height as f64 };
-        let moved_px = sudden + 0.5 * gathered_s * effects::speed::fastest_px_per_s(scene).unwrap_or(0.0);
+        let moved_px = 0.5 * gathered_s * effects::speed::fastest_px_per_s(scene).unwrap_or(0.0);
         Ok(Self { scene, pipeline, eye, points, field, effects: effects_of(plan), moved_px, setup })
     }
 
@@ -120,6 +109,12 @@ impl<'a> Renderer<'a> {
         &self.pipeline
     }
 
+    /// The points that are followed.
+    #[cfg(test)]
+    pub(super) fn points(&self) -> &Points {
+        &self.points
+    }
+
     /// Solves the contact of the frames in their order, where contact takes part.
     ///
     /// # Errors
@@ -128,25 +123,40 @@ impl<'a> Renderer<'a> {
         self.pipeline.contact.map(|level| Stepper::new(self.scene, level)).transpose()
     }
 
-    /// The sensor at a time; `around` is the touched dome about the frame.
+    /// The sensor at a frame's time; `around` is the touched dome about the frame.
     ///
     /// # Errors
     /// A load without balance.
-    pub fn instant(
+    pub fn instant(&self, frame: u32, around: Option<&Around>, work: &mut Work) -> Result<Instant, SimError> {
+        let time_s = self.scene.time_s(frame);
+        let shape = self.shape(0.0, around, work);
+        self.instant_of(frame, time_s, shape, work)
+    }
+
+    /// The touched dome at a time of so many frames after the frame.
+    fn shape(&self, frames: f64, around: Option<&Around>, work: &mut Work) -> Shape {
+        let touch = around.map(|around| around.at(frames));
+        Shape::of(touch, self.scene.optics().dome_radius_mm(), self.dent_step_mm(), work)
+    }
+
+    /// Distance of the dent's nodes; `None` where no light falls on them.
+    fn dent_step_mm(&self) -> Option<f64> {
+        let lit = self.pipeline.shading.is_some() && self.field.is_some();
+        lit.then(|| dent_step_mm(self.pipeline.contact))
+    }
+
+    fn instant_of(
         &self,
         frame: u32,
         time_s: f64,
-        around: Option<&Around>,
+        shape: Shape,
         work: &mut Work,
     ) -> Result<Instant, SimError> {
-        let touch = around.map(|around| around.at((time_s - self.scene.time_s(frame)) * self.rate_hz()));
-        let state = match &touch {
+        let state = match &shape.touch {
             Some(touch) => touch.state(self.scene.suspension().at_mm()),
             None => self.scene.state_at(frame, time_s)?,
         };
-        let lit = self.pipeline.shading.is_some() && self.field.is_some();
-        let step_mm = lit.then(|| dent_step_mm(self.pipeline.contact));
-        Instant::new(self.scene, &self.eye, self.pipeline.geometry, time_s, state, touch, step_mm, work)
+        Instant::new(&self.eye, self.pipeline.geometry, time_s, state, shape, work)
     }
 
     fn rate_hz(&self) -> f64 {
@@ -159,7 +169,7 @@ impl<'a> Renderer<'a> {
     /// As [`Renderer::instant`].
     pub fn centers(&self, frame: u32, around: Option<&Around>) -> Result<Vec<Option<glam::DVec2>>, SimError> {
         let mut work = Work::default();
-        let instant = self.instant(frame, self.scene.time_s(frame), around, &mut work)?;
+        let instant = self.instant(frame, around, &mut work)?;
         Ok(self.points.centers(&instant, self.eye.reference()))
     }
 
@@ -193,17 +203,18 @@ impl<'a> Renderer<'a> {
         scratch: &mut Scratch,
     ) -> Result<Drawn, SimError> {
         let mut work = Work::default();
-        let now = self.instant(number, self.scene.time_s(number), around, &mut work)?;
+        let now = self.instant(number, around, &mut work)?;
         self.count(&mut work);
         let spots = self.points.see(self.scene, &now);
-        let (image, bands) = match &self.field {
+        let (image, parts) = match &self.field {
             Some(field) => {
-                let (image, bands) = self.picture(field, number, &now, &spots, around, scratch, &mut work)?;
-                (Some(image), bands)
+                let (image, parts) =
+                    self.picture(field, number, (&now, &spots), around, scratch, &mut work)?;
+                (Some(image), parts)
             }
             None => (None, Vec::new()),
         };
-        let truth = self.truth(number, &now, &spots, &bands);
+        let truth = self.truth(number, &now, &spots, &parts);
         let contact = around.and_then(|around| around.now.contact.clone());
         Ok(Drawn { image, truth, contact, work })
     }
@@ -213,45 +224,37 @@ impl<'a> Renderer<'a> {
         count_points(self.pipeline.geometry, self.eye.channels(), central, Points::count(self.scene), work);
     }
 
-    fn bands(&self, time_s: f64, height: usize) -> Vec<Band> {
-        let timing = &self.pipeline.timing;
-        let rows_at: Vec<(Range<usize>, f64)> = match timing.rolling {
-            None => vec![(0..height, time_s)],
-            Some(rolling) => {
-                let bands = (rolling.bands as usize).clamp(1, height.max(1));
-                let edge = |band: usize| band * height / bands;
-                let row_time = |rows: &Range<usize>| {
-                    let middle = 0.5 * (rows.start + rows.end).saturating_sub(1) as f64;
-                    let span = (height.max(2) - 1) as f64;
-                    time_s + rolling.readout_s * (middle / span - 0.5)
-                };
-                let bands = (0..bands).map(|band| edge(band)..edge(band + 1));
-                bands.map(|rows| (rows.clone(), row_time(&rows))).collect()
-            }
-        };
-        let times = |at: f64| match timing.exposure {
-            None => vec![at],
-            Some(exposure) => {
-                let count = exposure.samples.max(1);
-                let part = |k: u32| (f64::from(k) + 0.5) / f64::from(count) - 0.5;
-                (0..count).map(|k| at + exposure.exposure_s * part(k)).collect()
-            }
-        };
-        rows_at.into_iter().map(|(rows, at)| Band { rows, times_s: times(at) }).collect()
+    /// Times at which a row gathers light, s after its own.
+    fn exposure_s(&self) -> Vec<f64> {
+        let Some(exposure) = self.pipeline.timing.exposure else { return vec![0.0] };
+        let count = exposure.samples.max(1);
+        let part = |k: u32| (f64::from(k) + 0.5) / f64::from(count) - 0.5;
+        (0..count).map(|k| exposure.exposure_s * part(k)).collect()
     }
 
-    /// The picture, and for each band of rows what was seen at its times; empty where all is at the frame's time.
-    #[expect(clippy::too_many_arguments, reason = "one step of frame_around(), taken out to be read")]
+    /// The rows of a picture with the time of their middle, s after the frame's.
+    fn rows_s(&self, height: usize) -> Vec<(Range<usize>, f64)> {
+        let Some(rolling) = self.pipeline.timing.rolling else { return vec![(0..height, 0.0)] };
+        let count = (rolling.slices as usize).clamp(1, height.max(1));
+        let slice = |k: usize| {
+            let rows = k * height / count..(k + 1) * height / count;
+            let middle = 0.5 * (rows.start + rows.end).saturating_sub(1) as f64;
+            let span = (height.max(2) - 1) as f64;
+            (rows, rolling.readout_s * (middle / span - 0.5))
+        };
+        (0..count).map(slice).collect()
+    }
+
+    /// The picture, and what was seen in each part of the exposure; empty where all is at the frame's time.
     fn picture(
         &self,
         field: &LensField,
         number: u32,
-        now: &Instant,
-        now_spots: &Spots,
+        (now, now_spots): (&Instant, &Spots),
         around: Option<&Around>,
         scratch: &mut Scratch,
         work: &mut Work,
-    ) -> Result<(Image8, SeenInBands), SimError> {
+    ) -> Result<(Image8, Vec<Spots>), SimError> {
         let scene = self.scene;
         let parts = Parts { scene, pipeline: &self.pipeline, points: &self.points, field };
         let (width, height) = scene.image_size();
@@ -261,71 +264,101 @@ impl<'a> Renderer<'a> {
         };
         let mut frame =
             scratch.frame.take().filter(fits).unwrap_or_else(|| Frame::new(width, height, planes));
-        let seed = scene.file().seed;
-        let bands = self.bands(now.time_s, height);
-        let alone = bands.len() == 1 && bands.iter().all(|band| band.times_s.len() == 1);
-        let mut part = None;
-        if !alone {
-            frame.planes.iter_mut().for_each(|plane| plane.fill(0.0));
-            part =
-                Some(scratch.part.take().filter(fits).unwrap_or_else(|| Frame::new(width, height, planes)));
-        }
+        let context = PassContext { frame: number, seed: scene.file().seed };
+        let (exposure_s, rows_s) = (self.exposure_s(), self.rows_s(height));
         let mut told = Vec::new();
-        for band in &bands {
-            let context = PassContext { frame: number, seed, rows: band.rows.clone() };
-            let mut seen = Vec::new();
-            for (sample, time_s) in band.times_s.iter().enumerate() {
-                let target = part.as_mut().unwrap_or(&mut frame);
+        if exposure_s.len() == 1 && rows_s.len() == 1 {
+            let slice = Slice { first: 0, end: height, instant: now };
+            scratch.painter.draw(parts, &[slice], now_spots, &mut frame, work);
+            self.run_passes(&mut frame, &context, work, |stage| stage <= Stage::Focus);
+        } else {
+            let mut extra = Work::default();
+            let radius_mm = scene.optics().dome_radius_mm();
+            let shapes = around.and_then(|around| {
+                Shapes::new(around, &self.points, radius_mm, self.dent_step_mm(), &mut extra)
+            });
+            work.add(self.owner_of_time(), extra.total());
+            let mut part =
+                scratch.part.take().filter(fits).unwrap_or_else(|| Frame::new(width, height, planes));
+            frame.planes.iter_mut().for_each(|plane| plane.fill(0.0));
+            for (sample, after_s) in exposure_s.iter().enumerate() {
                 let mut extra = Work::default();
-                let first = sample == 0 && told.is_empty();
-                let spent = if first { &mut *work } else { &mut extra };
-                if *time_s == now.time_s {
-                    scratch.painter.draw(parts, now, now_spots, band.rows.clone(), target, spent);
-                    seen.push(now_spots.clone());
-                } else {
-                    let instant = self.instant(number, *time_s, around, spent)?;
-                    self.count(spent);
-                    let spots = self.points.see_rows(scene, &instant, (now_spots, self.moved_px), &band.rows);
-                    scratch.painter.draw(parts, &instant, &spots, band.rows.clone(), target, spent);
-                    seen.push(spots);
+                let spent = if sample == 0 { &mut *work } else { &mut extra };
+                let mut instants = Vec::with_capacity(rows_s.len());
+                for (slice, (_, row_s)) in rows_s.iter().enumerate() {
+                    let mut one = Work::default();
+                    let frames = (after_s + row_s) * self.rate_hz();
+                    let time_s = now.time_s + after_s + row_s;
+                    let shape = match &shapes {
+                        Some(shapes) => shapes.at(frames),
+                        None => Shape { touch: around.map(|around| around.at(frames)), ..Shape::default() },
+                    };
+                    instants.push(self.instant_of(number, time_s, shape, &mut one)?);
+                    match slice {
+                        0 => spent.merge(&one),
+                        _ => spent.add(EffectName::RollingShutter, one.total()),
+                    }
                 }
-                for pass in self.pipeline.passes.iter().filter(|pass| pass.stage() <= Stage::Focus) {
-                    pass.run(target, &context, spent);
-                }
-                // What the first picture does not do, the effects of time do.
-                let owner = if sample > 0 { EffectName::MotionBlur } else { EffectName::RollingShutter };
-                work.add(owner, extra.total());
-                if let Some(part) = &part {
-                    add_rows(&mut frame, part, &band.rows, 1.0 / band.times_s.len() as f32);
-                }
+                let slice = |((rows, _), instant): (&(Range<usize>, f64), _)| Slice {
+                    first: rows.start,
+                    end: rows.end,
+                    instant,
+                };
+                let slices: Vec<Slice<'_>> = rows_s.iter().zip(&instants).map(slice).collect();
+                let spots = match slices.as_slice() {
+                    [only] => {
+                        self.count(spent);
+                        self.points.see(scene, only.instant)
+                    }
+                    _ => {
+                        let (spots, pixels) =
+                            Rolled::new(&self.points, &slices).see(scene, now_spots, self.moved_px);
+                        spent.add(EffectName::RollingShutter, pixels * (units::STRAIGHT + units::BEND));
+                        spots
+                    }
+                };
+                scratch.painter.draw(parts, &slices, &spots, &mut part, spent);
+                self.run_passes(&mut part, &context, spent, |stage| stage <= Stage::Focus);
+                // What the first picture does not do, the exposure does.
+                work.add(EffectName::MotionBlur, extra.total());
+                add(&mut frame, &part, 1.0 / exposure_s.len() as f32);
+                told.push(spots);
             }
-            if !alone {
-                told.push((band.rows.clone(), seen));
-            }
+            scratch.part = Some(part);
         }
-        let context = PassContext { frame: number, seed, rows: 0..height };
-        for pass in self.pipeline.passes.iter().filter(|pass| pass.stage() > Stage::Focus) {
-            pass.run(&mut frame, &context, work);
-        }
+        self.run_passes(&mut frame, &context, work, |stage| stage > Stage::Focus);
         let bytes = std::mem::take(&mut scratch.bytes);
         let mut image = frame.encode_into(scene.file().electronics.gamma, bytes);
         for pass in &self.pipeline.coded_passes {
             pass.run(&mut image, &context, work);
         }
         scratch.frame = Some(frame);
-        scratch.part = part.or(scratch.part.take());
         Ok((image, told))
     }
 
-    fn truth(
+    fn run_passes(
         &self,
-        number: u32,
-        now: &Instant,
-        spots: &Spots,
-        bands: &[(Range<usize>, Vec<Spots>)],
-    ) -> FrameTruth {
+        frame: &mut Frame,
+        context: &PassContext,
+        work: &mut Work,
+        when: impl Fn(Stage) -> bool,
+    ) {
+        for pass in self.pipeline.passes.iter().filter(|pass| when(pass.stage())) {
+            pass.run(frame, context, work);
+        }
+    }
+
+    /// The effect for which the dome is known at several times.
+    fn owner_of_time(&self) -> EffectName {
+        match self.pipeline.timing.rolling {
+            Some(_) => EffectName::RollingShutter,
+            None => EffectName::MotionBlur,
+        }
+    }
+
+    fn truth(&self, number: u32, now: &Instant, spots: &Spots, parts: &[Spots]) -> FrameTruth {
         let scene = self.scene;
-        let seen = Seen { now: spots, bands, reference: self.eye.reference() };
+        let seen = Seen { now: spots, parts, reference: self.eye.reference() };
         let held = now.state.held.as_ref();
         FrameTruth {
             frame: number,
@@ -349,36 +382,10 @@ impl<'a> Renderer<'a> {
     }
 }
 
-impl Around {
-    /// About one frame of a sequence.
-    pub fn of(touches: &[Touch], index: usize) -> Option<Self> {
-        let now = touches.get(index)?.clone();
-        let before = index.checked_sub(1).and_then(|i| touches.get(i)).unwrap_or(&now).clone();
-        let after = touches.get(index + 1).unwrap_or(&now).clone();
-        Some(Self { before, now, after })
-    }
-
-    /// At a time of so many frames after the frame.
-    fn at(&self, frames: f64) -> Between {
-        if frames < 0.0 {
-            let part = (1.0 + frames).clamp(0.0, 1.0);
-            Between { from: self.before.clone(), to: self.now.clone(), part }
-        } else if frames > 0.0 {
-            Between { from: self.now.clone(), to: self.after.clone(), part: frames.clamp(0.0, 1.0) }
-        } else {
-            Between::at_frame(self.now.clone())
-        }
-    }
-}
-
-fn add_rows(sum: &mut Frame, part: &Frame, rows: &Range<usize>, weight: f32) {
-    let width = sum.width();
+fn add(sum: &mut Frame, part: &Frame, weight: f32) {
     for (sum, part) in sum.planes.iter_mut().zip(&part.planes) {
-        let range = rows.start * width..rows.end * width;
-        if let (Some(sum), Some(part)) = (sum.get_mut(range.clone()), part.get(range)) {
-            for (sum, value) in sum.iter_mut().zip(part) {
-                *sum += weight * value;
-            }
+        for (sum, value) in sum.iter_mut().zip(part) {
+            *sum += weight * value;
         }
     }
 }

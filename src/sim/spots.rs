@@ -1,7 +1,5 @@
 //! Where dots and markers appear: centres, outlines as drawn, centroids.
 
-use std::ops::Range;
-
 use glam::{DVec2, DVec3};
 
 use super::coverage::{area_moment, clip, clip_to_image};
@@ -14,7 +12,7 @@ use super::scene::{RIM_POINTS, Scene};
 use super::work::Work;
 
 /// A centre and its outline.
-type Followed<T> = [T; RIM_POINTS + 1];
+pub(super) type Followed<T> = [T; RIM_POINTS + 1];
 
 /// Rings of the ink's soft edge, each with an equal share of the ink.
 const EDGE_RINGS: u32 = 6;
@@ -45,16 +43,10 @@ pub struct Spot {
 }
 
 impl Spot {
-    /// Whether any of it may lie in some rows.
-    pub fn meets(&self, rows: &Range<usize>) -> bool {
-        self.within(rows, 0.0)
-    }
-
-    fn within(&self, rows: &Range<usize>, more_px: f64) -> bool {
-        let reach = self.polygon.iter().map(|p| (p.y - self.center_px.y).abs()).fold(0.0, f64::max);
-        // The outermost ring of a soft edge lies at most at twice the outline.
-        let reach = 2.0 * reach + 1.0 + more_px;
-        self.center_px.y + reach >= rows.start as f64 && self.center_px.y - reach <= rows.end as f64
+    /// Its first and last row, px.
+    pub fn rows(&self) -> (f64, f64) {
+        let rows = self.polygon.iter().map(|p| p.y);
+        rows.fold((self.center_px.y, self.center_px.y), |(low, high), y| (low.min(y), high.max(y)))
     }
 }
 
@@ -147,36 +139,29 @@ impl Points {
 
     /// All images at an instant.
     pub fn see(&self, scene: &Scene, instant: &Instant) -> Spots {
-        self.see_some(scene, instant, &|_, _| true)
-    }
-
-    /// The images at an instant that lie in some rows or near them, by where they are at another instant,
-    /// from which none has moved by more than `moved_px`.
-    pub fn see_rows(
-        &self,
-        scene: &Scene,
-        instant: &Instant,
-        (then, moved_px): (&Spots, f64),
-        rows: &Range<usize>,
-    ) -> Spots {
-        self.see_some(scene, instant, &|item, channel| {
-            then.dot(item, channel).is_none_or(|spot| spot.within(rows, moved_px))
+        let moved = self.moved(instant);
+        let items = moved.as_ref().unwrap_or(&self.items);
+        let deformed = moved.is_some();
+        let surface_mm = items.iter().take(self.dots).map(|points| points[0]).collect();
+        self.gather(scene, instant.eye.channels(), surface_mm, &mut |item, channel, k| {
+            self.pixel(instant, channel, item, items.get(item)?, k, deformed)
         })
     }
 
-    fn see_some(&self, scene: &Scene, instant: &Instant, wanted: &dyn Fn(usize, usize) -> bool) -> Spots {
-        let moved = self.moved(instant);
-        let items = moved.as_ref().unwrap_or(&self.items);
-        let channels = instant.eye.channels();
-        let mut spots = Vec::with_capacity(items.len() * channels);
-        for (item, points) in items.iter().enumerate() {
+    /// Images made of the pixels of followed points, which `pixel` tells by item, channel and number of the point.
+    pub(super) fn gather(
+        &self,
+        scene: &Scene,
+        channels: usize,
+        surface_mm: Vec<DVec3>,
+        pixel: &mut dyn FnMut(usize, usize, usize) -> Option<DVec2>,
+    ) -> Spots {
+        let mut spots = Vec::with_capacity(self.items.len() * channels);
+        for item in 0..self.items.len() {
             for channel in 0..channels {
-                let spot = wanted(item, channel)
-                    .then(|| self.spot(scene, instant, channel, item, points, moved.is_some()));
-                spots.push(spot.flatten());
+                spots.push(self.spot(scene, item, &mut |k| pixel(item, channel, k)));
             }
         }
-        let surface_mm = items.iter().take(self.dots).map(|points| points[0]).collect();
         Spots { channels, dots: self.dots, spots, surface_mm }
     }
 
@@ -188,19 +173,36 @@ impl Points {
         items.iter().enumerate().map(see).collect()
     }
 
+    /// The followed points of the dots on the undeformed dome, mm.
+    pub fn on_dome_mm(&self) -> Vec<DVec3> {
+        self.items.iter().take(self.dots).flatten().copied().collect()
+    }
+
+    /// The followed points at rest.
+    pub(super) fn items(&self) -> &[Followed<DVec3>] {
+        &self.items
+    }
+
     /// The points on the deformed dome; `None` where it is not. Markers stay on the sheet.
-    fn moved(&self, instant: &Instant) -> Option<Vec<Followed<DVec3>>> {
-        let between = instant.touch.as_ref().filter(|between| between.is_dented())?;
-        let flat: Vec<DVec3> = self.items.iter().take(self.dots).flatten().copied().collect();
-        let displaced = between.displacements_mm(&flat);
+    pub(super) fn moved(&self, instant: &Instant) -> Option<Vec<Followed<DVec3>>> {
+        let between = instant.shape.touch.as_ref().filter(|between| between.is_dented())?;
+        let worked_out;
+        let displaced = match &instant.shape.displaced_mm {
+            Some(known) => known,
+            None => {
+                worked_out = between.displacements_mm(&self.on_dome_mm());
+                &worked_out
+            }
+        };
         let mut items = self.items.clone();
         for (point, u) in items.iter_mut().flatten().zip(displaced) {
-            *point += u;
+            *point += *u;
         }
         Some(items)
     }
 
-    fn pixel(
+    /// The pixel of a followed point, 0 the centre.
+    pub(super) fn pixel(
         &self,
         instant: &Instant,
         channel: usize,
@@ -219,19 +221,16 @@ impl Points {
     fn spot(
         &self,
         scene: &Scene,
-        instant: &Instant,
-        channel: usize,
         item: usize,
-        points: &Followed<DVec3>,
-        deformed: bool,
+        pixel: &mut dyn FnMut(usize) -> Option<DVec2>,
     ) -> Option<Spot> {
-        let center_px = self.pixel(instant, channel, item, points, 0, deformed)?;
+        let center_px = pixel(0)?;
         let mut rim = [DVec2::ZERO; RIM_POINTS];
         let mut seen = 0;
         for (k, place) in rim.iter_mut().enumerate() {
             // At the end of the lens's domain only a part of the outline is seen: what is not stays at the centre.
             *place = center_px;
-            if let Some(pixel) = self.pixel(instant, channel, item, points, k + 1, deformed) {
+            if let Some(pixel) = pixel(k + 1) {
                 *place = pixel;
                 seen += 1;
             }

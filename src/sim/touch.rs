@@ -12,7 +12,7 @@ use super::work::Work;
 use crate::design::DesignError;
 use crate::mechanics::Displacement;
 use crate::mechanics::contact::{
-    Contact, ContactError, ContactState, Elastomer, Level, PressStatus, Pressed,
+    Contact, ContactError, ContactState, Elastomer, Extent, Level, PressStatus, Pressed,
 };
 use crate::numeric::Rigid;
 
@@ -188,21 +188,30 @@ impl Between {
     /// The pressed part of the dome: direction of its middle and half the angle of a cap about it; `None` where
     /// nothing bears a load.
     pub fn pressed_cap(&self) -> Option<(DVec3, f64)> {
-        let nodes = || {
-            let parts = self.parts().into_iter().filter(|(_, weight)| *weight > 0.0);
-            parts.filter_map(|(contact, _)| contact).flat_map(|contact| &contact.nodes)
-        };
-        let middle = nodes().map(|node| node.at_mm.normalize_or_zero()).sum::<DVec3>().try_normalize()?;
-        let angle_of = |at: DVec3| middle.dot(at.normalize_or(middle)).clamp(-1.0, 1.0).acos();
-        Some((middle, nodes().map(|node| angle_of(node.at_mm)).fold(0.0, f64::max)))
+        pressed_cap(self.contacts())
     }
 
     /// The region that moves: direction of its middle, half its angle, and the most that anything moves outside.
-    pub fn extents(&self) -> Vec<crate::mechanics::contact::Extent> {
-        self.parts()
-            .into_iter()
-            .filter(|(_, weight)| *weight > 0.0)
-            .filter_map(|(c, _)| Some(c?.extent()))
-            .collect()
+    pub fn extents(&self) -> Vec<Extent> {
+        extents(self.contacts())
     }
+
+    fn contacts(&self) -> impl Iterator<Item = &ContactState> + Clone {
+        self.parts().into_iter().filter(|(_, weight)| *weight > 0.0).filter_map(|(contact, _)| contact)
+    }
+}
+
+/// The cap that holds what bears a load in any of some contacts: direction of its middle, half its angle.
+pub(super) fn pressed_cap<'c>(
+    contacts: impl Iterator<Item = &'c ContactState> + Clone,
+) -> Option<(DVec3, f64)> {
+    let nodes = || contacts.clone().flat_map(|contact| &contact.nodes);
+    let middle = nodes().map(|node| node.at_mm.normalize_or_zero()).sum::<DVec3>().try_normalize()?;
+    let angle_of = |at: DVec3| middle.dot(at.normalize_or(middle)).clamp(-1.0, 1.0).acos();
+    Some((middle, nodes().map(|node| angle_of(node.at_mm)).fold(0.0, f64::max)))
+}
+
+/// The regions that move in some contacts.
+pub(super) fn extents<'c>(contacts: impl Iterator<Item = &'c ContactState>) -> Vec<Extent> {
+    contacts.map(ContactState::extent).collect()
 }

@@ -1,7 +1,5 @@
 //! What is true of a frame.
 
-use std::ops::Range;
-
 use glam::DVec2;
 use serde::Serialize;
 
@@ -102,13 +100,13 @@ pub fn effects_of(plan: &Plan) -> Vec<EffectTruth> {
 pub(super) struct Seen<'a> {
     /// At the frame's time.
     pub now: &'a Spots,
-    /// By band of rows, at each of its times; empty where all rows are at the frame's time.
-    pub bands: &'a [(Range<usize>, Vec<Spots>)],
+    /// In each part of the exposure; empty where all light is gathered at the frame's time.
+    pub parts: &'a [Spots],
     /// The reference channel.
     pub reference: usize,
 }
 
-/// Mean centre, mean centroid and area of an item over the times at which its rows were exposed.
+/// Mean centre, mean centroid and area of an item over the parts of the exposure.
 struct Mean {
     center_px: DVec2,
     centroid_px: DVec2,
@@ -121,33 +119,15 @@ impl Seen<'_> {
         channel: usize,
         see: &dyn Fn(&'s Spots, usize) -> Option<&'s Spot>,
     ) -> Option<Mean> {
-        let now = see(self.now, channel)?;
-        // The band that holds the item where the item was when the band was exposed; near a band's edge there may
-        // be none or two, then the one where it is at the frame's time.
-        let row_of = |spot: &Spot| spot.center_px.y + 0.5;
-        let holds =
-            |rows: &Range<usize>, spot: &Spot| (rows.start as f64..rows.end as f64).contains(&row_of(spot));
-        let mut bands = self.bands.iter();
-        let band = bands
-            .find(|(rows, seen)| {
-                let middle = seen.get(seen.len() / 2).and_then(|spots| see(spots, channel));
-                middle.is_some_and(|spot| holds(rows, spot))
-            })
-            .or_else(|| self.bands.iter().find(|(rows, _)| holds(rows, now)));
-        let Some((_, seen)) = band else {
-            return Some(Mean {
-                center_px: now.center_px,
-                centroid_px: now.centroid_px,
-                area_px2: now.area_px2,
-            });
-        };
-        let spots: Vec<&Spot> = seen.iter().filter_map(|spots| see(spots, channel)).collect();
-        let count = spots.len().max(1) as f64;
+        let parts = if self.parts.is_empty() { std::slice::from_ref(self.now) } else { self.parts };
+        let spots: Vec<&Spot> = parts.iter().filter_map(|spots| see(spots, channel)).collect();
+        let first = spots.first()?;
+        let count = spots.len() as f64;
         let area: f64 = spots.iter().map(|spot| spot.area_px2).sum();
         let weighted = spots.iter().map(|spot| spot.centroid_px * spot.area_px2).sum::<DVec2>();
         Some(Mean {
             center_px: spots.iter().map(|spot| spot.center_px).sum::<DVec2>() / count,
-            centroid_px: if area > 0.0 { weighted / area } else { now.centroid_px },
+            centroid_px: if area > 0.0 { weighted / area } else { first.centroid_px },
             area_px2: area / count,
         })
     }

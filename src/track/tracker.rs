@@ -18,7 +18,7 @@ use super::result::{DotResult, MOST_FALSE_DOTS, MarkerResult, Tracked};
 use super::springs::Springs;
 use super::status::{MarkState, Problem};
 use super::surplus::Surplus;
-use super::whites::{Disc, View};
+use super::whites::{Disc, Tilt, View};
 use crate::constants::Constants;
 use crate::mechanics::Displacement;
 use crate::numeric::Rigid;
@@ -77,6 +77,8 @@ pub struct Tracker {
     hits: Vec<Result<SurfacePoint, Limit>>,
     seen: Vec<Seen>,
     discs: Vec<Option<Disc>>,
+    /// How the light falls off across each marker.
+    tilts: Vec<Tilt>,
     /// The last pose that was found.
     pose: Option<Rigid>,
     /// The oldest pose that an offset may be for, the one that the newest are for, and the dot whose turn is next.
@@ -147,6 +149,7 @@ impl Tracker {
             hits: Vec::with_capacity(dots),
             seen: Vec::with_capacity(model.markers.len()),
             discs: vec![None; model.markers.len()],
+            tilts: vec![Tilt::default(); model.markers.len()],
             pose: None,
             offsets_from: None,
             offsets_at: None,
@@ -187,6 +190,7 @@ impl Tracker {
         self.pose = None;
         self.last_number = None;
         self.surplus.forget();
+        self.tilts.fill(Tilt::default());
         self.tracks.fill(DotTrack::default());
         self.reference.frames = 0;
         self.reference.wrench = [0.0; 6];
@@ -333,16 +337,17 @@ impl Tracker {
         }
         let spacing = self.model.dots.first().map_or(MARKER_REACH_PX, |d| MARKER_REACH * d.spacing_px);
         let white = self.white();
-        for (marker, disc) in self.model.markers.iter().zip(&mut self.discs) {
+        for ((marker, disc), tilt) in self.model.markers.iter().zip(&mut self.discs).zip(&self.tilts) {
+            let tilt = tilt.known();
             let levels = disc.take().map(|d| d.levels);
             let Ok(image) = marker.image(&self.optics) else { continue };
             let Some(view) = View::new(&self.optics, marker) else { continue };
             let start = image.centroid_px;
-            *disc = view.fit(plane, start, FIT_REACH_PX, levels);
+            *disc = view.fit(plane, start, FIT_REACH_PX, levels, tilt);
             if disc.is_none() {
                 let mut best = [(0.0, DVec2::ZERO); 1];
                 if view.candidates(plane, start, spacing, white, &mut best) > 0 {
-                    *disc = view.fit(plane, best[0].1, FIT_REACH_PX, None);
+                    *disc = view.fit(plane, best[0].1, FIT_REACH_PX, None, tilt);
                 }
             }
         }
@@ -359,7 +364,7 @@ impl Tracker {
             }
             let Ok(image) = marker.image(&self.optics) else { continue };
             let Some(view) = View::new(&self.optics, marker) else { continue };
-            *disc = view.fit(plane, image.centroid_px, FIT_REACH_PX, None);
+            *disc = view.fit(plane, image.centroid_px, FIT_REACH_PX, None, self.tilts[index].known());
             if disc.is_some() {
                 more[count] = Some(index);
                 count += 1;
@@ -419,7 +424,9 @@ impl Tracker {
                 if next == CANDIDATES {
                     break;
                 }
-                let fits = views.iter().filter_map(|views| views[index]?.fit(plane, *at, FIT_REACH_PX, None));
+                let fits = views
+                    .iter()
+                    .filter_map(|views| views[index]?.fit(plane, *at, FIT_REACH_PX, None, DVec2::ZERO));
                 if let Some(disc) = fits.min_by(|a, b| a.misfit.total_cmp(&b.misfit)) {
                     found[index][next] = Some(disc);
                     next += 1;
@@ -466,9 +473,14 @@ impl Tracker {
         self.optics.move_to(&coarse.pose).ok()?;
         for index in 0..4 {
             let view = View::new(&self.optics, &self.model.markers[index]);
-            let at = found[index][choice[index]]?.centroid_px;
+            let seen = found[index][choice[index]]?;
+            let at = seen.centroid_px;
+            // Before any frame has told how the light falls off, this one does.
+            let mut tilt = self.tilts[index];
+            tilt.add(seen.tilt);
+            let tilt = tilt.known();
             self.discs[index] =
-                view.and_then(|v| v.fit(plane, at, FIT_REACH_PX, None)).or(found[index][choice[index]]);
+                view.and_then(|v| v.fit(plane, at, FIT_REACH_PX, None, tilt)).or(found[index][choice[index]]);
         }
         let refined = self.refine_seen(&coarse.pose)?;
         let mut sightings = [Sighting { id: 0, centroid_px: DVec2::ZERO }; 4];
@@ -749,6 +761,9 @@ impl Tracker {
         let transfer = displacement_from_motion(&refined.pose, at_mm);
         let left = |told: &MarkerResult| Some((told.residual_px?, told.sd_px?));
         self.surplus.add(result.white_markers.iter().map(left));
+        for (tilt, disc) in self.tilts.iter_mut().zip(&self.discs) {
+            tilt.add(disc.and_then(|disc| disc.tilt));
+        }
         let covariance = transfer * refined.covariance * transfer.transpose() * self.surplus.factor();
         result.pose_sd = deviations(&covariance);
         if let Some(springs) = &self.model.springs {

@@ -38,6 +38,43 @@ pub(super) struct Disc {
     pub misfit: f64,
     /// Levels of ground, disc and dome, the last two counted from the ground: a start for the next frame.
     pub levels: [f64; 3],
+    /// By what part of itself the disc's level rises in a px, as this frame shows it; `None` where too little of it is
+    /// flat.
+    pub tilt: Option<DVec2>,
+}
+
+/// How the light falls off across a marker, over the frames in which it was seen.
+///
+/// A lens darkens its corners and a lamp one side: a disc that is brighter on one side is fitted too far there. One
+/// frame's slope is noisy; but it stays, and the mean over some frames is not.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Tilt {
+    mean: DVec2,
+    frames: f64,
+}
+
+/// Frames that a slope of the light is averaged over.
+const TILT_FRAMES: f64 = 100.0;
+/// Frames' worth of belief that there is none.
+const LEVEL_FRAMES: f64 = 1.0;
+/// Steeper than this in a px, a disc is lit by something else than a lens's or a lamp's fall-off.
+const MOST_TILT: f64 = 0.05;
+/// Fewest flat pixels that tell a slope.
+const TILT_PIXELS: f64 = 16.0;
+
+impl Tilt {
+    /// What is known of it.
+    pub fn known(&self) -> DVec2 {
+        self.mean * (self.frames / (self.frames + LEVEL_FRAMES))
+    }
+
+    /// Takes in what a frame shows.
+    pub fn add(&mut self, seen: Option<DVec2>) {
+        if let Some(seen) = seen.filter(|seen| seen.length() < MOST_TILT) {
+            self.frames = (self.frames + 1.0).min(TILT_FRAMES);
+            self.mean += (seen - self.mean) / self.frames;
+        }
+    }
 }
 
 /// How a marker's surroundings map to the image.
@@ -201,17 +238,18 @@ impl View {
     }
 
     /// The disc near `start`, at most `stray_px` from it: Gauss-Newton on the pixels, for the place, the levels of
-    /// ground, disc and dome; `levels`: those of the last frame, if there was one.
+    /// ground, disc and dome; `levels`: those of the last frame, if there was one; `tilt`: how the light falls off.
     pub fn fit(
         &self,
         plane: &Plane<'_>,
         start: DVec2,
         stray_px: f64,
         levels: Option<[f64; 3]>,
+        tilt: DVec2,
     ) -> Option<Disc> {
         let mut at = start;
         let mut normal = SMatrix::<f64, 5, 5>::zeros();
-        let (mut left, mut count, mut noise) = (0.0, 0.0, 0.0);
+        let (mut left, mut count, mut noise, mut tilted) = (0.0, 0.0, 0.0, None);
         let mut levels = levels.map(SVector::from);
         let mut settled = false;
         for _ in 0..MOST_STEPS {
@@ -226,13 +264,14 @@ impl View {
             let known = match levels {
                 Some(known) => known,
                 None => {
-                    let alone = self.sums(plane, at, None)?;
+                    let alone = self.sums(plane, at, None, tilt)?;
                     solve_levels(&alone.normal, &alone.right)?
                 }
             };
-            let sums = self.sums(plane, at, Some(&known))?;
+            let sums = self.sums(plane, at, Some(&known), tilt)?;
             let step = solve_all(&sums.normal, &sums.right)?;
             (normal, left, count, noise) = (sums.normal, sums.left, sums.count, sums.noise());
+            tilted = sums.slope.map(|slope| tilt + slope / (known[0] + known[1]).max(LEAST_RISE));
             levels = Some(known + step.fixed_rows::<3>(0));
             let shift = DVec2::new(step[3], step[4]).clamp_length_max(1.5);
             at += shift;
@@ -257,16 +296,26 @@ impl View {
             sd_px,
             misfit: rms / contrast,
             levels: levels.into(),
+            tilt: tilted,
         })
     }
 
     /// Normal equations over the window: columns ground, disc, dome, and the place (with `levels` known).
-    fn sums(&self, plane: &Plane<'_>, at: DVec2, levels: Option<&SVector<f64, 3>>) -> Option<Sums> {
+    fn sums(
+        &self,
+        plane: &Plane<'_>,
+        at: DVec2,
+        levels: Option<&SVector<f64, 3>>,
+        tilt: DVec2,
+    ) -> Option<Sums> {
         let mut normal = [[0.0; 5]; 5];
         let mut right = [0.0; 5];
         let (mut left, mut count) = (0.0, 0.0);
         // On ground, disc and dome: pixels, sum of what is left of them, sum of its squares.
         let mut flats = [[0.0; 3]; 3];
+        // On the disc, for the slope of what is left: pixels, sums of x, y, xx, xy, yy, of what is left, and of its
+        // products with x and y.
+        let mut lean = [0.0; 9];
         let (cx, cy) = (at.x.round() as i32, at.y.round() as i32);
         let transposed = self.mm_by_px.transpose();
         // A pixel is at most this many mm: beyond that and the ground's width nothing is looked at.
@@ -283,7 +332,8 @@ impl View {
         }
         for y in cy - self.half..=cy + self.half {
             for x in cx - self.half..=cx + self.half {
-                let u = self.mm_by_px * (DVec2::new(f64::from(x), f64::from(y)) - at);
+                let from = DVec2::new(f64::from(x), f64::from(y)) - at;
+                let u = self.mm_by_px * from;
                 let square = u.length_squared();
                 if square > far * far {
                     continue;
@@ -303,14 +353,18 @@ impl View {
                 }
                 let value = f64::from(plane.at(x, y));
                 let beside = dome * (1.0 - disc);
-                let mut row = [1.0, disc, beside, 0.0, 0.0];
+                // The light falls off over disc and what it hides alike.
+                let lit = tilt.dot(from);
+                let mut row = [1.0 + disc * lit, disc * (1.0 + lit), beside, 0.0, 0.0];
                 let mut rest = value;
                 if levels.is_some() {
                     // The outline moves with the place: outside falls by the unit normal.
-                    let by_place = slope * (-disc_slope * (known[1] - dome * known[2]) / steep);
+                    let (step, whole) = (known[1] - dome * known[2], known[0] + known[1]);
+                    let by_place =
+                        slope * (-disc_slope * (step + whole * lit) / steep) - tilt * (disc * whole);
                     row[3] = by_place.x;
                     row[4] = by_place.y;
-                    rest -= known[0] + known[1] * disc + known[2] * beside;
+                    rest -= known[0] * row[0] + known[1] * row[1] + known[2] * beside;
                 }
                 for i in 0..5 {
                     right[i] += row[i] * rest;
@@ -327,11 +381,17 @@ impl View {
                     *sum += rest;
                     *square += rest * rest;
                 }
+                if outside < -FLAT_PX {
+                    let (x, y) = (from.x, from.y);
+                    let add = [1.0, x, y, x * x, x * y, y * y, rest, x * rest, y * rest];
+                    lean.iter_mut().zip(add).for_each(|(sum, add)| *sum += add);
+                }
             }
         }
+        let slope = slope_of(&lean);
         let normal = SMatrix::from_fn(|i, j| if i < j { normal[j][i] } else { normal[i][j] });
         let right = SVector::from(right);
-        (count > 12.0).then_some(Sums { normal, right, left, count, flats })
+        (count > 12.0).then_some(Sums { normal, right, left, count, flats, slope })
     }
 }
 
@@ -344,6 +404,19 @@ struct Sums {
     count: f64,
     /// Where no edge is near, on ground, disc and dome: pixels, sum of residuals, sum of squared ones.
     flats: [[f64; 3]; 3],
+    /// Slope of the residuals on the disc's flat, levels a px.
+    slope: Option<DVec2>,
+}
+
+/// The slope of a plane through residuals, from their number, sums of x, y, xx, xy, yy, theirs, and of xr, yr.
+fn slope_of([n, x, y, xx, xy, yy, rest, xr, yr]: &[f64; 9]) -> Option<DVec2> {
+    if *n < TILT_PIXELS {
+        return None;
+    }
+    let [cxx, cxy, cyy] = [xx - x * x / n, xy - x * y / n, yy - y * y / n];
+    let [cxr, cyr] = [xr - x * rest / n, yr - y * rest / n];
+    let det = cxx * cyy - cxy * cxy;
+    (det > 1e-3 * cxx * cyy).then(|| DVec2::new(cxr * cyy - cyr * cxy, cyr * cxx - cxr * cxy) / det)
 }
 
 impl Sums {

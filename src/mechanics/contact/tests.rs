@@ -118,9 +118,30 @@ fn forces_and_fields_of_the_local_levels_stay_within_their_estimates() {
                             .fold(0.0, f64::max);
                         let part = found.wrench.force_n.length() / exact.wrench.force_n.length() - 1.0;
                         assert!(off < bound.displacement_mm && part.abs() < bound.force_part);
+                        let off_n = found.wrench.force_n.length() - exact.wrench.force_n.length();
+                        assert!(off_n.abs() < bound.force_n && bound.force_n < 1e3);
                     }
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn no_object_presses_harder_than_is_said() {
+    let contact = Contact::new(silicone(), Level::Linear { element_mm: 1.0 }).unwrap();
+    let rigid = |solid| Indenter { solid, young_mpa: None, poisson: 0.3 };
+    for depth in [0.2, 1.0] {
+        let raised = |height: f64| Rigid::from_translation(DVec3::Z * (10.0 - depth + height));
+        for (object, pose) in [
+            (rigid(Solid::cuboid(DVec3::new(30.0, 30.0, 8.0)).unwrap()), raised(4.0)),
+            (rigid(Solid::cylinder(3.0, 8.0).unwrap()), raised(4.0)),
+            (rigid(Solid::sphere(60.0).unwrap()), raised(60.0)),
+        ] {
+            let force_n = contact.solve(&object, &pose, None).unwrap().wrench.force_n.length();
+            let bound = contact.estimate(&object, depth);
+            let most_n = bound.force_n / bound.force_part;
+            assert!(force_n < most_n && force_n > 0.05 * most_n, "{force_n} {most_n}");
         }
     }
 }

@@ -48,17 +48,19 @@ fn per_frame(scene: &Scene, name: LevelName) -> u64 {
 
 /// A coarser level than the scene's that the plan may take: its name, how far its pictures of dots may be from those
 /// of the scene's level, px, and the work that it saves in a frame. Cheapest first; none where an object is
-/// pressed on by a force, for its depth is not known before it is solved.
+/// pressed on by a force, for its depth is not known before it is solved. Where the scene's tolerance names a force,
+/// only levels whose force keeps it.
 pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
     let best = scene.file().contact.level;
     let Some(depth_mm) = deepest_mm(scene) else { return Vec::new() };
     let Some(object) = scene.objects().first() else { return Vec::new() };
     let elastomer = Elastomer::of_design(scene.design());
-    let error_mm = |name| {
+    let errors = |name| {
         let found = estimate(level_named(scene, name), &elastomer, &object.indenter, depth_mm);
-        found.applies.then_some(found.displacement_mm)
+        found.applies.then_some((found.displacement_mm, found.force_n))
     };
-    let Some(own_mm) = error_mm(best) else { return Vec::new() };
+    let Some((own_mm, own_n)) = errors(best) else { return Vec::new() };
+    let most_n = scene.file().tolerance.force_n.unwrap_or(f64::INFINITY);
     let px_per_mm = largest_px_per_mm(scene);
     let own_work = per_frame(scene, best);
     [LevelName::Geometric, LevelName::ClosedForm, LevelName::Linear]
@@ -66,8 +68,9 @@ pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
         .filter(|name| *name < best)
         .filter_map(|name| {
             // Both are within their bounds of the reference.
-            let px = (error_mm(name)? + own_mm) * px_per_mm;
-            Some((name, px, own_work.saturating_sub(per_frame(scene, name))))
+            let (error_mm, error_n) = errors(name)?;
+            let px = (error_mm + own_mm) * px_per_mm;
+            (error_n + own_n <= most_n).then_some((name, px, own_work.saturating_sub(per_frame(scene, name))))
         })
         .filter(|(_, _, saved)| *saved > 0)
         .collect()

@@ -197,7 +197,7 @@ mod tests {
     }
 
     fn run(sensor: &Sensor, frame: &mut Frame, number: u32, seed: u64) {
-        let context = PassContext { frame: number, seed, rows: 0..frame.height() };
+        let context = PassContext { frame: number, seed };
         sensor.run(frame, &context, &mut Work::default());
     }
 

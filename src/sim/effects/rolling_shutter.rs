@@ -1,7 +1,9 @@
 //! The rows are exposed one after the other, and what moves is sheared or stretched.
 //!
-//! The picture is drawn in bands of rows, each at the time of its middle row, as many as keep the motion from one
-//! band to the next below a fifth of the scene's tolerance, and below 0.02 px.
+//! The sensor is worked out at the times of some slices of rows. Each point of a dot or marker is seen where its way in
+//! the image meets the row that is exposed just then, exactly; the brightness of the membrane is that of the slice's
+//! middle row. There are as many slices as keep the motion within one below 0.1 px and below half of the scene's
+//! tolerance, [`MOST_SLICES`] at most.
 
 use super::speed::fastest_px_per_s;
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
@@ -11,11 +13,15 @@ use crate::sim::{Pipeline, Scene, SimError};
 /// See the module.
 pub struct RollingShutter;
 
-/// Largest motion from band to band, px.
-const STEP_PX: f64 = 0.02;
+/// Largest motion in a slice, px.
+const STEP_PX: f64 = 0.1;
 
-/// Work of one more band: pose, places of dots and markers.
-const BAND_UNITS: u64 = 60_000;
+/// Most slices: each holds its own tables of the dented membrane. What moves by more than `MOST_SLICES * STEP_PX`
+/// during the readout has its shadows and creases, not its dots, up to half a slice's motion out of place.
+const MOST_SLICES: f64 = 64.0;
+
+/// Work of one more slice: pose and tables.
+const SLICE_UNITS: u64 = 25_000;
 
 impl Effect for RollingShutter {
     fn name(&self) -> EffectName {
@@ -34,12 +40,12 @@ impl Effect for RollingShutter {
     }
 
     fn cost(&self, scene: &Scene) -> Cost {
-        Cost { once: 0, per_frame: u64::from(bands(scene).saturating_sub(1)) * BAND_UNITS }
+        Cost { once: 0, per_frame: u64::from(slices(scene)) * SLICE_UNITS }
     }
 
     fn apply(&self, scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
         pipeline.timing.rolling =
-            readout_s(scene).map(|readout_s| Rolling { readout_s, bands: bands(scene) });
+            readout_s(scene).map(|readout_s| Rolling { readout_s, slices: slices(scene) });
         Ok(())
     }
 }
@@ -52,8 +58,8 @@ fn roll_px(scene: &Scene) -> f64 {
     readout_s(scene).unwrap_or(0.0) * fastest_px_per_s(scene).unwrap_or(0.0)
 }
 
-fn bands(scene: &Scene) -> u32 {
-    let step = STEP_PX.min(0.2 * scene.file().tolerance.px);
-    let most = scene.image_size().1.max(2) as f64;
-    (roll_px(scene) / step).ceil().clamp(2.0, most) as u32
+fn slices(scene: &Scene) -> u32 {
+    let step = STEP_PX.min(0.5 * scene.file().tolerance.px);
+    let rows = scene.image_size().1.max(2) as f64;
+    (roll_px(scene) / step).ceil().clamp(2.0, rows.min(MOST_SLICES)) as u32
 }

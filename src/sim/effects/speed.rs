@@ -69,14 +69,17 @@ fn pose_key(key: &PoseKey) -> (f64, Displacement) {
 fn objects_mm_per_s(scene: &Scene) -> f64 {
     let reach_mm = 2.0 * scene.optics().dome_radius_mm();
     let mut fastest = 0.0_f64;
-    for object in &scene.file().objects {
+    for (object, resolved) in scene.file().objects.iter().zip(scene.objects()) {
+        // No point of it is farther from its origin than this.
+        let (center, radius_mm) = resolved.indenter.solid.bounding_sphere();
+        let size_mm = center.length() + radius_mm;
         for pair in object.path.windows(2) {
             let ([from, to], [turn_from, turn_to]) = (
                 [pair[0].position_mm, pair[1].position_mm].map(DVec3::from_array),
                 [pair[0].rotation_deg, pair[1].rotation_deg].map(DVec3::from_array),
             );
-            // Where it touches the dome is at most this far from its origin.
-            let lever_mm = reach_mm + from.length().max(to.length());
+            // Where it touches the dome is at most this far from its origin: on it, and near the dome.
+            let lever_mm = size_mm.min(reach_mm + from.length().max(to.length()));
             let turned = (turn_to - turn_from).length().to_radians();
             let way_mm = (to - from).length() + turned * lever_mm;
             fastest = fastest.max(way_mm / (pair[1].time_s - pair[0].time_s));

@@ -83,20 +83,13 @@ impl Pass for Darkening {
         Stage::Vignetting
     }
 
-    fn run(&self, frame: &mut Frame, context: &PassContext, work: &mut Work) {
-        let width = frame.width();
-        let pixels = context.rows.start * width..context.rows.end * width;
-        let mut units = (pixels.len() * frame.planes.len()) as u64 / PIXELS_PER_UNIT;
+    fn run(&self, frame: &mut Frame, _context: &PassContext, work: &mut Work) {
+        let mut units = (self.factors.len() * frame.planes.len()) as u64 / PIXELS_PER_UNIT;
         if !self.counted.swap(true, std::sync::atomic::Ordering::Relaxed) {
             units += self.factors.len() as u64 * FACTOR_UNITS;
         }
         for plane in &mut frame.planes {
-            let (Some(values), Some(factors)) =
-                (plane.get_mut(pixels.clone()), self.factors.get(pixels.clone()))
-            else {
-                continue;
-            };
-            for (value, factor) in values.iter_mut().zip(factors) {
+            for (value, factor) in plane.iter_mut().zip(&self.factors) {
                 *value *= factor;
             }
         }

@@ -14,6 +14,9 @@ const ROUNDING: f64 = 1e-9;
 /// Hollows that one ray may meet ahead of its free part; no platform comes near it, and more count as material.
 const WAITING: usize = 64;
 
+/// By what a hollow's box is wider than it is, mm: a ray along its face still meets it.
+const WIDER_MM: f64 = 1e-6;
+
 /// Chords that stand for an arc in a turned hollow.
 const ARC_CHORDS: usize = 16;
 
@@ -30,6 +33,9 @@ enum Convex {
 struct Hollow {
     shape: Convex,
     own_from_part: DAffine3,
+    /// Corners of a box around it in the part's frame, mm; a little wider than it is.
+    low_mm: DVec3,
+    high_mm: DVec3,
 }
 
 /// All hollows of a part.
@@ -44,7 +50,7 @@ impl Cavities {
         let mut hollows = Vec::new();
         for Piece { shape, part_from_shape, .. } in &part.cut {
             let own_from_part = part_from_shape.inverse();
-            hollows.extend(convex_parts(shape).into_iter().map(|shape| Hollow { shape, own_from_part }));
+            hollows.extend(convex_parts(shape).into_iter().map(|shape| Hollow::new(shape, own_from_part)));
         }
         Self { hollows }
     }
@@ -56,10 +62,7 @@ impl Cavities {
 
     /// Those of the hollows that reach into a range of heights: a ray that stays in it meets no others.
     pub fn between(mut self, low_z_mm: f64, high_z_mm: f64) -> Self {
-        self.hollows.retain(|hollow| {
-            let (bottom, top) = hollow.heights();
-            bottom <= high_z_mm && top >= low_z_mm
-        });
+        self.hollows.retain(|hollow| hollow.low_mm.z <= high_z_mm && hollow.high_mm.z >= low_z_mm);
         self
     }
 
@@ -72,7 +75,11 @@ impl Cavities {
         let mut waiting = [(0.0_f64, 0.0_f64); WAITING];
         let mut count = 0;
         let mut front = 0.0;
+        let (low, high) = (from_mm.min(to_mm), from_mm.max(to_mm));
         for hollow in &self.hollows {
+            if !(low.cmple(hollow.high_mm) & high.cmpge(hollow.low_mm)).all() {
+                continue;
+            }
             let Some((enter, leave)) = hollow.interval(from_mm, to_mm) else { continue };
             if enter <= front + ROUNDING {
                 front = leave.max(front);
@@ -102,24 +109,23 @@ impl Cavities {
 }
 
 impl Hollow {
-    /// Lowest and highest point of its bounding box.
-    fn heights(&self) -> (f64, f64) {
-        let part_from_own = self.own_from_part.inverse();
-        let (reach, bottom, top) = match &self.shape {
+    fn new(shape: Convex, own_from_part: DAffine3) -> Self {
+        let part_from_own = own_from_part.inverse();
+        let (reach, bottom, top) = match &shape {
             Convex::Frustum { bottom, top, radius, slope } => {
                 let widest = radius.max(radius + slope * (top - bottom));
                 (DVec2::splat(widest), *bottom, *top)
             }
             Convex::Faces { reach, bottom, top, .. } => (*reach, *bottom, *top),
         };
-        let corner = |k: u32| {
+        let (mut low_mm, mut high_mm) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for k in 0..8 {
             let side = |bit: u32, size: f64| if k & bit == 0 { -size } else { size };
             let z = if k & 4 == 0 { bottom } else { top };
-            part_from_own.transform_point3(DVec3::new(side(1, reach.x), side(2, reach.y), z)).z
-        };
-        (0..8)
-            .map(corner)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)))
+            let corner = part_from_own.transform_point3(DVec3::new(side(1, reach.x), side(2, reach.y), z));
+            (low_mm, high_mm) = (low_mm.min(corner), high_mm.max(corner));
+        }
+        Self { shape, own_from_part, low_mm: low_mm - WIDER_MM, high_mm: high_mm + WIDER_MM }
     }
 
     /// The part of the ray from `from` (0) to `to` (1) that lies inside.

@@ -87,10 +87,8 @@ pub struct Lit<const N: usize> {
 
 /// The membrane that is lit.
 pub struct LitSurface<'a> {
-    /// Camera, layers and dome at the instant, for the channel.
-    pub optics: &'a SensorOptics,
-    /// The deformed part.
-    pub dent: Option<&'a Dent>,
+    /// Slices of rows that see it at times of their own, from the first row; not empty.
+    pub slices: &'a [LitSlice<'a>],
     /// What the pixels see, where it is known.
     pub rays: Option<&'a LensRays>,
     /// The light.
@@ -100,6 +98,26 @@ pub struct LitSurface<'a> {
     /// How far a middle may be from what the corners promise, full scales; with 0 every pixel has its own ray, followed
     /// all the way.
     pub tolerance: f32,
+}
+
+/// The membrane as some rows see it.
+pub struct LitSlice<'a> {
+    /// The row after the last.
+    pub end: usize,
+    /// Camera, layers and dome, for the channel.
+    pub optics: &'a SensorOptics,
+    /// The deformed part.
+    pub dent: Option<&'a Dent>,
+}
+
+impl<'a> LitSurface<'a> {
+    /// As a row sees it; the nodes below the picture belong to the last slice.
+    fn at(&self, y: usize) -> Option<&LitSlice<'a>> {
+        match self.slices {
+            [only] => Some(only),
+            slices => slices.get(slices.partition_point(|slice| slice.end <= y)).or(slices.last()),
+        }
+    }
 }
 
 /// A box of pixels, ends excluded.
@@ -116,6 +134,16 @@ pub struct PixelBox {
 }
 
 impl PixelBox {
+    /// The box around both.
+    pub fn with(&self, other: &Self) -> Self {
+        Self {
+            left: self.left.min(other.left),
+            top: self.top.min(other.top),
+            right: self.right.max(other.right),
+            bottom: self.bottom.max(other.bottom),
+        }
+    }
+
     fn meets(&self, x: usize, y: usize, side: usize) -> bool {
         x < self.right && y < self.bottom && x + side >= self.left && y + side >= self.top
     }

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3, Vec3A};
 
-use super::{Known, LARGEST, Lit, LitSurface, units};
+use super::{Known, LARGEST, Lit, LitSlice, LitSurface, units};
 use crate::optics::SensorOptics;
 use crate::sim::effect::EffectName;
 use crate::sim::shading::{Moved, SurfaceSample};
@@ -91,20 +91,21 @@ impl<const N: usize> Lit<N> {
             if self.known.get(at) != Some(&Known::Nothing) {
                 continue;
             }
+            let Some(seen) = surface.at(y) else { continue };
             let ray = surface.rays.filter(|_| surface.tolerance > 0.0).and_then(|rays| rays.at(x, y));
             let pixel = DVec2::new(x as f64, y as f64);
             let hit = match ray {
-                Some(ray) => surface.optics.follow_continued(ray),
-                None => surface.optics.trace_continued(pixel),
+                Some(ray) => seen.optics.follow_continued(ray),
+                None => seen.optics.trace_continued(pixel),
             };
             let rays = match hit {
                 Ok(hit) => [Some((hit, 1.0)), None],
-                Err(_) => continued(surface.optics, pixel),
+                Err(_) => continued(seen.optics, pixel),
             };
             let mut known = Known::Misses;
             for ((surface_mm, inside), weight) in rays.into_iter().flatten() {
                 self.places.push((at, weight));
-                let sample = self.sample(surface, surface_mm, inside, corner, (x, y), work);
+                let sample = self.sample((surface, seen), (surface_mm, inside), corner, (x, y), work);
                 known = if sample.moved == Moved::Not { Known::Still } else { Known::Moved };
                 self.samples.push(sample);
             }
@@ -145,14 +146,13 @@ impl<const N: usize> Lit<N> {
     /// What a ray that meets the undeformed dome shows.
     fn sample(
         &mut self,
-        surface: &LitSurface<'_>,
-        surface_mm: DVec3,
-        inside: DVec3,
+        (surface, seen): (&LitSurface<'_>, &LitSlice<'_>),
+        (surface_mm, inside): (DVec3, DVec3),
         corner: (usize, usize),
         (x, y): (usize, usize),
         work: &mut Work,
     ) -> SurfaceSample {
-        let per_radius = 1.0 / surface.optics.dome_radius_mm();
+        let per_radius = 1.0 / seen.optics.dome_radius_mm();
         let still = SurfaceSample {
             point_mm: surface_mm,
             normal: surface_mm * per_radius,
@@ -163,7 +163,7 @@ impl<const N: usize> Lit<N> {
         if let Some(motion) = kept.and_then(|at| self.motions.get_mut(at)) {
             *motion = Motion { place_mm: surface_mm.as_vec3a(), ..Motion::default() };
         }
-        let Some(dent) = surface.dent else { return still };
+        let Some(dent) = seen.dent else { return still };
         match self.source(corner) {
             Source::Still => return still,
             source @ (Source::Smooth | Source::Little) => {
@@ -272,7 +272,7 @@ impl<const N: usize> Lit<N> {
         let (dx, dy) = (x - largest.0, y - largest.1);
         let corners = [(dx, dy), (dx + side, dy), (dx, dy + side), (dx + side, dy + side)];
         let places = corners.map(|at| self.motion(largest, at).place_mm.as_dvec3());
-        let per_radius = 1.0 / surface.optics.dome_radius_mm();
+        let per_radius = 1.0 / surface.at(y)?.optics.dome_radius_mm();
         let places = places.map(|place| place * per_radius);
         // Nodes without a ray have no place.
         let lit = (0..9).all(|i| {

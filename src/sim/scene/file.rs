@@ -98,6 +98,10 @@ pub struct ToleranceSection {
     /// Of every pixel, in grey levels of 8 bits.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 255.0))]
     pub grey: f64,
+    /// Of the force between dome and object, N; left out: any, as long as the frames are right.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1e6))]
+    pub force_n: Option<f64>,
 }
 
 /// A motion of the platform, by what causes it or as it is.

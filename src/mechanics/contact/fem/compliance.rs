@@ -116,16 +116,16 @@ fn ring_load(
     }
 }
 
-/// Solves one harmonic: the surface's response to every ring, and the rings' own, hats included.
-fn harmonic(
+/// Solves one harmonic: the surface's response to every ring that has a hat, and the rings' own, hats included.
+pub(super) fn harmonic(
     grid: &Grid,
     body: &Body,
     hats: &[Vec<(usize, f64)>],
     m: usize,
 ) -> Result<(Spectrum, Vec<f64>), ContactError> {
-    let first_ring = (0..grid.elements).find(|ring| grid.harmonics(*ring) > m).unwrap_or(grid.elements);
+    let first_ring = (0..hats.len()).find(|ring| grid.harmonics(*ring) > m).unwrap_or(hats.len());
     // Rings between that do not reach this harmonic have zero columns, and are rare.
-    let rings = grid.elements - first_ring;
+    let rings = hats.len() - first_ring;
     let loads: Vec<Vec<((usize, usize), f64)>> = (0..AXES * rings)
         .map(|column| {
             let ring = first_ring + column / AXES;

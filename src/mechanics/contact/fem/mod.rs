@@ -2,7 +2,8 @@
 //!
 //! The dome is the same at every azimuth, so its stiffness falls apart into harmonics; each is a small sparse
 //! problem over the meridian ([`mesh`], [`element`], [`body`]), factored once ([`compliance`]). What remains per
-//! frame lives on the surface: forces on the nodes of a [`grid`], and the field that they make ([`field`]).
+//! frame lives on the surface: forces on the nodes of a [`grid`], and the field that they make ([`field`]). Loads that are the same at
+//! every azimuth need one harmonic only ([`revolved`]).
 
 mod body;
 mod compliance;
@@ -10,11 +11,13 @@ mod element;
 mod field;
 mod grid;
 mod mesh;
+mod revolved;
 
 pub(super) use compliance::Compliance;
 pub(super) use field::SurfaceField;
 #[cfg(test)]
 use grid::GridNode;
+pub(super) use revolved::Revolved;
 
 #[cfg(test)]
 mod tests;

@@ -257,7 +257,16 @@ impl SensorOptics {
     /// As `trace`, less the rays that pass the base but not the sphere.
     #[inline]
     pub fn trace_continued(&self, pixel: DVec2) -> Result<(DVec3, DVec3), Limit> {
-        let ray = self.lens.unproject(pixel)?;
+        self.follow_continued(self.lens.unproject(pixel)?)
+    }
+
+    /// [`SensorOptics::trace_continued`] from the unit direction that the pixel sees, camera frame
+    /// ([`Lens::unproject`]).
+    ///
+    /// # Errors
+    /// As `trace_continued`, less the lens's.
+    #[inline]
+    pub fn follow_continued(&self, ray: DVec3) -> Result<(DVec3, DVec3), Limit> {
         // Only a pupil that moves asks for the angle.
         let field_angle_rad = if self.lens.is_central() { 0.0 } else { Lens::field_angle_rad(ray) };
         let (hit, _) = self.meet_sphere(ray, field_angle_rad)?;

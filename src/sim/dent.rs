@@ -149,22 +149,44 @@ impl Dent {
         let mut place =
             if near_mm == DVec3::ZERO { rest_mm } else { back_on_sphere(rest_mm, inside, near_mm) };
         let mut last = f64::INFINITY;
-        for step in 1..=MOST_STEPS {
+        // At a crease Newton's steps may jump from side to side: then the nearest of them, and from it plain ones.
+        let (mut nearest_mm, mut least) = (DVec3::ZERO, f64::INFINITY);
+        for step in 1..=MOST_STEPS + PLAIN_STEPS {
             let (chart, [x, y], moved) = self.near(place)?;
             let normal = moved.along_x.cross(moved.along_y);
             let surface = place + moved.displacement_mm;
             let along = (surface - rest_mm).dot(normal) / inside.dot(normal);
             let miss = rest_mm + inside * along - surface;
             let miss2 = miss.length_squared();
-            if miss2 < CLOSE_MM * CLOSE_MM || step == MOST_STEPS {
+            let found = |place: DVec3, displacement_mm| {
                 let normal = normal.try_normalize().unwrap_or(place / chart.radius_mm);
-                return Some((place, Dented { displacement_mm: moved.displacement_mm, normal }));
+                Some((place, Dented { displacement_mm, normal }))
+            };
+            if miss2 < least {
+                (nearest_mm, least) = (moved.displacement_mm, miss2);
+            }
+            if miss2 < CLOSE_MM * CLOSE_MM || step == MOST_STEPS + PLAIN_STEPS {
+                return found(place, moved.displacement_mm);
+            }
+            let on_plane = || {
+                let per = normal.length_squared().recip();
+                [miss.cross(moved.along_y).dot(normal) * per, moved.along_x.cross(miss).dot(normal) * per]
+            };
+            let near_mm = NEAR_PART / chart.per_step;
+            if miss2 < near_mm * near_mm {
+                // So near that the tangent plane is the membrane: the point on it, and where that was.
+                let [a, b] = on_plane();
+                let place = chart.point(x + a, y + b);
+                return found(place, surface + miss - place);
             }
             // NaN, of a ray along the plane, is no smaller either.
-            place = if miss2 < 0.25 * last && miss2 < FARTHEST_MM * FARTHEST_MM {
-                let per = normal.length_squared().recip();
-                let (a, b) = (miss.cross(moved.along_y).dot(normal), moved.along_x.cross(miss).dot(normal));
-                chart.point(x + a * per, y + b * per)
+            place = if step >= MOST_STEPS {
+                nearest_mm =
+                    nearest_mm.lerp(moved.displacement_mm, if step == MOST_STEPS { 0.0 } else { 0.5 });
+                back_on_sphere(rest_mm, inside, nearest_mm)
+            } else if miss2 < 0.25 * last && miss2 < FARTHEST_MM * FARTHEST_MM {
+                let [a, b] = on_plane();
+                chart.point(x + a, y + b)
             } else {
                 back_on_sphere(rest_mm, inside, moved.displacement_mm)
             };
@@ -280,8 +302,13 @@ impl Chart {
 
 /// Repetitions of [`Dent::meet`]; a slope of 0.5 leaves a thousandth after ten.
 const MOST_STEPS: u32 = 10;
+/// More of them, each half of the plain one's way, where those do not end.
+const PLAIN_STEPS: u32 = 16;
 /// A step this short ends it, mm: hundredths of a pixel.
 const CLOSE_MM: f64 = 3e-4;
+/// The same as a part of the distance of a chart's nodes, over which the membrane may bend: what the tangent plane
+/// leaves is of the second order.
+const NEAR_PART: f64 = 0.01;
 /// A step longer than this is none of Newton's, mm.
 const FARTHEST_MM: f64 = 1.0;
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 
-use super::lit::PixelBox;
+use super::lit::{LARGEST, PixelBox};
 use crate::camera::Lens;
 use crate::optics::SensorOptics;
 
@@ -15,10 +15,12 @@ const RIM_AZIMUTHS: usize = 64;
 /// Corners between two of them, on a cubic through the neighbours.
 const RIM_BETWEEN: usize = 6;
 
-/// The columns of each row that the lens shows: outside there is no light.
+/// The columns of each row that the lens shows, outside of which there is no light; and what its pixels see, which no
+/// motion changes.
 #[derive(Debug, Clone)]
 pub struct LensField {
     rows: Vec<Range<usize>>,
+    rays: LensRays,
 }
 
 impl LensField {
@@ -44,12 +46,105 @@ impl LensField {
             };
             edge(middle, 0)..edge(middle, width - 1) + 1
         };
-        Self { rows: (0..height).map(row).collect() }
+        Self { rows: (0..height).map(row).collect(), rays: LensRays::new(lens, width, height) }
+    }
+
+    /// What the pixels see.
+    pub fn rays(&self) -> &LensRays {
+        &self.rays
     }
 
     /// The columns of a row.
     pub fn row(&self, y: usize) -> Range<usize> {
         self.rows.get(y).cloned().unwrap_or(0..0)
+    }
+}
+
+/// Distance of the nodes of [`LensRays`], px.
+const RAY_STEP: usize = 8;
+/// Nodes before the picture's first row and column.
+const RAYS_BEFORE: usize = 1;
+/// Directions are known between the nodes where the middle of four is right within this, rad: thousandths of a pixel.
+const RAY_CLOSE_RAD: f64 = 1e-6;
+/// Rays that leave the camera's axis by more than this cosine are not looked up.
+const LEAST_COSINE: f64 = 0.05;
+
+/// Directions that pixels see, from few of them: cubics through nodes each 8 px, where they are as good as the lens's
+/// own formula.
+#[derive(Debug, Clone)]
+pub struct LensRays {
+    across: usize,
+    /// Components of the unit direction along the picture's axes; NaN where there is none.
+    nodes: Vec<DVec2>,
+    /// Of each cell, whether its directions may be looked up.
+    good: Vec<bool>,
+}
+
+/// Weights of four nodes at each pixel between the middle two: Lagrange's cubic.
+const RAY_WEIGHTS: [[f64; 4]; RAY_STEP] = {
+    let mut weights = [[0.0; 4]; RAY_STEP];
+    let mut i = 0;
+    while i < RAY_STEP {
+        weights[i] = lagrange(i as f64 / RAY_STEP as f64);
+        i += 1;
+    }
+    weights
+};
+
+/// Lagrange's weights of values at -1, 0, 1 and 2.
+const fn lagrange(t: f64) -> [f64; 4] {
+    let (p, q, r) = (t + 1.0, t - 1.0, t - 2.0);
+    [-t * q * r / 6.0, p * q * r / 2.0, -p * t * r / 2.0, p * t * q / 6.0]
+}
+
+impl LensRays {
+    fn new(lens: &Lens, width: usize, height: usize) -> Self {
+        // Pictures are laid out in squares of some cells, which may pass their end.
+        let count = |n: usize| n.div_ceil(LARGEST) * (LARGEST / RAY_STEP) + 1 + RAYS_BEFORE + 2;
+        let (across, down) = (count(width), count(height));
+        let ray = |x: f64, y: f64| {
+            let ray = lens.unproject(DVec2::new(x, y)).ok().filter(|ray| ray.z > LEAST_COSINE);
+            ray.map_or(DVec2::NAN, |ray| ray.truncate())
+        };
+        let place = |i: usize| i as f64 * RAY_STEP as f64 - (RAYS_BEFORE * RAY_STEP) as f64;
+        let nodes = (0..across * down).map(|i| ray(place(i % across), place(i / across))).collect();
+        let mut rays = Self { across, nodes, good: Vec::new() };
+        let middle = lagrange(0.5);
+        let good = |i: usize| {
+            let half = 0.5 * RAY_STEP as f64;
+            if i % across < RAYS_BEFORE || i % across + 2 >= across {
+                return false;
+            }
+            let exact = ray(place(i % across) + half, place(i / across) + half);
+            // NaN is no match either.
+            rays.mix(i, &middle, &middle).is_some_and(|found| (found - exact).length() < RAY_CLOSE_RAD)
+        };
+        rays.good = (0..across * down).map(good).collect();
+        rays
+    }
+
+    /// The unit direction that a pixel sees, camera frame; `None` where only the lens itself knows it.
+    #[inline]
+    pub fn at(&self, x: usize, y: usize) -> Option<DVec3> {
+        let cell = (y / RAY_STEP + RAYS_BEFORE) * self.across + x / RAY_STEP + RAYS_BEFORE;
+        if x / RAY_STEP + RAYS_BEFORE >= self.across || !*self.good.get(cell)? {
+            return None;
+        }
+        let flat = self.mix(cell, &RAY_WEIGHTS[x % RAY_STEP], &RAY_WEIGHTS[y % RAY_STEP])?;
+        Some(flat.extend((1.0 - flat.length_squared()).max(0.0).sqrt()))
+    }
+
+    /// Of the cell right and below of a node.
+    #[inline]
+    fn mix(&self, cell: usize, wx: &[f64; 4], wy: &[f64; 4]) -> Option<DVec2> {
+        let start = cell.checked_sub(self.across + 1)?;
+        let corner = self.nodes.get(start..start + 3 * self.across + 4)?;
+        let mut sum = DVec2::ZERO;
+        for (row, wy) in wy.iter().enumerate() {
+            let row = &corner[row * self.across..row * self.across + 4];
+            sum += ((row[0] * wx[0] + row[1] * wx[1]) + (row[2] * wx[2] + row[3] * wx[3])) * *wy;
+        }
+        Some(sum)
     }
 }
 

@@ -36,21 +36,44 @@ impl Frame {
         bytes.resize(self.width * self.height * self.planes.len(), 0);
         match self.planes.as_slice() {
             [red, green, blue] => {
-                // In runs that stay in the nearest cache: codes first, channel by channel, then woven.
-                let mut codes = [[0_u8; RUN]; 3];
+                // In runs that stay in the nearest cache: codes first, channel by channel, then woven, four pixels into
+                // three words.
+                let mut codes = [[0_u32; RUN]; 3];
                 let runs = red.chunks(RUN).zip(green.chunks(RUN)).zip(blue.chunks(RUN));
                 for (pixels, ((red, green), blue)) in bytes.chunks_mut(3 * RUN).zip(runs) {
                     for (codes, values) in codes.iter_mut().zip([red, green, blue]) {
                         coder.fill(values, codes);
                     }
-                    let [red, green, blue] = &codes;
-                    let three = red.iter().zip(green).zip(blue);
-                    for (pixel, ((r, g), b)) in pixels.chunks_exact_mut(3).zip(three) {
-                        pixel.copy_from_slice(&[*r, *g, *b]);
+                    let [red, green, blue] = &mut codes;
+                    for ((r, g), b) in red.iter_mut().zip(&*green).zip(&*blue) {
+                        *r |= g << 8 | b << 16;
+                    }
+                    let count = pixels.len() / 3;
+                    let mut words = pixels.chunks_exact_mut(12);
+                    for (pixels, four) in (&mut words).zip(red.chunks_exact(4)) {
+                        let three = [
+                            four[0] | four[1] << 24,
+                            four[1] >> 8 | four[2] << 16,
+                            four[2] >> 16 | four[3] << 8,
+                        ];
+                        for (pixel, word) in pixels.chunks_exact_mut(4).zip(three) {
+                            pixel.copy_from_slice(&word.to_le_bytes());
+                        }
+                    }
+                    let last = words.into_remainder().chunks_exact_mut(3);
+                    let left = last.len();
+                    for (pixel, code) in last.zip(red.iter().skip(count - left)) {
+                        pixel.copy_from_slice(&code.to_le_bytes()[..3]);
                     }
                 }
             }
-            [grey] => coder.fill(grey, &mut bytes),
+            [grey] => {
+                let mut codes = [0_u32; RUN];
+                for (bytes, values) in bytes.chunks_mut(RUN).zip(grey.chunks(RUN)) {
+                    coder.fill(values, &mut codes);
+                    bytes.iter_mut().zip(&codes).for_each(|(byte, code)| *byte = *code as u8);
+                }
+            }
             planes => {
                 for (channel, plane) in planes.iter().enumerate() {
                     let places = bytes.iter_mut().skip(channel).step_by(planes.len());
@@ -69,6 +92,9 @@ const RUN: usize = 512;
 
 /// 2^23: a number from 0 to it, added to it, leaves its nearest whole number, and that in the lowest bits.
 const WHOLE: f32 = 8_388_608.0;
+
+/// From light to code: 255, and two roundings more, so that what lies half way between two codes goes to the upper one.
+const SCALE: f32 = 255.0 * (1.0 + 2.0 * f32::EPSILON);
 
 /// From light to code.
 enum Coder {
@@ -99,20 +125,20 @@ impl Coder {
     }
 
     /// The codes of some values.
-    fn fill(&self, values: &[f32], codes: &mut [u8]) {
+    fn fill(&self, values: &[f32], codes: &mut [u32]) {
         match self {
             // As in `code`, in steps that machines do several of at once.
             Self::Linear => {
                 for (code, value) in codes.iter_mut().zip(values) {
-                    let scaled = 255.0 * value.clamp(0.0, 1.0) + 0.5;
-                    let nearest = (scaled + WHOLE) - WHOLE;
-                    let floor = if nearest > scaled { nearest - 1.0 } else { nearest };
-                    *code = (floor + WHOLE).to_bits() as u8;
+                    // Two plain choices, of which NaN takes the darker, are one step of a machine each.
+                    let clear = if *value > 0.0 { *value } else { 0.0 };
+                    let clear = if clear < 1.0 { clear } else { 1.0 };
+                    *code = (SCALE * clear + WHOLE).to_bits() & 0xff;
                 }
             }
             Self::Power { .. } => {
                 for (code, value) in codes.iter_mut().zip(values) {
-                    *code = self.code(*value);
+                    *code = u32::from(self.code(*value));
                 }
             }
         }
@@ -123,7 +149,7 @@ impl Coder {
     fn code(&self, value: f32) -> u8 {
         let clear = value.clamp(0.0, 1.0);
         match self {
-            Self::Linear => (255.0 * clear + 0.5) as u8,
+            Self::Linear => (SCALE * clear + WHOLE).to_bits() as u8,
             Self::Power { begins, start } => {
                 let part = (clear * PARTS as f32) as usize;
                 let mut code = start.get(part).copied().unwrap_or(0);

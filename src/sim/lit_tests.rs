@@ -58,7 +58,7 @@ fn levels(scene: &Scene, frame: u32, tolerance: f32) -> (Vec<[f32; 3]>, u64, Vec
     }
     let shading = pipeline.shading.as_deref().unwrap();
     let slices = [LitSlice { end: height, optics, dent: instant.shape.dent.as_ref() }];
-    let surface = LitSurface { slices: &slices, shading, channel: 0, tolerance };
+    let surface = LitSurface { slices: &slices, rays: Some(field.rays()), shading, channel: 0, tolerance };
     let pressed = instant.shape.touch.as_ref().unwrap().pressed_cap();
     let dented = pressed.map(|(middle, angle)| cap_box(optics, middle, angle + 0.06, width, height));
     let mut lit = Lit::<3>::default();
@@ -84,7 +84,7 @@ fn levels(scene: &Scene, frame: u32, tolerance: f32) -> (Vec<[f32; 3]>, u64, Vec
 
 #[test]
 fn what_is_filled_in_is_what_each_ray_shows() {
-    for (level, most) in [("geometric", 16.0), ("closed_form", 8.0), ("linear", 8.0)] {
+    for (level, most) in [("geometric", 6.0), ("closed_form", 6.0), ("linear", 6.0)] {
         let scene = rolled(level);
         let (filled, few, _) = levels(&scene, 3, 2.0 / 255.0);
         let (exact, all, places) = levels(&scene, 3, 0.0);
@@ -96,7 +96,7 @@ fn what_is_filled_in_is_what_each_ray_shows() {
             .collect();
         let worst = off.iter().copied().fold(0.0, f32::max);
         let above = |grey: f32| off.iter().filter(|off| **off > grey).count();
-        for (at, off) in places.iter().zip(&off).filter(|(_, off)| **off > 4.0).take(10) {
+        for (at, off) in places.iter().zip(&off).filter(|(_, off)| **off > 3.0).take(10) {
             println!("{at:?}: {off}");
         }
         let mean = off.iter().sum::<f32>() / off.len() as f32;
@@ -109,7 +109,7 @@ fn what_is_filled_in_is_what_each_ray_shows() {
         assert!(few * 6 < all, "{level}: {few} {all}");
         // Along the edges of shadows and of the dent a square may miss a corner.
         assert!(
-            mean < 0.15 && one * 50 < off.len() && three * 2000 < off.len(),
+            mean < 0.15 && one * 100 < off.len() && three * 2000 < off.len(),
             "{level}: {mean} {one} {three}"
         );
         assert!(worst < most, "{level}: {worst}");

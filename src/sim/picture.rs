@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::DVec2;
 
-use super::coverage::{Coverage, clip, clip_to_image};
+use super::coverage::{Coverage, LEAST_SHARE, clip, clip_to_image};
 use super::effect::EffectName;
 use super::field::{LensField, cap_box, inside, rim_polygon};
 use super::frame::Frame;
@@ -38,6 +38,8 @@ pub struct Painter {
     coverage: Coverage,
     /// The dome's by slice.
     domes: Vec<Coverage>,
+    /// Rows whose surround is laid with the membrane.
+    later: Vec<bool>,
     spans: Vec<Range<usize>>,
     one: Lit<1>,
     three: Lit<3>,
@@ -62,28 +64,34 @@ impl Painter {
 
     /// Surround and membrane.
     fn ground(&mut self, parts: Parts<'_>, slices: &[Slice<'_>], frame: &mut Frame, work: &mut Work) {
-        let surround = parts.scene.file().light.surround_level as f32;
         let (width, height) = (frame.width(), frame.height());
-        for plane in &mut frame.planes {
-            for (y, row) in plane.chunks_exact_mut(width).enumerate() {
-                let seen = parts.field.row(y);
-                let (dark, rest) = row.split_at_mut(seen.start.min(width));
-                let (seen, beyond) = rest.split_at_mut(seen.len().min(rest.len()));
-                dark.fill(0.0);
-                seen.fill(surround);
-                beyond.fill(0.0);
-            }
-            work.add_base((height * width) as u64 * units::PIXEL);
-        }
         // Channels with rays of their own are drawn one by one, the others together.
         let planes = frame.planes.len();
         let own = slices.first().is_some_and(|slice| slice.instant.eye.channels() == planes);
+        // Under a membrane that is drawn at once a row's surround is laid when its turn comes: it is at hand then.
+        let at_once = parts.pipeline.shading.is_some() && !own;
+        self.later.clear();
+        self.later.resize(height, false);
         self.domes.resize_with(slices.len(), Coverage::default);
+        if at_once {
+            self.find_domes(slices, 0, (width, height));
+            for (dome, slice) in self.domes.iter().zip(slices) {
+                for (y, ..) in dome.rows(width, height).filter(|(y, ..)| slice.rows().contains(y)) {
+                    self.later.get_mut(y).into_iter().for_each(|later| *later = true);
+                }
+            }
+        }
+        let surround = Surround::of(parts);
+        for plane in &mut frame.planes {
+            let rows = plane.chunks_exact_mut(width).zip(&self.later).enumerate();
+            for (y, (row, _)) in rows.filter(|(_, (_, later))| !**later) {
+                surround.lay(y, row, 0..width);
+            }
+            work.add_base((height * width) as u64 * units::PIXEL);
+        }
         for channel in 0..if own { planes } else { 1 } {
-            for (dome, slice) in self.domes.iter_mut().zip(slices) {
-                let rim = slice.instant.eye.optics(channel).map(rim_polygon).unwrap_or_default();
-                let rim = clip_to_image(&rim, width, height);
-                dome.fill(&clip_to_rows(rim, &slice.rows(), height));
+            if !at_once {
+                self.find_domes(slices, channel, (width, height));
             }
             let together = if own { channel..channel + 1 } else { 0..planes };
             let mut extra = Work::default();
@@ -93,6 +101,15 @@ impl Painter {
                 Some(shading) => self.lit(parts, slices, shading.as_ref(), frame, together, spent),
             }
             work.add(EffectName::Dispersion, extra.total());
+        }
+    }
+
+    /// The domes' coverage by slice, in a channel.
+    fn find_domes(&mut self, slices: &[Slice<'_>], channel: usize, (width, height): (usize, usize)) {
+        for (dome, slice) in self.domes.iter_mut().zip(slices) {
+            let rim = slice.instant.eye.optics(channel).map(rim_polygon).unwrap_or_default();
+            let rim = clip_to_image(&rim, width, height);
+            dome.fill(&clip_to_rows(rim, &slice.rows(), height));
         }
     }
 
@@ -159,6 +176,7 @@ impl Painter {
         }
         let surface = LitSurface {
             slices: &seen,
+            rays: Some(parts.field.rays()),
             shading,
             channel: channels.start,
             tolerance: (SMOOTH_GREY / 255.0 / parts.scene.file().electronics.steepest_code(DARK_LEVEL))
@@ -174,9 +192,10 @@ impl Painter {
         for (dome, slice) in self.domes.iter().zip(slices) {
             let over = (dome, &slice.rows());
             if channels.len() == 3 {
-                blend(&mut self.three, over, parts.field, center, frame, channels.start);
+                let ground = (parts.field, Some(Surround::of(parts)));
+                blend(&mut self.three, over, ground, center, frame, channels.start);
             } else {
-                blend(&mut self.one, over, parts.field, center, frame, channels.start);
+                blend(&mut self.one, over, (parts.field, None), center, frame, channels.start);
             }
             work.add_base(dome.area() as u64 * units::PIXEL * channels.len() as u64);
         }
@@ -265,11 +284,36 @@ const DARK_LEVEL: f64 = 0.05;
 /// Room around the pressed part in which the membrane still bends sharply, mm.
 const PRESSED_MARGIN_MM: f64 = 0.6;
 
+/// What is beside the sensor.
+#[derive(Clone, Copy)]
+struct Surround<'a> {
+    field: &'a LensField,
+    level: f32,
+}
+
+impl<'a> Surround<'a> {
+    fn of(parts: Parts<'a>) -> Self {
+        Self { field: parts.field, level: parts.scene.file().light.surround_level as f32 }
+    }
+
+    /// Columns of a row without sensor: dark where the lens shows nothing.
+    fn lay(&self, y: usize, row: &mut [f32], columns: Range<usize>) {
+        let seen = self.field.row(y);
+        let mut fill = |from: usize, to: usize, level: f32| {
+            let place = from.max(columns.start)..to.min(columns.end);
+            row.get_mut(place).into_iter().for_each(|part| part.fill(level));
+        };
+        fill(0, seen.start, 0.0);
+        fill(seen.start, seen.end, self.level);
+        fill(seen.end, usize::MAX, 0.0);
+    }
+}
+
 /// Lays the lit membrane over the ground.
 fn blend<const N: usize>(
     lit: &mut Lit<N>,
     (coverage, rows): (&Coverage, &Range<usize>),
-    field: &LensField,
+    (field, surround): (&LensField, Option<Surround<'_>>),
     center: DVec2,
     frame: &mut Frame,
     first: usize,
@@ -278,12 +322,43 @@ fn blend<const N: usize>(
     for (y, x, part) in coverage.rows(width, height).filter(|(y, ..)| rows.contains(y)) {
         let (seen, part) = inside(field.row(y), x, part);
         lit.complete(y, seen.clone(), part, center);
+        let whole = whole_of(part);
+        let (left, right) = (seen.start + whole.start, seen.start + whole.end);
         // A picture has one plane or three.
         for (lane, plane) in frame.planes.iter_mut().skip(first).take(N).enumerate() {
-            let Some(values) = plane.get_mut(y * width + seen.start..y * width + seen.end) else { continue };
-            for ((value, share), level) in values.iter_mut().zip(part).zip(lit.row(lane, y, seen.clone())) {
-                *value += share * (level - *value);
+            let Some(row) = plane.get_mut(y * width..(y + 1) * width) else { continue };
+            if let Some(surround) = surround {
+                surround.lay(y, row, 0..left);
+                surround.lay(y, row, right..width);
+            }
+            let Some(values) = row.get_mut(seen.clone()) else { continue };
+            let levels = lit.row(lane, y, seen.clone());
+            let edge = |values: &mut [f32], columns: Range<usize>| {
+                let (Some(values), Some(part), Some(levels)) =
+                    (values.get_mut(columns.clone()), part.get(columns.clone()), levels.get(columns))
+                else {
+                    return;
+                };
+                for ((value, share), level) in values.iter_mut().zip(part).zip(levels) {
+                    *value += share * (level - *value);
+                }
+            };
+            edge(values, 0..whole.start);
+            edge(values, whole.end..part.len());
+            if let (Some(values), Some(levels)) = (values.get_mut(whole.clone()), levels.get(whole.clone())) {
+                values.copy_from_slice(levels);
             }
         }
     }
+}
+
+/// The columns between a row's edges, where all is membrane; empty where there are none.
+fn whole_of(shares: &[f32]) -> Range<usize> {
+    let is_whole = |share: &f32| *share > 1.0 - LEAST_SHARE;
+    let first = shares.iter().position(is_whole).unwrap_or(0);
+    let last = shares.iter().rposition(is_whole).map_or(first, |last| last + 1);
+    // A count, and no look for the first that is not: machines count several at once.
+    let lacking = shares.get(first..last).unwrap_or_default();
+    let lacking: u32 = lacking.iter().map(|share| u32::from(!is_whole(share))).sum();
+    if lacking == 0 { first..last } else { 0..0 }
 }

@@ -8,22 +8,40 @@ use super::work::Work;
 /// A point of the membrane that the camera sees. Sensor frame, mm: the lights ride with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceSample {
-    /// Where the point is on the undeformed dome.
-    pub rest_mm: DVec3,
-    /// Where it is now.
+    /// Where the point is.
     pub point_mm: DVec3,
     /// Unit normal out of the elastomer there, of the deformed surface.
     pub normal: DVec3,
     /// Unit direction inside the elastomer from the point towards the camera.
     pub to_camera: DVec3,
-    /// Whether an object has moved it: where not, `point_mm` is `rest_mm` and a table may answer.
-    pub deformed: bool,
+    /// What an object has done to it.
+    pub moved: Moved,
+}
+
+/// What an object has done to a point of the membrane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Moved {
+    /// Nothing: it lies on the undeformed dome, and a table may answer.
+    Not,
+    /// It has moved and turned it.
+    Far,
+    /// The same, but so smoothly that the points about it tell the change of its light ([`Shading::change`]): its normal
+    /// is not used.
+    Little([f32; 3]),
 }
 
 /// Brightness of the membrane without ink, as linear values of the picture (1 is full scale), red, green, blue.
 pub trait Shading: Send + Sync {
     /// The brightness of each sample, written to the place of the same number; the slices have one length.
     fn levels(&self, samples: &[SurfaceSample], levels: &mut [[f32; 3]], work: &mut Work);
+
+    /// What is added to the brightness of an undeformed point in the same direction from the dome's centre where the
+    /// membrane lies at `point_mm` with this unit normal; before losses on the way to the camera.
+    fn change(&self, point_mm: DVec3, normal: DVec3) -> [f32; 3];
+
+    /// How far the light of the undeformed membrane may be, full scales, from the surface of the second order through
+    /// nine nodes in rows of three, whose corners lie in these directions from the dome's centre.
+    fn bend(&self, corners: &[DVec3; 4]) -> f32;
 
     /// Brightness of a white marker at a place of the sheet's top.
     fn marker_level(&self, scene: &Scene, _position_mm: DVec3) -> [f32; 3] {

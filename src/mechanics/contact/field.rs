@@ -100,20 +100,19 @@ impl Sunk {
     fn at(&self, at_mm: DVec3) -> DVec3 {
         let (x, y) = (at_mm.dot(self.first), at_mm.dot(self.second));
         let cosine = (at_mm.dot(self.normal) / self.dome_radius_mm).clamp(-1.0, 1.0);
-        let angle = cosine.acos();
         // Chord lengths from the contact keep their bearing: the half-space's plane, wrapped on the dome.
         let flat = x.hypot(y);
-        let chord = 2.0 * self.dome_radius_mm * (0.5 * angle).sin();
-        let scale = if angle > std::f64::consts::FRAC_PI_2 && flat > 0.0 { chord / flat } else { 1.0 };
+        let chord = self.dome_radius_mm * (2.0 * (1.0 - cosine)).sqrt();
+        let scale = if cosine < 0.0 && flat > 0.0 { chord / flat } else { 1.0 };
         let (x, y) = (x * scale, y * scale);
         let q = (x / self.patch.a_mm).powi(2) + (y / self.patch.b_mm).powi(2);
         let sink = self.patch.sink_mm(x, y, self.modulus_mpa) * self.share;
         let fade = rim_fade(at_mm.z / self.dome_radius_mm);
-        let held = self.held_mm * self.share * profile(angle);
+        let held = self.held_mm * self.share * profile(cosine);
         let sideways = if q <= 1.0 { 1.0 } else { std::f64::consts::FRAC_2_PI * q.sqrt().recip().asin() };
         let mut u = self.normal * -((sink - held) * fade);
         u += self.shift_mm * (sideways * fade);
-        let turn = if q <= 1.0 { 1.0 } else { q.powf(-1.5) };
+        let turn = if q <= 1.0 { 1.0 } else { 1.0 / (q * q.sqrt()) };
         u += (self.normal * (self.turn_rad * turn * fade)).cross(at_mm);
         u
     }
@@ -130,8 +129,8 @@ impl Sunk {
 }
 
 /// How the finite body's hold falls off with the angle from the contact.
-fn profile(angle: f64) -> f64 {
-    angle.cos().max(0.0)
+fn profile(cosine: f64) -> f64 {
+    cosine.max(0.0)
 }
 
 /// Falls to zero at the bonded rim.

@@ -47,6 +47,14 @@ impl Placed {
         self.object_from_sensor
     }
 
+    /// Centre and radius, if the object is a ball.
+    fn ball(&self) -> Option<(DVec3, f64)> {
+        self.solid.is_ball().then(|| {
+            let (center, radius_mm) = self.solid.bounding_sphere();
+            (self.sensor_from_object.point(center), radius_mm)
+        })
+    }
+
     /// Signed distance and outward direction, sensor frame.
     pub fn distance(&self, at_mm: DVec3) -> (f64, DVec3) {
         let found = self.solid.distance(self.object_from_sensor.point(at_mm));
@@ -72,6 +80,13 @@ impl Placed {
     ) -> Option<(f64, DVec3)> {
         if value >= 0.0 {
             return Some((0.0, outward));
+        }
+        if let Some((center, radius_mm)) = self.ball() {
+            let from_center = from_mm - center;
+            let b = from_center.dot(along);
+            let way = (b * b + radius_mm * radius_mm - from_center.length_squared()).max(0.0).sqrt() - b;
+            let outward = (from_center + along * way) / radius_mm;
+            return (way <= most_mm).then_some((way, outward));
         }
         let tiny = 1e-10 * most_mm;
         let (mut inside, mut way) = (0.0, 0.0_f64);

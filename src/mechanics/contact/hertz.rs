@@ -214,6 +214,13 @@ impl Patch {
         if q <= 1.0 {
             return self.depth_mm - gap;
         }
+        if a == b {
+            // The integral in closed form (Johnson, 3.42a).
+            let r2 = a * a * q;
+            let ratio = q.sqrt().recip();
+            let bracket = (2.0 * a * a - r2) * ratio.asin() + r2 * ratio * (1.0 - ratio * ratio).sqrt();
+            return 0.75 * self.force_n / (PI * modulus_mpa * a * a * a) * bracket;
+        }
         // Largest root of x^2/(a^2+l) + y^2/(b^2+l) = 1.
         let (x2, y2, a2, b2) = (x_mm * x_mm, y_mm * y_mm, a * a, b * b);
         let half = 0.5 * (x2 + y2 - a2 - b2);

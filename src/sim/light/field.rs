@@ -13,11 +13,13 @@ use super::dome_map::{DomeGrid, bicubic, direction_from_disc, disc_continued};
 use super::radiosity::Rings;
 use super::tables::{Prepared, SHELLS, Tables, Ways};
 
-/// Fine cells in a coarse one: the look-up is linear in the fine table, which is cubic in the coarse one. Fine enough
-/// that near the rim, where the lights are close, less than a thousandth is lost.
-const FINE: usize = 6;
-/// The same on the shells.
+/// Fine cells in a coarse one: the shells' look-up is linear in the fine table, which is cubic in the coarse one.
 const FINE_SHELL: usize = 2;
+/// A parabola through three nodes leaves a third difference between four of the same distance over this: 9 times the root
+/// of 3.
+const REST: f32 = 15.59;
+/// Places in a cell, each way, at which the undeformed membrane's brightest and steepest light is looked for.
+const LOOKS: usize = 6;
 
 /// Which parts of the light a field has.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,18 +40,21 @@ pub struct LightField {
     radius_mm: f64,
     grid: DomeGrid,
     still: Vec<Vec4>,
+    /// Largest third difference about each of its cells.
+    third: Vec<f32>,
     shell_grid: DomeGrid,
     shells: Vec<Vec<ShellNode>>,
     brightest: [f64; 3],
+    steepest_per_mm: f64,
     error: f64,
     evaluations: u64,
     own: Option<OwnLight>,
 }
 
-/// Three vectors, one for each channel, and the membrane's own light.
+/// The flux of the three channels along x, y and z, and the membrane's own light.
 #[derive(Debug, Clone, Copy, Default)]
 struct ShellNode {
-    flux: [Vec3A; 3],
+    along: [Vec3A; 3],
     own: Vec3A,
 }
 
@@ -67,9 +72,11 @@ impl LightField {
             radius_mm: ways.radius_mm(),
             grid: DomeGrid::with_cells(8),
             still: Vec::new(),
+            third: Vec::new(),
             shell_grid: DomeGrid::with_cells(8),
             shells: Vec::new(),
             brightest: [0.0; 3],
+            steepest_per_mm: 0.0,
             error: 0.0,
             evaluations: 0,
             own: None,
@@ -99,24 +106,57 @@ impl LightField {
         field
     }
 
+    /// The table is small, so that it stays in the nearest caches, and looked up by cubics: smooth, so that a picture of
+    /// it has no creases of the table's making.
     fn set_still(&mut self, grid: &DomeGrid, table: &[[f64; 3]], own: Option<&OwnLight>) {
-        let fine = DomeGrid::with_cells(grid.cells() * FINE);
+        let more = |place: DVec2| own.map_or([0.0; 3], |own| own.at(direction_from_disc(place)));
         let inside = |place: DVec2| -> [f64; 3] {
             let direct = bicubic(grid, table, grid.coordinates_of_disc(place));
-            let more = own.map_or([0.0; 3], |own| own.at(direction_from_disc(place)));
+            let more = more(place);
             std::array::from_fn(|c| direct[c].max(0.0) + more[c])
         };
         let node = |i: usize| {
-            let [r, g, b] = continued(fine.place(i % fine.nodes, i / fine.nodes), inside);
+            let place = grid.place(i % grid.nodes, i / grid.nodes);
+            let [r, g, b] = if place.length() <= 1.0 {
+                let more = more(place);
+                std::array::from_fn(|c| table[i][c].max(0.0) + more[c])
+            } else {
+                continued(place, inside)
+            };
             Vec4::new(r as f32, g as f32, b as f32, 0.0)
         };
-        self.still = (0..fine.nodes * fine.nodes).into_par_iter().map(node).collect();
-        self.grid = fine;
-        for (i, node) in self.still.iter().enumerate() {
-            if fine.place(i % fine.nodes, i / fine.nodes).length() <= 1.0 {
-                self.brightest = std::array::from_fn(|c| self.brightest[c].max(f64::from(node[c])));
+        self.still = (0..grid.nodes * grid.nodes).into_par_iter().map(node).collect();
+        self.grid = *grid;
+        self.find_third();
+        self.look_over();
+    }
+
+    /// The brightest and the steepest light of the undeformed membrane.
+    fn look_over(&mut self) {
+        let fine = DomeGrid::with_cells(self.grid.cells() * LOOKS);
+        let row = |row: usize| -> Vec<Option<Vec4>> {
+            let light = |column: usize| {
+                let place = fine.place(column, row);
+                (place.length() <= 1.0).then(|| self.still_at(place))
+            };
+            (0..fine.nodes).map(light).collect()
+        };
+        let rows: Vec<Vec<Option<Vec4>>> = (0..fine.nodes).into_par_iter().map(row).collect();
+        let (mut brightest, mut steepest) = (Vec4::ZERO, 0.0_f32);
+        for (j, row) in rows.iter().enumerate() {
+            for (i, here) in row.iter().enumerate() {
+                let Some(here) = here else { continue };
+                brightest = brightest.max(*here);
+                let below = rows.get(j + 1).and_then(|row| row.get(i));
+                for there in [row.get(i + 1), below].into_iter().flatten().flatten() {
+                    steepest = steepest.max((*there - *here).abs().max_element());
+                }
             }
         }
+        self.brightest = [brightest.x, brightest.y, brightest.z].map(f64::from);
+        // The map's scale is at most sqrt(2) (at the rim, along it), so a cell is at least this long.
+        let cell_mm = fine.cell() * self.radius_mm / std::f64::consts::SQRT_2;
+        self.steepest_per_mm = std::f64::consts::SQRT_2 * f64::from(steepest) / cell_mm;
     }
 
     fn set_shells(&mut self, ways: &Ways, tables: &[Tables<3>], own: Option<&OwnLight>) {
@@ -142,8 +182,8 @@ impl LightField {
                 };
                 let node = |i: usize| {
                     let v = continued(fine.place(i % fine.nodes, i / fine.nodes), inside).map(|v| v as f32);
-                    let three = |k: usize| Vec3A::new(v[3 * k], v[3 * k + 1], v[3 * k + 2]);
-                    ShellNode { flux: std::array::from_fn(three), own: three(3) }
+                    let along = |axis: usize| Vec3A::new(v[axis], v[3 + axis], v[6 + axis]);
+                    ShellNode { along: std::array::from_fn(along), own: Vec3A::new(v[9], v[10], v[11]) }
                 };
                 (0..fine.nodes * fine.nodes).into_par_iter().map(node).collect()
             })
@@ -154,13 +194,33 @@ impl LightField {
     /// Irradiance of an undeformed point in this direction, for the channels red, green, blue.
     #[inline]
     pub fn still(&self, direction: DVec3) -> [f32; 3] {
-        let (at, x, y) = cell_of(&self.grid, direction);
-        let nodes = self.grid.nodes;
-        let Some(corner) = self.still.get(at..at + nodes + 2) else { return [0.0; 3] };
-        let low = corner[0] + (corner[1] - corner[0]) * x;
-        let high = corner[nodes] + (corner[nodes + 1] - corner[nodes]) * x;
-        let value = low + (high - low) * y;
+        let value = self.still_at(disc_continued(direction));
         [value.x, value.y, value.z]
+    }
+
+    /// The undeformed membrane's light at a place of the disc.
+    #[inline]
+    fn still_at(&self, disc: DVec2) -> Vec4 {
+        self.cubic_at(&self.still, disc).max(Vec4::ZERO)
+    }
+
+    /// A table on the undeformed membrane's grid at a place of the disc.
+    #[inline]
+    fn cubic_at(&self, table: &[Vec4], disc: DVec2) -> Vec4 {
+        let nodes = self.grid.nodes;
+        let at = self.grid.coordinates_of_disc(disc);
+        // The cubics take a node more on each side.
+        let last = nodes as f64 - 2.001;
+        let (x, y) = (at.x.clamp(1.0, last), at.y.clamp(1.0, last));
+        let (column, row) = (x as usize, y as usize);
+        let (wx, wy) = (cubic((x - column as f64) as f32), cubic((y - row as f64) as f32));
+        let start = (row - 1) * nodes + column - 1;
+        let Some(corner) = table.get(start..start + 3 * nodes + 4) else { return Vec4::ZERO };
+        let across = |row: usize| {
+            let row = &corner[row * nodes..row * nodes + 4];
+            (row[0] * wx[0] + row[1] * wx[1]) + (row[2] * wx[2] + row[3] * wx[3])
+        };
+        (across(0) * wy[0] + across(1) * wy[1]) + (across(2) * wy[2] + across(3) * wy[3])
     }
 
     /// Irradiance of a point that was moved to `point_mm` (sensor frame), with the unit normal out of the
@@ -170,19 +230,28 @@ impl LightField {
         if self.shells.is_empty() || distance.is_nan() || distance <= 0.0 {
             return self.still(if distance > 0.0 { point_mm / distance } else { DVec3::Z });
         }
-        let (at, x, y) = cell_of(&self.shell_grid, point_mm / distance);
+        let direction = point_mm / distance;
+        let (at, x, y) = cell_of(&self.shell_grid, direction);
         let nodes = self.shell_grid.nodes;
         let weights = shell_weights(distance / self.radius_mm);
-        let normal = normal.as_vec3a();
+        // What the outer shell's coarser table lacks of the undeformed membrane's light belongs to that one's own place and
+        // normal, and is lost on the way from there.
+        let near = smooth_step(1.0 - (1.0 - distance / self.radius_mm).abs() / LACKING_PART)
+            * smooth_step(1.0 - (1.0 - normal.dot(direction)) / LACKING_TILT);
+        let (normal, outward) = (normal.as_vec3a(), direction.as_vec3a());
         let mut light = Vec3A::ZERO;
-        for (shell, weight) in self.shells.iter().zip(weights) {
+        let across = |corner: &[ShellNode], normal: Vec3A| {
+            let low = corner[0].light(normal) * (1.0 - x) + corner[1].light(normal) * x;
+            let high = corner[nodes].light(normal) * (1.0 - x) + corner[nodes + 1].light(normal) * x;
+            low * (1.0 - y) + high * y
+        };
+        for (number, (shell, weight)) in self.shells.iter().zip(weights).enumerate() {
             let Some(corner) = shell.get(at..at + nodes + 2) else { return [0.0; 3] };
-            let mix = |a: &ShellNode| {
-                Vec3A::new(a.flux[0].dot(normal), a.flux[1].dot(normal), a.flux[2].dot(normal)) + a.own
-            };
-            let low = mix(&corner[0]) * (1.0 - x) + mix(&corner[1]) * x;
-            let high = mix(&corner[nodes]) * (1.0 - x) + mix(&corner[nodes + 1]) * x;
-            light += (low * (1.0 - y) + high * y) * weight;
+            light += across(corner, normal) * weight;
+            if number == 0 && near > 0.0 {
+                let still = Vec3A::from_vec4(self.still_at(disc_continued(direction)));
+                light += (still - across(corner, outward)) * near;
+            }
         }
         light.max(Vec3A::ZERO).to_array()
     }
@@ -218,22 +287,70 @@ impl LightField {
         self.evaluations
     }
 
-    /// Largest difference between neighbouring nodes over their distance on the dome, 1/mm.
-    pub fn steepest_per_mm(&self) -> f64 {
-        let grid = self.grid;
-        // The map's scale is at most sqrt(2) (at the rim, along it), so a cell is at least this long.
-        let cell_mm = grid.cell() * self.radius_mm / std::f64::consts::SQRT_2;
-        let inside = |i: usize| grid.place(i % grid.nodes, i / grid.nodes).length() <= 1.0;
-        let mut steepest = 0.0_f32;
-        for (i, here) in self.still.iter().enumerate().filter(|(i, _)| inside(*i)) {
-            for next in [i + 1, i + grid.nodes] {
-                if let Some(there) = self.still.get(next).filter(|_| inside(next)) {
-                    steepest = steepest.max((*there - *here).abs().max_element());
-                }
-            }
+    /// How far the undeformed membrane's light may be from the surface of the second order through nine nodes, in rows
+    /// of three, whose corners lie in these directions: two parabolas' rests, from the largest third difference of the
+    /// table's cells about.
+    pub fn bend(&self, corners: &[DVec3; 4]) -> f32 {
+        let places = corners.map(|at| {
+            let last = DVec2::splat(self.grid.nodes as f64 - 2.0);
+            self.grid.coordinates_of_disc(disc_continued(at)).clamp(DVec2::ONE, last)
+        });
+        let low = places.iter().copied().fold(DVec2::INFINITY, DVec2::min);
+        let high = places.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
+        let mut most = 0.0_f32;
+        for row in low.y as usize..=high.y as usize {
+            let start = row * self.grid.nodes;
+            let cells = self.third.get(start + low.x as usize..=start + high.x as usize);
+            most = cells.unwrap_or_default().iter().copied().fold(most, f32::max);
         }
-        std::f64::consts::SQRT_2 * f64::from(steepest) / cell_mm
+        let apart = 0.5 * (high - low).max_element() as f32;
+        2.0 * most * apart * apart * apart / REST
     }
+
+    /// Largest third difference about each cell of the undeformed membrane's table.
+    fn find_third(&mut self) {
+        let nodes = self.grid.nodes;
+        let at = |column: usize, row: usize| {
+            // A clamped look-up is level beyond the table.
+            self.still.get(row.min(nodes - 1) * nodes + column.min(nodes - 1)).copied().unwrap_or(Vec4::ZERO)
+        };
+        let third = |v: [Vec4; 4]| (v[3] - v[0] + (v[1] - v[2]) * 3.0).abs().max_element();
+        let cell = |i: usize| {
+            let (column, row) = ((i % nodes).max(1), (i / nodes).max(1));
+            let mut most = 0.0_f32;
+            for k in 0..4 {
+                most = most.max(third(std::array::from_fn(|j| at(column + j - 1, row + k - 1))));
+                most = most.max(third(std::array::from_fn(|j| at(column + k - 1, row + j - 1))));
+            }
+            most
+        };
+        self.third = (0..nodes * nodes).map(cell).collect();
+    }
+
+    /// Largest difference of the undeformed membrane's light between near places over their distance, 1/mm.
+    pub fn steepest_per_mm(&self) -> f64 {
+        self.steepest_per_mm
+    }
+}
+
+impl ShellNode {
+    /// Light on a surface of this normal.
+    #[inline]
+    fn light(&self, normal: Vec3A) -> Vec3A {
+        let [x, y, z] = self.along;
+        (x * normal.x + y * normal.y) + (z * normal.z + self.own)
+    }
+}
+
+/// Depth, as a part of the radius, and turn of the normal, as one less its cosine, at which what the outer shell lacks
+/// does not count any more.
+const LACKING_PART: f64 = 0.05;
+const LACKING_TILT: f64 = 0.02;
+
+/// 0 up to 0, 1 from 1 on, smooth between.
+fn smooth_step(t: f64) -> f32 {
+    let t = t.clamp(0.0, 1.0);
+    (t * t * (3.0 - 2.0 * t)) as f32
 }
 
 /// A function of the disc at a place, beyond its rim as the parabola through the rim and two places inside goes on, as
@@ -308,6 +425,17 @@ fn shell_weights(part: f64) -> [f32; 3] {
         ((p - b) * (p - c) / ((a - b) * (a - c))) as f32,
         ((p - a) * (p - c) / ((b - a) * (b - c))) as f32,
         ((p - a) * (p - b) / ((c - a) * (c - b))) as f32,
+    ]
+}
+
+/// Weights of the four nodes about a place between the middle two (Catmull and Rom).
+#[inline]
+fn cubic(t: f32) -> [f32; 4] {
+    [
+        0.5 * t * ((2.0 - t) * t - 1.0),
+        0.5 * (t * t * (3.0 * t - 5.0) + 2.0),
+        0.5 * t * ((4.0 - 3.0 * t) * t + 1.0),
+        0.5 * t * t * (t - 1.0),
     ]
 }
 

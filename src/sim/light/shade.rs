@@ -9,7 +9,7 @@ use crate::design::sections::LedColor;
 use crate::sim::SimError;
 use crate::sim::effect::EffectName;
 use crate::sim::scene::Scene;
-use crate::sim::shading::{Shading, SurfaceSample};
+use crate::sim::shading::{Moved, Shading, SurfaceSample};
 use crate::sim::work::Work;
 
 /// Work of one look-up in the table of the undeformed membrane.
@@ -172,20 +172,35 @@ impl Shading for LitDome {
         let per_mm = 1.0 / self.radius_mm;
         let mut moved = 0_u64;
         for (sample, level) in samples.iter().zip(levels.iter_mut()) {
-            let light = if sample.deformed {
-                moved += 1;
-                self.field.moved(sample.point_mm, sample.normal)
-            } else {
-                self.field.still(sample.rest_mm * per_mm)
+            let (light, change) = match sample.moved {
+                Moved::Not => (self.field.still(sample.point_mm * per_mm), [0.0; 3]),
+                Moved::Little(change) => (self.field.still(sample.point_mm.normalize_or(DVec3::Z)), change),
+                Moved::Far => {
+                    moved += 1;
+                    (self.field.moved(sample.point_mm, sample.normal), [0.0; 3])
+                }
             };
             let passed = self.passed(sample.to_camera);
-            *level = std::array::from_fn(|c| self.gain[c] * light[c] * passed[c] + self.stray);
+            *level = std::array::from_fn(|c| {
+                (self.gain[c] * light[c] + change[c]).max(0.0) * passed[c] + self.stray
+            });
         }
         let still = samples.len() as u64 - moved;
         work.add(EffectName::DirectLight, STILL_UNITS * still + MOVED_UNITS * moved);
         if self.leaving.is_some() {
             work.add(EffectName::Fresnel, LEAVING_UNITS * samples.len() as u64);
         }
+    }
+
+    fn change(&self, point_mm: DVec3, normal: DVec3) -> [f32; 3] {
+        let moved = self.field.moved(point_mm, normal);
+        let still = self.field.still(point_mm.normalize_or(DVec3::Z));
+        std::array::from_fn(|c| self.gain[c] * (moved[c] - still[c]))
+    }
+
+    fn bend(&self, corners: &[DVec3; 4]) -> f32 {
+        let gain = self.gain.iter().copied().fold(0.0, f32::max);
+        gain * self.field.bend(corners)
     }
 
     fn marker_level(&self, _scene: &Scene, position_mm: DVec3) -> [f32; 3] {

@@ -18,6 +18,7 @@ use super::tables::{Prepared, Source, Ways};
 use crate::camera::{LensSpec, Model};
 use crate::numeric::Rigid;
 use crate::optics::{Layer, OpticsSpec, SensorOptics};
+use crate::sim::shading::Moved;
 use crate::sim::{EffectName, Shading, SurfaceSample, Work};
 
 const WIDE: DVec2 = DVec2::splat(1e6);
@@ -441,11 +442,10 @@ fn the_sensor_is_lit_from_three_sides() {
     }
     // A point that was not moved has the same light by either table.
     let sample = |direction: DVec3, deformed| SurfaceSample {
-        rest_mm: direction * 10.0,
         point_mm: direction * 10.0,
         normal: direction,
         to_camera: DVec3::NEG_Z,
-        deformed,
+        moved: if deformed { Moved::Far } else { Moved::Not },
     };
     let moved_scene = self::scene(
         r#", "objects": [ { "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 },
@@ -481,11 +481,10 @@ fn largest_change(a: &LitDome, b: &LitDome, deformed: bool) -> f64 {
     for direction in directions(3_000) {
         let part = if deformed { (1.0 - direction.z).max(0.93) } else { 1.0 };
         let sample = SurfaceSample {
-            rest_mm: direction * 10.0,
             point_mm: direction * (10.0 * part),
             normal: direction,
             to_camera: DVec3::NEG_Z,
-            deformed,
+            moved: if deformed { Moved::Far } else { Moved::Not },
         };
         let mut levels = [[[0.0_f32; 3]; 1]; 2];
         for (dome, level) in [a, b].into_iter().zip(&mut levels) {

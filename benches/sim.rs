@@ -209,15 +209,12 @@ fn whole(with: Option<EffectName>) -> Value {
 }
 
 fn effects(design: &Design) {
-    /// Pairs of runs, one right after the other: others may load the machine now more, now less.
-    const PAIRS: usize = 5;
-    println!("\n== cost of each effect: a frame with it, less one without it (median of {PAIRS} pairs)");
-    let took = |value: &Value| {
-        let seconds = scene_of(design, value).and_then(|scene| frame_s(&scene, 1));
-        seconds.map_or(f64::NAN, |s| s[0] + s[1])
-    };
+    /// Pairs of drawings, one right after the other and in turn: others may load the machine now more, now less.
+    const PAIRS: usize = 7;
+    println!(
+        "\n== cost of each effect: a picture with it, less one without it, and the quartiles of {PAIRS} pairs"
+    );
     let all = whole(None);
-    println!("{:<20} {:>9.3} ms", "everything", 1e3 * median((0..PAIRS).map(|_| took(&all)).collect()));
     for effect in EffectName::ALL {
         // Effects of time draw the picture many times over: they are added instead.
         let added = matches!(effect, EffectName::MotionBlur | EffectName::RollingShutter);
@@ -226,9 +223,35 @@ fn effects(design: &Design) {
             less["effects"][effect.as_str()] = json!("never");
         }
         let more = if added { whole(Some(effect)) } else { all.clone() };
-        let cost = median((0..PAIRS).map(|_| took(&more) - took(&less)).collect());
-        println!("{:<20} {:>9.3} ms", effect.as_str(), 1e3 * cost);
+        let (Some(more), Some(less)) = (scene_of(design, &more), scene_of(design, &less)) else { continue };
+        let Some(mut costs_ms) = pair_costs_ms(&more, &less, PAIRS) else { continue };
+        costs_ms.sort_by(f64::total_cmp);
+        let at = |part: usize| costs_ms.get(part * (PAIRS - 1) / 4).copied().unwrap_or(f64::NAN);
+        let [low, cost, high] = [1, 2, 3].map(at);
+        let note = if low < 0.0 && high > 0.0 { "  below the scatter" } else { "" };
+        println!("{:<20} {cost:>9.2} ms  ({low:.2} to {high:.2}){note}", effect.as_str());
     }
+}
+
+/// What a picture of one scene takes more than one of another, drawn in turn; the contact is solved beforehand.
+fn pair_costs_ms(more: &Scene, less: &Scene, pairs: usize) -> Option<Vec<f64>> {
+    let plans = [Plan::everything(more).ok()?, Plan::everything(less).ok()?];
+    let renderers = [Renderer::new(more, &plans[0]).ok()?, Renderer::new(less, &plans[1]).ok()?];
+    let touches = [0, 1].map(|k| {
+        let mut stepper = renderers[k].stepper().ok().flatten();
+        let count = more.frame_count();
+        let next = |frame| stepper.as_mut()?.next(frame, more.time_s(frame), &mut Default::default()).ok();
+        (0..count).map_while(next).collect::<Vec<_>>()
+    });
+    let mut scratch = Scratch::default();
+    let mut took = |k: usize| drawing_s(&renderers[k], &touches[k], more.frame_count(), &mut scratch);
+    // Tables and room are made the first time.
+    let _ = [0, 1].map(&mut took);
+    let pair = |i: usize| {
+        let (first, second) = (took(i % 2), took(1 - i % 2));
+        1e3 * if i.is_multiple_of(2) { first - second } else { second - first }
+    };
+    Some((0..pairs).map(pair).collect())
 }
 
 fn slopes(design: &Design) {

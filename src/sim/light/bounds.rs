@@ -30,6 +30,9 @@ const AROUND: usize = 36;
 /// The largest change of a code, in grey levels of 8 bits, that a change of light by `change` (full scales) makes,
 /// wherever on the scale: for gamma of 1 and more the code `x^(1/gamma)` is concave and changes most from dark, for
 /// less it is steepest at full scale.
+///
+/// It ends at 255, whatever the change: a picture holds no code outside its scale, so where both pictures are bright enough
+/// to saturate they differ by less, and by no more than the whole scale anywhere.
 pub fn grey_of_change(gamma: f64, change: f64) -> f64 {
     let clear = change.clamp(0.0, 1.0);
     let power = 1.0 / gamma;

@@ -698,3 +698,18 @@ fn dots_are_seen_where_mitsuba_sees_them() {
     println!("{} dots, at most {worst:.4} px from Mitsuba's", places.len());
     assert!(worst < 0.05 && places.len() >= 45, "{worst}");
 }
+
+#[test]
+fn a_change_of_light_changes_no_code_by_more_than_its_bound_and_none_by_more_than_the_scale() {
+    for gamma in [0.5, 1.0, 2.2] {
+        let code = |light: f64| 255.0 * light.clamp(0.0, 1.0).powf(1.0 / gamma);
+        for i in 0..60 {
+            for j in 0..60 {
+                let (before, after) = (f64::from(i) * 0.05, f64::from(j) * 0.05);
+                let most = super::bounds::grey_of_change(gamma, (after - before).abs());
+                let found = (code(after) - code(before)).abs();
+                assert!(found <= most + 1e-9 && most <= 255.0, "{gamma} {before} {after}: {found} {most}");
+            }
+        }
+    }
+}

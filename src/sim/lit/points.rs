@@ -209,8 +209,10 @@ impl<const N: usize> Lit<N> {
         self.width.div_ceil(KEPT_STEP)
     }
 
-    /// Room for the motions of a picture.
+    /// Room for the motions of a picture; of the last one, nothing is left that could tell on this one's bytes.
     pub(super) fn lay_out_motions(&mut self) {
+        self.moved_mm = DVec3::ZERO;
+        self.motions.clear();
         let count = self.kept_across() * self.height.div_ceil(KEPT_STEP);
         self.motions.resize(count, Motion::default());
         self.sources.clear();

@@ -260,7 +260,8 @@ fn check_frames_by_threads(name: &str, count: u32) {
             .collect::<Vec<_>>()
     };
     let (one, three) = (made(1), made(3));
-    assert_eq!(one.len(), count as usize + 3);
+    // Scenes may ask for height maps and pressures beside the frames.
+    assert!(one.len() >= count as usize + 3);
     let differ: Vec<_> = one.iter().zip(&three).filter(|(a, b)| a != b).map(|(a, _)| &a.0).collect();
     assert!(differ.is_empty() && one.len() == three.len(), "{name}: {differ:?}");
 }

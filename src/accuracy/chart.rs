@@ -43,7 +43,13 @@ impl Chart {
         let rungs: Vec<&Rung> = ladder.rungs.iter().filter(usable).collect();
         let mut errors: Vec<f64> = rungs.iter().map(|rung| error(rung)).collect();
         errors.extend(ladder.asked.filter(|asked| *asked > 0.0));
-        let times: Vec<f64> = rungs.iter().map(|rung| rung.per_item_s).collect();
+        let per_item = |rung: &Rung, seconds: f64| seconds * rung.per_item_s / rung.time.median_s;
+        // The axis holds the spread as well.
+        let spread = |rung: &&Rung| {
+            let time = rung.time;
+            [time.lower_quartile_s, time.median_s, time.upper_quartile_s].map(|s| per_item(rung, s))
+        };
+        let times: Vec<f64> = rungs.iter().flat_map(spread).collect();
         let (across, up) = (Axis::over(&times)?, Axis::over(&errors)?);
         let place = |time: f64, error: f64| {
             DVec2::new(
@@ -81,7 +87,6 @@ impl Chart {
         front.sort_by(|a, b| a.time.median_s.total_cmp(&b.time.median_s));
         let line: Vec<DVec2> = front.iter().map(|rung| place(rung.per_item_s, error(rung))).collect();
         chart.line(&line, FRONT, 2.0);
-        let per_item = |rung: &Rung, seconds: f64| seconds * rung.per_item_s / rung.time.median_s;
         for rung in &rungs {
             let at = place(rung.per_item_s, error(rung));
             let rgb = if rung.dominated { DOMINATED } else { FRONT };

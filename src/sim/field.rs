@@ -211,14 +211,8 @@ pub fn rim_polygon(optics: &SensorOptics) -> Vec<DVec2> {
         let (a, b, c, d) = (at(k + RIM_AZIMUTHS - 1), at(k), at(k + 1), at(k + 2));
         for step in 0..RIM_BETWEEN {
             let t = step as f64 / RIM_BETWEEN as f64;
-            // Lagrange's cubic through the four.
-            let (p, q, r) = (t + 1.0, t - 1.0, t - 2.0);
-            polygon.push(
-                a * (-t * q * r / 6.0)
-                    + b * (p * q * r / 2.0)
-                    + c * (-p * t * r / 2.0)
-                    + d * (p * t * q / 6.0),
-            );
+            let weights = lagrange(t);
+            polygon.push(a * weights[0] + b * weights[1] + c * weights[2] + d * weights[3]);
         }
     }
     polygon

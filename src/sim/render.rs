@@ -12,7 +12,7 @@ use super::field::LensField;
 use super::frame::{Frame, Image8};
 use super::instant::{Instant, count_points, dent_step_mm, units};
 use super::picture::{Painter, Parts};
-use super::pipeline::{PassContext, Pipeline, Stage};
+use super::pipeline::{PassContext, Pipeline, Stage, Timing};
 use super::plan::Plan;
 use super::rolled::{Rolled, Slice};
 use super::scene::Scene;
@@ -128,15 +128,11 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// A load without balance.
     pub fn instant(&self, frame: u32, around: Option<&Around>, work: &mut Work) -> Result<Instant, SimError> {
-        let time_s = self.scene.time_s(frame);
-        let shape = self.shape(0.0, around, work);
-        self.instant_of(frame, time_s, shape, work)
-    }
-
-    /// The touched dome at a time of so many frames after the frame.
-    fn shape(&self, frames: f64, around: Option<&Around>, work: &mut Work) -> Shape {
-        let touch = around.map(|around| around.at(frames));
-        Shape::of(touch, self.scene.optics().dome_radius_mm(), self.dent_step_mm(), work)
+        // Where light is gathered over a time, that very instant is not drawn.
+        let step_mm = self.dent_step_mm().filter(|_| self.is_at_once());
+        let touch = around.map(|around| around.at(0.0));
+        let shape = Shape::of(touch, self.scene.optics().dome_radius_mm(), step_mm, work);
+        self.instant_of(frame, self.scene.time_s(frame), shape, work)
     }
 
     /// Distance of the dent's nodes; `None` where no light falls on them.
@@ -224,6 +220,11 @@ impl<'a> Renderer<'a> {
         count_points(self.pipeline.geometry, self.eye.channels(), central, Points::count(self.scene), work);
     }
 
+    /// Whether all light is gathered at the frame's time.
+    fn is_at_once(&self) -> bool {
+        self.pipeline.timing == Timing::default()
+    }
+
     /// Times at which a row gathers light, s after its own.
     fn exposure_s(&self) -> Vec<f64> {
         let Some(exposure) = self.pipeline.timing.exposure else { return vec![0.0] };
@@ -267,7 +268,7 @@ impl<'a> Renderer<'a> {
         let context = PassContext { frame: number, seed: scene.file().seed };
         let (exposure_s, rows_s) = (self.exposure_s(), self.rows_s(height));
         let mut told = Vec::new();
-        if exposure_s.len() == 1 && rows_s.len() == 1 {
+        if self.is_at_once() {
             let slice = Slice { first: 0, end: height, instant: now };
             scratch.painter.draw(parts, &[slice], now_spots, &mut frame, work);
             self.run_passes(&mut frame, &context, work, |stage| stage <= Stage::Focus);
@@ -288,12 +289,9 @@ impl<'a> Renderer<'a> {
                 for (slice, (_, row_s)) in rows_s.iter().enumerate() {
                     let mut one = Work::default();
                     let frames = (after_s + row_s) * self.rate_hz();
-                    let time_s = now.time_s + after_s + row_s;
-                    let shape = match &shapes {
-                        Some(shapes) => shapes.at(frames),
-                        None => Shape { touch: around.map(|around| around.at(frames)), ..Shape::default() },
-                    };
-                    instants.push(self.instant_of(number, time_s, shape, &mut one)?);
+                    let free = || Shape { touch: around.map(|around| around.at(frames)), ..Shape::default() };
+                    let shape = shapes.as_ref().map_or_else(free, |shapes| shapes.at(frames));
+                    instants.push(self.instant_of(number, now.time_s + after_s + row_s, shape, &mut one)?);
                     match slice {
                         0 => spent.merge(&one),
                         _ => spent.add(EffectName::RollingShutter, one.total()),

@@ -39,6 +39,7 @@ mod result;
 mod springs;
 mod status;
 mod surplus;
+mod tilt;
 mod tracker;
 mod undistort;
 mod whites;

@@ -11,8 +11,6 @@ pub struct Estimate {
     pub displacement_mm: f64,
     /// The force at a held pose is within this part of the reference's.
     pub force_part: f64,
-    /// The force at a held pose is within this of the reference's, N.
-    pub force_n: f64,
     /// Multiplications per frame.
     pub work: f64,
     /// Multiplications once per dome.
@@ -40,12 +38,10 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
     // Nodes that touch a plane, which touches most of all that is not hollow (Hertz: a^2 = R d), and half as many beside.
     let nodes = |h: f64| 4.0 + 1.5 * std::f64::consts::PI * radius * depth / (h * h);
     let large = 0.8 * deep * depth;
-    let most_n = most_force_n(elastomer, indenter, depth);
-    let found = match level {
+    match level {
         Level::Geometric => Estimate {
             displacement_mm: (0.55 + sharp + 3.0 * deep) * depth,
             force_part: 0.3 + sharp + 2.0 * deep,
-            force_n: 0.0,
             work: 3e5,
             setup_work: 0.0,
             applies: true,
@@ -53,7 +49,6 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
         Level::ClosedForm => Estimate {
             displacement_mm: (0.2 + 3.5 * deep) * depth,
             force_part: 0.15 + 2.0 * deep,
-            force_n: 0.0,
             work: 5e4,
             setup_work: 0.0,
             applies: !matches!(indenter.solid.0, Form::Mesh(_)),
@@ -65,7 +60,6 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
             Estimate {
                 displacement_mm: (0.1 + sharp) * h.min(4.0 * depth) + large,
                 force_part: 0.1 + 0.1 * h / radius.min(h + depth) + 2.0 * deep,
-                force_n: 0.0,
                 // Some 300 sweeps over 3 n forces in all trials of a balance with friction.
                 work: 2500.0 * n * n + 2e4 * elements,
                 // Harmonics, times unknowns and their fill, times right-hand sides.
@@ -80,14 +74,12 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
             Estimate {
                 displacement_mm: (0.1 + sharp) * h.min(4.0 * depth),
                 force_part: 0.1 + 0.1 * h / radius.min(h + depth),
-                force_n: 0.0,
                 work: 10.0 * (unknowns.powi(2) + 3.0 * n * unknowns.powf(4.0 / 3.0)),
                 setup_work: 100.0 * unknowns,
                 applies: true,
             }
         }
-    };
-    Estimate { force_n: found.force_part * most_n, ..found }
+    }
 }
 
 /// No object that lies `depth_mm` inside the undeformed dome presses harder than this, N.
@@ -95,7 +87,8 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
 /// Of convex ones a plate presses most: Hertz' force on the dome's radius, and half as much again for the bonded base
 /// and large strain (measured: a quarter at R/10). A hollow one may hold the dome on all sides: a column of the dome's
 /// base that cannot give way sideways.
-fn most_force_n(elastomer: &Elastomer, indenter: &Indenter, depth_mm: f64) -> f64 {
+pub fn most_force_n(elastomer: &Elastomer, indenter: &Indenter, depth_mm: f64) -> f64 {
+    let depth_mm = depth_mm.max(0.0).min(elastomer.dome_radius_mm);
     let (radius, nu) = (elastomer.dome_radius_mm, elastomer.poisson);
     let modulus = elastomer.young_mpa / (1.0 - nu * nu);
     let plate_n = 1.5 * 4.0 / 3.0 * modulus * radius.sqrt() * depth_mm.powf(1.5);

@@ -35,7 +35,7 @@ mod trials;
 
 pub use elastomer::{Elastomer, Indenter};
 pub use error::ContactError;
-pub use estimate::{Estimate, estimate};
+pub use estimate::{Estimate, estimate, most_force_n};
 pub use on_pole::OnPole;
 pub use press::{PressStatus, Pressed};
 pub use solid::{Distance, Solid};

@@ -1,6 +1,6 @@
 //! Objects dent the dome, and press the platform on its springs.
 
-use crate::mechanics::contact::{Elastomer, Level, estimate};
+use crate::mechanics::contact::{Elastomer, Level, estimate, most_force_n};
 use crate::sim::effect::{Bound, Cost, Effect, EffectName};
 use crate::sim::scene::file::LevelName;
 use crate::sim::scene::object::Hold;
@@ -55,9 +55,10 @@ pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
     let Some(depth_mm) = deepest_mm(scene) else { return Vec::new() };
     let Some(object) = scene.objects().first() else { return Vec::new() };
     let elastomer = Elastomer::of_design(scene.design());
+    let hardest_n = most_force_n(&elastomer, &object.indenter, depth_mm);
     let errors = |name| {
         let found = estimate(level_named(scene, name), &elastomer, &object.indenter, depth_mm);
-        found.applies.then_some((found.displacement_mm, found.force_n))
+        found.applies.then_some((found.displacement_mm, found.force_part * hardest_n))
     };
     let Some((own_mm, own_n)) = errors(best) else { return Vec::new() };
     let most_n = scene.file().tolerance.force_n.unwrap_or(f64::INFINITY);

@@ -121,5 +121,12 @@ fn explain(output: &Output, scene: &Scene, plan: &Plan) -> Result<(), Failure> {
     output.say(&format!(
         "  left out in all: <= {:.2e} of {} px, {:.2e} of {} grey levels",
         plan.left_out.px, tolerance.px, plan.left_out.grey, tolerance.grey
-    ))
+    ))?;
+    if plan.filled_grey > 0.0 {
+        output.say(&format!(
+            "  filled in between rays: <= {:.2} grey levels, twice counted in the tolerance",
+            plan.filled_grey
+        ))?;
+    }
+    Ok(())
 }

@@ -1,10 +1,10 @@
-//! What of the sensor lies where in the picture: the lens's field, the dome's rim, a cap of the dome.
+//! What of the sensor lies where in the picture: the lens's field, the dome's rim.
 
 use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 
-use super::lit::{LARGEST, PixelBox};
+use super::lit::LARGEST;
 use crate::camera::Lens;
 use crate::optics::SensorOptics;
 
@@ -70,14 +70,27 @@ const RAY_CLOSE_RAD: f64 = 1e-6;
 const LEAST_COSINE: f64 = 0.05;
 
 /// Directions that pixels see, from few of them: cubics through nodes each 8 px, where they are as good as the lens's
-/// own formula.
+/// own formula; else each pixel's own.
 #[derive(Debug, Clone)]
 pub struct LensRays {
     across: usize,
     /// Components of the unit direction along the picture's axes; NaN where there is none.
     nodes: Vec<DVec2>,
-    /// Of each cell, whether its directions may be looked up.
-    good: Vec<bool>,
+    /// Of each cell, how its directions are known.
+    cells: Vec<Cell>,
+    /// Every pixel's direction, of cells that ask for it; NaN where there is none.
+    own: Vec<DVec2>,
+}
+
+/// How the directions of a cell are known.
+#[derive(Debug, Clone, Copy)]
+enum Cell {
+    /// By the cubics through the nodes about it.
+    Good,
+    /// Pixel by pixel, from this place on.
+    Own(usize),
+    /// Not at all.
+    Dark,
 }
 
 /// Weights of four nodes at each pixel between the middle two: Lagrange's cubic.
@@ -108,7 +121,7 @@ impl LensRays {
         };
         let place = |i: usize| i as f64 * RAY_STEP as f64 - (RAYS_BEFORE * RAY_STEP) as f64;
         let nodes = (0..across * down).map(|i| ray(place(i % across), place(i / across))).collect();
-        let mut rays = Self { across, nodes, good: Vec::new() };
+        let mut rays = Self { across, nodes, cells: Vec::new(), own: Vec::new() };
         let middle = lagrange(0.5);
         let good = |i: usize| {
             let half = 0.5 * RAY_STEP as f64;
@@ -119,7 +132,27 @@ impl LensRays {
             // NaN is no match either.
             rays.mix(i, &middle, &middle).is_some_and(|found| (found - exact).length() < RAY_CLOSE_RAD)
         };
-        rays.good = (0..across * down).map(good).collect();
+        let good: Vec<bool> = (0..across * down).map(good).collect();
+        // Along the end of the field the lens's own formula, whose root takes long, is asked once and for all.
+        for (i, good) in good.into_iter().enumerate() {
+            let corner = [i % across, i / across].map(place);
+            let pixels = (0..RAY_STEP * RAY_STEP)
+                .map(|k| ray(corner[0] + (k % RAY_STEP) as f64, corner[1] + (k / RAY_STEP) as f64));
+            let first = rays.own.len();
+            rays.cells.push(if good {
+                Cell::Good
+            } else if corner.iter().any(|at| *at < 0.0) {
+                Cell::Dark
+            } else {
+                rays.own.extend(pixels);
+                if rays.own.iter().skip(first).all(|ray| ray.is_nan()) {
+                    rays.own.truncate(first);
+                    Cell::Dark
+                } else {
+                    Cell::Own(first)
+                }
+            });
+        }
         rays
     }
 
@@ -127,10 +160,15 @@ impl LensRays {
     #[inline]
     pub fn at(&self, x: usize, y: usize) -> Option<DVec3> {
         let cell = (y / RAY_STEP + RAYS_BEFORE) * self.across + x / RAY_STEP + RAYS_BEFORE;
-        if x / RAY_STEP + RAYS_BEFORE >= self.across || !*self.good.get(cell)? {
+        if x / RAY_STEP + RAYS_BEFORE >= self.across {
             return None;
         }
-        let flat = self.mix(cell, &RAY_WEIGHTS[x % RAY_STEP], &RAY_WEIGHTS[y % RAY_STEP])?;
+        let (column, row) = (x % RAY_STEP, y % RAY_STEP);
+        let flat = match *self.cells.get(cell)? {
+            Cell::Good => self.mix(cell, &RAY_WEIGHTS[column], &RAY_WEIGHTS[row])?,
+            Cell::Own(first) => *self.own.get(first + row * RAY_STEP + column).filter(|ray| !ray.is_nan())?,
+            Cell::Dark => return None,
+        };
         Some(flat.extend((1.0 - flat.length_squared()).max(0.0).sqrt()))
     }
 
@@ -153,40 +191,6 @@ pub fn inside(field: Range<usize>, x: usize, part: &[f32]) -> (Range<usize>, &[f
     let start = x.max(field.start).min(x + part.len());
     let end = (x + part.len()).min(field.end).max(start);
     (start..end, part.get(start - x..end - x).unwrap_or(&[]))
-}
-
-/// Box of the pixels that may show a cap of the dome.
-pub fn cap_box(
-    optics: &SensorOptics,
-    middle: DVec3,
-    angle_rad: f64,
-    width: usize,
-    height: usize,
-) -> PixelBox {
-    const AZIMUTHS: u32 = 16;
-    /// The polygon through the azimuths lies inside the cap's outline, and the dent moves it.
-    const MARGIN_PX: f64 = 6.0;
-    let side = middle.any_orthonormal_vector();
-    let up = middle.cross(side);
-    let (sin, cos) = angle_rad.min(std::f64::consts::FRAC_PI_2).sin_cos();
-    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    for k in 0..AZIMUTHS {
-        let turn = DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(AZIMUTHS));
-        let mut at = (middle * cos + (side * turn.x + up * turn.y) * sin) * optics.dome_radius_mm();
-        at.z = at.z.max(0.0);
-        let Ok(pixel) = optics.project_deformed(at) else {
-            return PixelBox { left: 0, top: 0, right: width, bottom: height };
-        };
-        low = low.min(pixel);
-        high = high.max(pixel);
-    }
-    let whole = |value: f64, most: usize| (value.max(0.0) as usize).min(most);
-    PixelBox {
-        left: whole(low.x - MARGIN_PX, width),
-        top: whole(low.y - MARGIN_PX, height),
-        right: whole(high.x + MARGIN_PX + 1.0, width),
-        bottom: whole(high.y + MARGIN_PX + 1.0, height),
-    }
 }
 
 /// The dome's rim in the image, px. Where the lens does not see it, the polygon runs outside the lens's field.

@@ -6,9 +6,10 @@ use glam::DVec2;
 
 use super::coverage::{Coverage, LEAST_SHARE, clip_to_image};
 use super::eye::Eye;
-use super::field::{LensField, cap_box, rim_polygon};
+use super::field::{LensField, rim_polygon};
 use super::instant::dent_step_mm;
 use super::lit::{Lit, LitSlice, LitSurface};
+use super::picture::fill_tolerance;
 use super::shapes::Shape;
 use super::touch::Between;
 use super::*;
@@ -20,7 +21,7 @@ fn rolled(level: &str) -> Scene {
     let text = format!(
         r#"{{
         "version": 1, "name": "t", "design": "../thumb24.json", "frames": {{ "count": 5, "rate_hz": 10 }},
-        "tolerance": {{ "px": 1e-9, "grey": 1e-9 }}, "contact": {{ "level": "{level}", "element_mm": 1 }},
+        "tolerance": {{ "px": 1e-9, "grey": 2 }}, "contact": {{ "level": "{level}", "element_mm": 1 }},
         "objects": [{{ "name": "ball", "shape": {{ "kind": "sphere", "radius_mm": 4 }}, "path": [
             {{ "time_s": 0, "position_mm": [0, 0, 14.1] }},
             {{ "time_s": 0.4, "position_mm": [1.5, 0.5, 13.1], "rotation_deg": [0, 9, 0] }} ]}}],
@@ -30,8 +31,12 @@ fn rolled(level: &str) -> Scene {
     Scene::from_text(&text, &folder).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Levels of every pixel of the dome, each from its own ray or filled in within a tolerance, and the rays traced.
-fn levels(scene: &Scene, frame: u32, tolerance: f32) -> (Vec<[f32; 3]>, u64, Vec<(usize, usize)>) {
+/// The levels of every pixel of the dome, and the rays that were traced for them.
+type Levels = (Vec<[f32; 3]>, u64);
+
+/// Levels of every pixel of the dome, filled in within some tolerances (full scales; 0: each from its own ray), and where
+/// they are.
+fn levels(scene: &Scene, frame: u32, tolerances: &[f32]) -> (Vec<Levels>, Vec<(usize, usize)>) {
     let mut work = Work::default();
     let plan = Plan::everything(scene).unwrap();
     let pipeline = plan.pipeline(scene, &mut work).unwrap();
@@ -58,61 +63,136 @@ fn levels(scene: &Scene, frame: u32, tolerance: f32) -> (Vec<[f32; 3]>, u64, Vec
     }
     let shading = pipeline.shading.as_deref().unwrap();
     let slices = [LitSlice { end: height, optics, dent: instant.shape.dent.as_ref() }];
-    let surface = LitSurface { slices: &slices, rays: Some(field.rays()), shading, channel: 0, tolerance };
-    let pressed = instant.shape.touch.as_ref().unwrap().pressed_cap();
-    let dented = pressed.map(|(middle, angle)| cap_box(optics, middle, angle + 0.06, width, height));
-    let mut lit = Lit::<3>::default();
-    let mut spent = Work::default();
-    lit.fill(&surface, (width, height), &spans, dented, &mut spent);
-    let rays = spent.of(EffectName::Fresnel) / light::shade::LEAVING_UNITS;
-    let (mut out, mut places) = (Vec::new(), Vec::new());
     let center = DVec2::new(width as f64, height as f64) * 0.5;
-    for (y, x, part) in coverage.rows(width, height) {
-        let columns = spans[y].clone();
-        let shares = &part[columns.start - x..columns.end - x];
-        lit.complete(y, columns.clone(), shares, center);
-        let lanes = [0, 1, 2].map(|lane| lit.row(lane, y, columns.clone()));
-        for k in 0..columns.len() {
-            if shares[k] > LEAST_SHARE {
+    let mut lit = Lit::<3>::default();
+    let mut places = Vec::new();
+    let mut filled = |tolerance: f32| {
+        let surface =
+            LitSurface { slices: &slices, rays: Some(field.rays()), shading, channel: 0, tolerance };
+        let mut spent = Work::default();
+        lit.fill(&surface, (width, height), &spans, &mut spent);
+        let rays = spent.of(EffectName::Fresnel) / light::shade::LEAVING_UNITS;
+        let mut out = Vec::new();
+        places.clear();
+        for (y, x, part) in coverage.rows(width, height) {
+            let columns = spans[y].clone();
+            let shares = &part[columns.start - x..columns.end - x];
+            lit.complete(y, columns.clone(), shares, center);
+            let lanes = [0, 1, 2].map(|lane| lit.row(lane, y, columns.clone()));
+            for k in (0..columns.len()).filter(|k| shares[*k] > LEAST_SHARE) {
                 out.push([lanes[0][k], lanes[1][k], lanes[2][k]]);
                 places.push((columns.start + k, y));
             }
         }
+        (out, rays)
+    };
+    let all = tolerances.iter().map(|tolerance| filled(*tolerance)).collect();
+    (all, places)
+}
+
+/// Objects that leave edges, and how they are held against the dome.
+const OBJECTS: [(&str, &str); 6] = [
+    (
+        "ball",
+        r#""shape": { "kind": "sphere", "radius_mm": 4 }, "path": [{ "time_s": 0, "position_mm": [1, 0.4, 13.2] }]"#,
+    ),
+    (
+        "box edge",
+        r#""shape": { "kind": "box", "size_mm": [4, 6, 3] },
+           "path": [{ "time_s": 0, "position_mm": [0.6, 0, 13.5], "rotation_deg": [35, 0, 20] }],
+           "press": { "direction": [0, 0, -1], "force": [{ "time_s": 0, "force_n": 3 }] }"#,
+    ),
+    (
+        "cone",
+        r#""shape": { "kind": "cone", "radius_mm": 3, "height_mm": 4 },
+           "path": [{ "time_s": 0, "position_mm": [1.5, 0.5, 10.5], "rotation_deg": [10, 5, 0] }],
+           "press": { "direction": [0, 0, -1], "force": [{ "time_s": 0, "force_n": 1 }] }"#,
+    ),
+    (
+        "nut",
+        r#""shape": { "kind": "mesh", "file": "meshes/nut.stl" },
+           "path": [{ "time_s": 0, "position_mm": [0, 0, 13] }],
+           "press": { "direction": [0, 0, -1], "force": [{ "time_s": 0, "force_n": 5 }] }"#,
+    ),
+    (
+        "USB plug",
+        r#""shape": { "kind": "mesh", "file": "meshes/usb_plug.stl" },
+           "path": [{ "time_s": 0, "position_mm": [0.5, 0, 11.5], "rotation_deg": [0, 12, 0] }],
+           "press": { "direction": [0, 0, -1], "force": [{ "time_s": 0, "force_n": 4 }] }"#,
+    ),
+    (
+        "bolt",
+        r#""shape": { "kind": "mesh", "file": "meshes/bolt.stl" },
+           "path": [{ "time_s": 0, "position_mm": [2, 0, 15], "rotation_deg": [0, 90, 0] }],
+           "press": { "direction": [0, 0, -1], "force": [{ "time_s": 0, "force_n": 5 }] }"#,
+    ),
+];
+
+/// An object against the dome of a design under its lights, at a level of contact.
+fn pressed(design: &str, level: &str, object: &str, grey: f64) -> Scene {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes");
+    let text = format!(
+        r#"{{
+        "version": 1, "name": "t", "design": "../{design}.json", "frames": {{ "count": 1, "rate_hz": 10 }},
+        "tolerance": {{ "px": 1e-3, "grey": {grey} }}, "contact": {{ "level": "{level}", "element_mm": 1 }},
+        "objects": [{{ "name": "object", {object} }}],
+        "light": {{ "surround_level": 0.02,
+            "leds": {{ "level_per_mw_mm2": 450, "stray_level": 0.005, "crosstalk": 0.08 }} }} }}"#
+    );
+    Scene::from_text(&text, &folder).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Compares filled pictures of a scene with one whose pixels each have their own ray, at some tolerances of the scene in
+/// grey levels: no pixel may be further off.
+fn keeps_within(design: &str, level: &str, (name, object): (&str, &str), greys: &[f64]) {
+    let scene = pressed(design, level, object, 1.0);
+    let tolerance = |grey: &f64| fill_tolerance(&pressed(design, level, object, *grey));
+    let tolerances: Vec<f32> = greys.iter().map(tolerance).chain([0.0]).collect();
+    let (mut all, places) = levels(&scene, 0, &tolerances);
+    let (exact, every) = all.pop().unwrap();
+    for ((filled, rays), grey) in all.iter().zip(greys) {
+        assert_eq!(filled.len(), exact.len());
+        let far =
+            |a: &[f32; 3], b: &[f32; 3]| (0..3).map(|c| 255.0 * (a[c] - b[c]).abs()).fold(0.0, f32::max);
+        let each = filled.iter().zip(&exact).zip(&places);
+        let mut off: Vec<(f32, (usize, usize))> = each.map(|((a, b), at)| (far(a, b), *at)).collect();
+        off.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mean = off.iter().map(|off| off.0).sum::<f32>() / off.len() as f32;
+        let rank = |part: f64| off[(part * (off.len() - 1) as f64) as usize];
+        let (worst, at) = rank(1.0);
+        println!(
+            "{design} {name} {level} {grey}: {rays} rays of {every}; mean {mean:.3}, 99 % {:.2}, 99.9 % {:.2}, at most \
+             {worst:.2} at {at:?}, {:.2} of the tolerance",
+            rank(0.99).0,
+            rank(0.999).0,
+            f64::from(worst) / grey
+        );
+        if std::env::var_os("DOMECAST_LOOK").is_none() {
+            assert!(f64::from(worst) <= *grey, "{design} {name} {level} {grey}: {worst} at {at:?}");
+        }
     }
-    (out, rays, places)
 }
 
 #[test]
 fn what_is_filled_in_is_what_each_ray_shows() {
-    for (level, most) in [("geometric", 6.0), ("closed_form", 6.0), ("linear", 6.0)] {
-        let scene = rolled(level);
-        let (filled, few, _) = levels(&scene, 3, 2.0 / 255.0);
-        let (exact, all, places) = levels(&scene, 3, 0.0);
-        assert_eq!(filled.len(), exact.len());
-        let off: Vec<f32> = filled
-            .iter()
-            .zip(&exact)
-            .map(|(a, b)| (0..3).map(|c| 255.0 * (a[c] - b[c]).abs()).fold(0.0, f32::max))
-            .collect();
-        let worst = off.iter().copied().fold(0.0, f32::max);
-        let above = |grey: f32| off.iter().filter(|off| **off > grey).count();
-        for (at, off) in places.iter().zip(&off).filter(|(_, off)| **off > 3.0).take(10) {
-            println!("{at:?}: {off}");
+    for level in ["geometric", "closed_form", "linear"] {
+        keeps_within("thumb24", level, OBJECTS[0], &[1.0, 4.0]);
+    }
+    keeps_within("thumb24-pinhole", "geometric", OBJECTS[2], &[0.5, 2.0]);
+    keeps_within("thumb24", "linear", OBJECTS[1], &[0.5, 2.0]);
+}
+
+#[test]
+fn long_objects_are_filled_in_as_each_ray_shows_them() {
+    for design in ["thumb24", "thumb24-pinhole", "thumb24-fisheye"] {
+        for object in OBJECTS {
+            for level in ["geometric", "closed_form", "linear"] {
+                // The closed form knows balls.
+                if level != "closed_form" || object.0 == "ball" {
+                    keeps_within(design, level, object, &[0.5, 1.0, 2.0, 4.0]);
+                }
+            }
         }
-        let mean = off.iter().sum::<f32>() / off.len() as f32;
-        let [one, three] = [1.0, 3.0].map(above);
-        println!(
-            "{level}: {few} rays of {all}, {} px; mean {mean} grey levels off, {one} px by more than 1, {three} by more \
-             than 3, at most {worst}",
-            off.len()
-        );
-        assert!(few * 6 < all, "{level}: {few} {all}");
-        // Along the edges of shadows and of the dent a square may miss a corner.
-        assert!(
-            mean < 0.15 && one * 100 < off.len() && three * 2000 < off.len(),
-            "{level}: {mean} {one} {three}"
-        );
-        assert!(worst < most, "{level}: {worst}");
     }
 }
 

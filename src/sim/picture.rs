@@ -6,17 +6,15 @@ use glam::DVec2;
 
 use super::coverage::{Coverage, LEAST_SHARE, clip, clip_to_image};
 use super::effect::EffectName;
-use super::field::{LensField, cap_box, inside, rim_polygon};
+use super::field::{LensField, inside, rim_polygon};
 use super::frame::Frame;
 use super::instant::units;
-use super::lit::{Lit, LitSlice, LitSurface, PixelBox};
+use super::lit::{Lit, LitSlice, LitSurface};
 use super::pipeline::Pipeline;
 use super::rolled::Slice;
 use super::scene::Scene;
 use super::shading::Shading;
-use super::shapes::Shape;
 use super::spots::{Points, Spots};
-use super::touch::Between;
 use super::work::Work;
 
 /// What a picture is made from.
@@ -153,7 +151,6 @@ impl Painter {
         self.spans.clear();
         self.spans.resize(height, 0..0);
         let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-        let mut pressed: Option<PixelBox> = None;
         let mut seen = Vec::with_capacity(slices.len());
         for (dome, slice) in self.domes.iter().zip(slices) {
             let Some(optics) = slice.instant.eye.optics(channels.start) else { continue };
@@ -161,14 +158,7 @@ impl Painter {
             low = [low[0].min(left), low[1].min(top)];
             high = [high[0].max(right), high[1].max(bottom)];
             dome.spans(width, height, &slice.rows(), &mut self.spans);
-            let Shape { touch, dent, .. } = &slice.instant.shape;
-            let cap = touch.as_ref().filter(|_| dent.is_some()).and_then(Between::pressed_cap);
-            if let Some((middle, angle_rad)) = cap {
-                let angle_rad = angle_rad + PRESSED_MARGIN_MM / optics.dome_radius_mm();
-                let cap = cap_box(optics, middle, angle_rad, width, height);
-                pressed = Some(pressed.map_or(cap, |pressed| pressed.with(&cap)));
-            }
-            seen.push(LitSlice { end: slice.end, optics, dent: dent.as_ref() });
+            seen.push(LitSlice { end: slice.end, optics, dent: slice.instant.shape.dent.as_ref() });
         }
         for (y, span) in self.spans.iter_mut().enumerate() {
             let shown = parts.field.row(y);
@@ -179,15 +169,14 @@ impl Painter {
             rays: Some(parts.field.rays()),
             shading,
             channel: channels.start,
-            tolerance: (SMOOTH_GREY / 255.0 / parts.scene.file().electronics.steepest_code(DARK_LEVEL))
-                as f32,
+            tolerance: fill_tolerance(parts.scene),
         };
         let at = |k: usize| 0.5 * (low[k].min(high[k]) + high[k]) as f64;
         let center = DVec2::new(at(0), at(1));
         if channels.len() == 3 {
-            self.three.fill(&surface, (width, height), &self.spans, pressed, work);
+            self.three.fill(&surface, (width, height), &self.spans, work);
         } else {
-            self.one.fill(&surface, (width, height), &self.spans, pressed, work);
+            self.one.fill(&surface, (width, height), &self.spans, work);
         }
         for (dome, slice) in self.domes.iter().zip(slices) {
             let over = (dome, &slice.rows());
@@ -276,13 +265,31 @@ fn clip_to_rows(polygon: Vec<DVec2>, rows: &Range<usize>, height: usize) -> Vec<
     clip(&kept, DVec2::Y, rows.end as f64 - 0.5)
 }
 
-/// How far the middle of a square may be from what its corners promise, grey levels: what is left between the
-/// nodes, of the third order, is then a fraction of a level.
-const SMOOTH_GREY: f64 = 2.0;
-/// Level at which the code's slope is taken for that.
-const DARK_LEVEL: f64 = 0.05;
-/// Room around the pressed part in which the membrane still bends sharply, mm.
-const PRESSED_MARGIN_MM: f64 = 0.6;
+/// Part of a scene's grey tolerance that pixels which are filled in between rays may be off; another such part is what the
+/// picture that it is compared with may be off, and the last is the plan's.
+const FILL_PART: f64 = 1.0 / 3.0;
+/// Grey levels. Nothing finer than the first part of a code shows: a scene that asks for less gets each pixel's own ray. More
+/// than the second, the nodes of a square of the largest size would hardly tell.
+const FILL_GREY: [f64; 2] = [1.0 / 6.0, 2.0];
+
+/// How far a pixel of the lit membrane that is filled in between rays may be from what its own ray shows, grey levels: a
+/// third of the scene's tolerance, but 2 at most; 0, where the scene's tolerance is below half a level, for then each
+/// pixel has its own ray.
+pub(super) fn fill_grey(scene: &Scene) -> f64 {
+    let part = FILL_PART * scene.file().tolerance.grey;
+    if part < FILL_GREY[0] * (1.0 - 1e-12) { 0.0 } else { part.min(FILL_GREY[1]) }
+}
+
+/// [`fill_grey`] in the light of the picture, full scales, where the code is steepest: in the dark, of which the stray light
+/// is the end.
+pub(super) fn fill_tolerance(scene: &Scene) -> f32 {
+    let file = scene.file();
+    let darkest = file.light.leds.as_ref().map_or(0.0, |leds| leds.stray_level).max(DARKEST);
+    (fill_grey(scene) / 255.0 / file.electronics.steepest_code(darkest)) as f32
+}
+
+/// Below this the light of a code is not worked out finer, full scales: a tenth of the first code of a linear picture.
+const DARKEST: f64 = 0.0004;
 
 /// What is beside the sensor.
 #[derive(Clone, Copy)]

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::effect::{Bound, Cost, Effect, EffectChoice, EffectName};
 use super::effects;
 use super::geometry_bound::shift_px;
+use super::picture::fill_grey;
 use super::pipeline::Geometry;
 use super::scene::Scene;
 use super::scene::file::{LevelName, ToleranceSection};
@@ -38,6 +39,11 @@ pub struct Plan {
     /// Sum of the bounds of what the plan leaves out although the scene calls for it (not counting what the
     /// scene forbids); within the scene's tolerance.
     pub left_out: Bound,
+    /// How far pixels of a lit membrane that are filled in between rays may be from what their own rays show, grey levels; 0
+    /// where each has its own. Twice that, as a picture with everything is filled in too, and what is left out are within
+    /// the scene's tolerance.
+    #[serde(skip_serializing_if = "is_none")]
+    pub filled_grey: f64,
     /// The level of contact where it is coarser than the scene's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact_level: Option<LevelName>,
@@ -99,7 +105,10 @@ impl Plan {
         }
         // What a scene forbids takes with it what needs it.
         drop_orphans(&mut entries);
-        let mut plan = Self { entries, left_out: Bound::default(), contact_level: None };
+        let mut plan = Self { entries, left_out: Bound::default(), filled_grey: 0.0, contact_level: None };
+        if light::lit_by_leds(scene) && plan.uses(EffectName::DirectLight) {
+            plan.filled_grey = fill_grey(scene);
+        }
         if spare {
             plan.leave_out(scene)?;
         }
@@ -135,9 +144,9 @@ impl Plan {
     fn holds_jointly(
         &self,
         scene: &Scene,
-        spares: &[Spare],
-        set: u64,
+        (spares, set): (&[Spare], u64),
         per_px: f64,
+        tolerance: &ToleranceSection,
     ) -> Result<bool, SimError> {
         let out = |name: EffectName| {
             let chosen = spares.iter().enumerate().filter(|(place, _)| set & (1 << place) != 0);
@@ -153,12 +162,13 @@ impl Plan {
         let with = Geometry::of(&uses);
         let without = Geometry::of(&|name| uses(name) && !out(name));
         let shift = shift_px(scene, with, without)?;
-        let tolerance = scene.file().tolerance;
         Ok(shift <= tolerance.px && shift * per_px <= tolerance.grey)
     }
 
     fn leave_out(&mut self, scene: &Scene) -> Result<(), SimError> {
         let mut tolerance = scene.file().tolerance;
+        tolerance.grey -= 2.0 * self.filled_grey;
+        let left = tolerance;
         let frames = u64::from(scene.frame_count());
         let per_px = grey_per_px(scene);
         self.choose_level(scene, per_px, &mut tolerance);
@@ -184,7 +194,7 @@ impl Plan {
                     && self.grey_of(scene, &spares, set) <= tolerance.grey
             };
             chosen = best_set(&spares, tolerance.px, tolerance.grey, &allowed);
-            if self.holds_jointly(scene, &spares, chosen, per_px)? {
+            if self.holds_jointly(scene, (&spares, chosen), per_px, &left)? {
                 break;
             }
             banned.push(chosen);
@@ -263,6 +273,10 @@ impl Plan {
         pipeline.shading = light::shading(scene, &pipeline.light, work)?;
         Ok(pipeline)
     }
+}
+
+fn is_none(grey: &f64) -> bool {
+    *grey == 0.0
 }
 
 /// Sets that are tried before the plan gives up leaving anything out.

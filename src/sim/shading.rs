@@ -30,6 +30,28 @@ pub enum Moved {
     Little([f32; 3]),
 }
 
+/// Bounds on what an object has done to a part of the membrane.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Turned {
+    /// How far its normals may be from the surface of the second order through those at nine nodes, rad.
+    pub tilt_rad: f32,
+    /// Slope of its displacement.
+    pub slope: f32,
+    /// Its displacement, mm.
+    pub moved_mm: f32,
+}
+
+impl Turned {
+    /// What holds for either.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            tilt_rad: self.tilt_rad.max(other.tilt_rad),
+            slope: self.slope.max(other.slope),
+            moved_mm: self.moved_mm.max(other.moved_mm),
+        }
+    }
+}
+
 /// Brightness of the membrane without ink, as linear values of the picture (1 is full scale), red, green, blue.
 pub trait Shading: Send + Sync {
     /// The brightness of each sample, written to the place of the same number; the slices have one length.
@@ -40,8 +62,11 @@ pub trait Shading: Send + Sync {
     fn change(&self, point_mm: DVec3, normal: DVec3) -> [f32; 3];
 
     /// How far the light of the undeformed membrane may be, full scales, from the surface of the second order through
-    /// nine nodes in rows of three, whose corners lie in these directions from the dome's centre.
-    fn bend(&self, corners: &[DVec3; 4]) -> f32;
+    /// nine nodes in rows of three over a part of the dome that holds these directions from its centre.
+    fn bend(&self, directions: &[DVec3]) -> f32;
+
+    /// How much further that of the displaced membrane may be, for what its sharp bends and the tables of its light do.
+    fn moved_bend(&self, directions: &[DVec3], turned: Turned) -> f32;
 
     /// Brightness of a white marker at a place of the sheet's top.
     fn marker_level(&self, scene: &Scene, _position_mm: DVec3) -> [f32; 3] {

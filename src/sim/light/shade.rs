@@ -9,7 +9,7 @@ use crate::design::sections::LedColor;
 use crate::sim::SimError;
 use crate::sim::effect::EffectName;
 use crate::sim::scene::Scene;
-use crate::sim::shading::{Moved, Shading, SurfaceSample};
+use crate::sim::shading::{Moved, Shading, SurfaceSample, Turned};
 use crate::sim::work::Work;
 
 /// Work of one look-up in the table of the undeformed membrane.
@@ -198,9 +198,12 @@ impl Shading for LitDome {
         std::array::from_fn(|c| self.gain[c] * (moved[c] - still[c]))
     }
 
-    fn bend(&self, corners: &[DVec3; 4]) -> f32 {
-        let gain = self.gain.iter().copied().fold(0.0, f32::max);
-        gain * self.field.bend(corners)
+    fn bend(&self, directions: &[DVec3]) -> f32 {
+        self.gain.iter().copied().fold(0.0, f32::max) * self.field.bend(directions)
+    }
+
+    fn moved_bend(&self, directions: &[DVec3], turned: Turned) -> f32 {
+        self.gain.iter().copied().fold(0.0, f32::max) * self.field.moved_bend(directions, turned)
     }
 
     fn marker_level(&self, _scene: &Scene, position_mm: DVec3) -> [f32; 3] {

@@ -4,7 +4,13 @@
 //! worked out exactly (ray, deformed membrane, light). Where the middles are what the corners promise, within a
 //! tolerance, or what the square of twice the size foretold, the square is filled by the biquadratic surface through
 //! the nine; else it falls into four, down to single pixels. Pixels are their own nodes, so nothing is worked out twice.
+//!
+//! What lies between its nodes, a square cannot know from them: the edge of a dent or of a shadow may pass there. The tables
+//! of the membrane and of its light tell it: each bounds what a surface of the second order can leave of it over a part of
+//! the dome ([`super::dent::Dent::bend`], [`Shading::bend`]), and where the bounds are above the tolerance the square is
+//! divided whatever its nodes say.
 
+mod motion;
 mod points;
 mod smooth;
 
@@ -12,7 +18,7 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 
-use self::points::{Motion, Source};
+use self::motion::{Motion, Square};
 use self::smooth::Verdict;
 use super::coverage::LEAST_SHARE;
 use super::dent::Dent;
@@ -23,13 +29,10 @@ use crate::optics::SensorOptics;
 
 /// Side of the largest squares, px; a power of two.
 pub(super) const LARGEST: usize = 32;
-/// Squares that reach into the dent are divided at least down to this, px.
-const IN_DENT: usize = 8;
-
 /// Parts of the tolerance: a bound on what the surface through the nodes leaves that is above the first divides a
-/// square whatever its nodes say, for it is that much larger than what is found; one below the second does not, for
-/// then the nodes only differ as a surface of the second order does.
-const HIDDEN: f32 = 3.0;
+/// square whatever its nodes say; one below the second does not, for then the nodes only differ as a surface of the
+/// second order does.
+const HIDDEN: f32 = 1.5;
 const TOLD: f32 = 0.5;
 /// Squares up to this size, px, whose nine rays miss the dome show none of it.
 const MISSED: usize = 8;
@@ -50,19 +53,10 @@ pub(super) mod units {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Known {
     Nothing,
-    /// It shows the dome where that is as it was made, or would if dome and lens went on beyond their ends, and its
-    /// brightness stands.
-    Still,
-    /// The same where the dome is dented.
-    Moved,
+    /// It shows the dome, or would if dome and lens went on beyond their ends, and its brightness stands.
+    Lit,
     /// It has no ray.
     Misses,
-}
-
-impl Known {
-    fn is_lit(self) -> bool {
-        matches!(self, Self::Still | Self::Moved)
-    }
 }
 
 /// Brightness of the membrane over the picture, for `N` channels that share their rays.
@@ -75,8 +69,7 @@ pub struct Lit<const N: usize> {
     known: Vec<Known>,
     /// How the membrane moved at the nodes of the largest squares; only where it did.
     motions: Vec<Motion>,
-    /// Of each of the largest squares.
-    sources: Vec<Source>,
+    squares: Vec<Square>,
     /// The motion of the pixel that was asked last, mm.
     moved_mm: DVec3,
     samples: Vec<SurfaceSample>,
@@ -95,8 +88,8 @@ pub struct LitSurface<'a> {
     pub shading: &'a dyn Shading,
     /// The first channel whose brightness is wanted, 0 to 2.
     pub channel: usize,
-    /// How far a middle may be from what the corners promise, full scales; with 0 every pixel has its own ray, followed
-    /// all the way.
+    /// How far a pixel that is filled in may be from what its own ray shows, full scales; with 0 every pixel has its own
+    /// ray, followed all the way.
     pub tolerance: f32,
 }
 
@@ -118,34 +111,14 @@ impl<'a> LitSurface<'a> {
             slices => slices.get(slices.partition_point(|slice| slice.end <= y)).or(slices.last()),
         }
     }
-}
 
-/// A box of pixels, ends excluded.
-#[derive(Debug, Clone, Copy)]
-pub struct PixelBox {
-    /// First column.
-    pub left: usize,
-    /// First row.
-    pub top: usize,
-    /// Column after the last.
-    pub right: usize,
-    /// Row after the last.
-    pub bottom: usize,
-}
-
-impl PixelBox {
-    /// The box around both.
-    pub fn with(&self, other: &Self) -> Self {
-        Self {
-            left: self.left.min(other.left),
-            top: self.top.min(other.top),
-            right: self.right.max(other.right),
-            bottom: self.bottom.max(other.bottom),
-        }
-    }
-
-    fn meets(&self, x: usize, y: usize, side: usize) -> bool {
-        x < self.right && y < self.bottom && x + side >= self.left && y + side >= self.top
+    /// The dents that some rows see.
+    fn dents(&self, top: usize, bottom: usize) -> impl Iterator<Item = &'a Dent> {
+        let first =
+            self.slices.partition_point(|slice| slice.end <= top).min(self.slices.len().saturating_sub(1));
+        let last = self.slices.partition_point(|slice| slice.end <= bottom);
+        let slices = self.slices.get(first..=last.min(self.slices.len().saturating_sub(1)));
+        slices.unwrap_or_default().iter().filter_map(|slice| slice.dent)
     }
 }
 
@@ -157,7 +130,7 @@ impl<const N: usize> Default for Lit<N> {
             levels: [const { Vec::new() }; N],
             known: Vec::new(),
             motions: Vec::new(),
-            sources: Vec::new(),
+            squares: Vec::new(),
             moved_mm: DVec3::ZERO,
             samples: Vec::new(),
             places: Vec::new(),
@@ -167,14 +140,12 @@ impl<const N: usize> Default for Lit<N> {
 }
 
 impl<const N: usize> Lit<N> {
-    /// Works out the brightness of the pixels of `spans`, by row, those of the picture that show the dome; `dented` holds
-    /// all pixels that may show its deformed part.
+    /// Works out the brightness of the pixels of `spans`, by row, those of the picture that show the dome.
     pub fn fill(
         &mut self,
         surface: &LitSurface<'_>,
         size: (usize, usize),
         spans: &[Range<usize>],
-        dented: Option<PixelBox>,
         work: &mut Work,
     ) {
         // Nodes lie on the corners of squares, so the grid reaches one pixel past the last square.
@@ -213,38 +184,43 @@ impl<const N: usize> Lit<N> {
             self.light(surface, work);
             let mut next = Vec::new();
             for (x, y) in squares {
-                let in_dent = dented.is_some_and(|dented| dented.meets(x, y, side));
                 if side == LARGEST && surface.tolerance > 0.0 {
-                    self.settle_source((x, y), in_dent, surface.tolerance);
+                    self.settle(surface, (x, y));
                 }
-                let mut verdict = self.judge((x, y), half, in_dent, surface.tolerance);
-                // What lies between the nodes, none of them shows: the light's own table does.
-                if verdict != Verdict::Misses
-                    && let Some(bend) = self.bend(surface, (x, y), side)
-                {
-                    if bend.most > HIDDEN * surface.tolerance {
-                        verdict = Verdict::Rough;
-                    } else if bend.most < TOLD * surface.tolerance && bend.is_inside {
-                        verdict = Verdict::Smooth;
-                    }
+                // The smallest squares have no pixels between their nodes.
+                if half == 1 {
+                    continue;
                 }
-                match verdict {
-                    Verdict::Smooth if half > 1 && !(in_dent && side > IN_DENT) => {
+                match self.verdict(surface, (x, y), half) {
+                    Verdict::Smooth => {
                         self.biquadratic(x, y, half);
                         work.add_base((side * side) as u64 * units::FILL);
                     }
                     // A square whose nine rays all miss may still hold a corner of the dome; large ones are divided
                     // once more.
                     Verdict::Misses if side <= MISSED => {}
-                    _ if half > 1 => {
+                    _ => {
                         let parts = [(x, y), (x + half, y), (x, y + half), (x + half, y + half)];
                         next.extend(parts.into_iter().filter(|part| shows(part, half)));
                     }
-                    _ => {}
                 }
             }
             squares = next;
             side = half;
+        }
+    }
+
+    /// Whether a square may be filled in: what its nodes say, and what the tables say that none of them shows.
+    fn verdict(&self, surface: &LitSurface<'_>, (x, y): (usize, usize), half: usize) -> Verdict {
+        let told = self.judge((x, y), half, surface.tolerance);
+        if told == Verdict::Misses || surface.tolerance <= 0.0 {
+            return if told == Verdict::Misses { told } else { Verdict::Rough };
+        }
+        match self.bend(surface, (x, y), 2 * half, told) {
+            Some(bend) if bend.most > HIDDEN * surface.tolerance => Verdict::Rough,
+            Some(bend) if bend.most < TOLD * surface.tolerance && bend.is_inside => Verdict::Smooth,
+            Some(_) => told,
+            None => Verdict::Rough,
         }
     }
 
@@ -260,14 +236,14 @@ impl<const N: usize> Lit<N> {
     pub fn complete(&mut self, y: usize, columns: Range<usize>, shares: &[f32], inwards: DVec2) {
         let place = |x: usize| y * self.width + x;
         let known = self.known.get(place(columns.start)..place(columns.end)).unwrap_or_default();
-        let lacks = |(known, share): (&Known, &f32)| u32::from(!known.is_lit() && *share > LEAST_SHARE);
+        let lacks = |(known, share): (&Known, &f32)| u32::from(*known != Known::Lit && *share > LEAST_SHARE);
         // A sum, and no look for the first: machines add several at once.
         if known.iter().zip(shares).map(lacks).sum::<u32>() == 0 {
             return;
         }
         for (x, share) in columns.zip(shares) {
             let at = y * self.width + x;
-            if *share > LEAST_SHARE && self.known.get(at).is_some_and(|known| !known.is_lit()) {
+            if *share > LEAST_SHARE && self.known.get(at).is_some_and(|known| *known != Known::Lit) {
                 let near = self.near(x, y, inwards);
                 for (levels, value) in self.levels.iter_mut().zip(near) {
                     if let Some(level) = levels.get_mut(at) {
@@ -285,7 +261,7 @@ impl<const N: usize> Lit<N> {
         let beside = |k: u32| {
             let place = (from + step * f64::from(k)).round().max(DVec2::ZERO);
             let (known, level) = self.node(place.x as usize, place.y as usize);
-            known.is_lit().then_some(level)
+            (known == Known::Lit).then_some(level)
         };
         (0..=4).find_map(beside).unwrap_or([0.0; N])
     }

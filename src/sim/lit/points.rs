@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3, Vec3A};
 
+use super::motion::{Motion, Source};
 use super::{Known, LARGEST, Lit, LitSlice, LitSurface, units};
 use crate::optics::SensorOptics;
 use crate::sim::effect::EffectName;
@@ -14,67 +15,6 @@ const BATCH: usize = 512;
 const BEYOND_PX: f64 = 2.0 * LARGEST as f64;
 /// What moves by less is not dented, mm.
 const STILL_MM: f64 = 1e-6;
-/// Distance of the pixels of which the membrane's motion is kept, px: the nodes of the largest squares.
-const KEPT_STEP: usize = LARGEST / 2;
-
-/// The motion is smooth over a square where no normal in the middle is further than this from what those on both sides
-/// say, rad; the change of the light, where it is nearer than this part of the tolerance. What parabolas leave is a
-/// fraction of that.
-const SMOOTH_RAD: f32 = 5e-3;
-const LITTLE: f32 = 0.4;
-/// Nearer to the base than this part of the radius, rays graze the dome: what they show bends more than the light does.
-const GRAZING: f64 = 0.2;
-
-/// Where the light's change is not smooth in itself, its own bend is counted as so many of the resting light's.
-const ALSO: f32 = 1.5;
-
-/// How the light may bend over a square.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Bend {
-    /// Bound on what the surface through the nodes leaves, full scales.
-    pub most: f32,
-    /// Whether all of it lies well inside the rim, and the bound is the whole truth there.
-    pub is_inside: bool,
-}
-
-/// How the membrane moved where a ray met it undeformed.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Motion {
-    /// The point of the undeformed dome on the ray, mm.
-    place_mm: Vec3A,
-    /// From the undeformed point on the ray to the deformed one, mm.
-    shift_mm: Vec3A,
-    /// Change of the unit normal.
-    tilt: Vec3A,
-    /// Change of the light, full scales.
-    change: Vec3A,
-}
-
-/// How the pixels of a largest square come by their place on the membrane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Source {
-    /// Each ray is followed to the deformed membrane.
-    #[default]
-    Exact,
-    /// No part of the square moves.
-    Still,
-    /// The motion is smooth: the parabolas through the nine nodes tell it.
-    Smooth,
-    /// So is the change of the light.
-    Little,
-}
-
-/// Weights of a square's three nodes at each of its columns or rows.
-const WEIGHTS: [[f32; 3]; LARGEST + 1] = {
-    let mut weights = [[0.0; 3]; LARGEST + 1];
-    let mut i = 0;
-    while i <= LARGEST {
-        let t = i as f32 / KEPT_STEP as f32;
-        weights[i] = [0.5 * (t - 1.0) * (t - 2.0), t * (2.0 - t), 0.5 * t * (t - 1.0)];
-        i += 1;
-    }
-    weights
-};
 
 impl<const N: usize> Lit<N> {
     /// Traces and lights those of some pixels of a square that are not known yet; the square lies in the largest one
@@ -106,7 +46,7 @@ impl<const N: usize> Lit<N> {
             for ((surface_mm, inside), weight) in rays.into_iter().flatten() {
                 self.places.push((at, weight));
                 let sample = self.sample((surface, seen), (surface_mm, inside), corner, (x, y), work);
-                known = if sample.moved == Moved::Not { Known::Still } else { Known::Moved };
+                known = Known::Lit;
                 self.samples.push(sample);
             }
             if known == Known::Misses {
@@ -161,7 +101,12 @@ impl<const N: usize> Lit<N> {
         };
         let kept = self.kept_at((x, y));
         if let Some(motion) = kept.and_then(|at| self.motions.get_mut(at)) {
-            *motion = Motion { place_mm: surface_mm.as_vec3a(), ..Motion::default() };
+            let cosine = inside.dot(still.normal).abs();
+            *motion = Motion {
+                place_mm: surface_mm.as_vec3a(),
+                slant: ((1.0 - cosine * cosine).max(0.0).sqrt() / cosine.max(1e-3)) as f32,
+                ..Motion::default()
+            };
         }
         let Some(dent) = seen.dent else { return still };
         match self.source(corner) {
@@ -180,7 +125,9 @@ impl<const N: usize> Lit<N> {
             Source::Exact => {}
         }
         work.add(EffectName::Contact, units::DENT);
-        let Some((rest_mm, dented)) = dent.meet(surface_mm, inside, self.moved_mm) else {
+        // Where a ray may meet the membrane more than once, what it shows may not depend on what was asked before.
+        let near_mm = if dent.may_fold() { DVec3::ZERO } else { self.moved_mm };
+        let Some((rest_mm, dented)) = dent.meet(surface_mm, inside, near_mm) else {
             self.moved_mm = DVec3::ZERO;
             return still;
         };
@@ -198,107 +145,6 @@ impl<const N: usize> Lit<N> {
             return SurfaceSample { point_mm, moved: Moved::Little(change), ..still };
         }
         SurfaceSample { point_mm, normal: dented.normal, to_camera: -inside, moved: Moved::Far }
-    }
-
-    fn kept_at(&self, (x, y): (usize, usize)) -> Option<usize> {
-        (x.is_multiple_of(KEPT_STEP) && y.is_multiple_of(KEPT_STEP))
-            .then(|| y / KEPT_STEP * self.kept_across() + x / KEPT_STEP)
-    }
-
-    fn kept_across(&self) -> usize {
-        self.width.div_ceil(KEPT_STEP)
-    }
-
-    /// Room for the motions of a picture; of the last one, nothing is left that could tell on this one's bytes.
-    pub(super) fn lay_out_motions(&mut self) {
-        self.moved_mm = DVec3::ZERO;
-        self.motions.clear();
-        let count = self.kept_across() * self.height.div_ceil(KEPT_STEP);
-        self.motions.resize(count, Motion::default());
-        self.sources.clear();
-        self.sources.resize((self.width / LARGEST) * (self.height / LARGEST), Source::Exact);
-    }
-
-    fn source(&self, (x, y): (usize, usize)) -> Source {
-        let at = y / LARGEST * (self.width / LARGEST) + x / LARGEST;
-        self.sources.get(at).copied().unwrap_or_default()
-    }
-
-    /// Decides how the pixels of a largest square, of which the nine nodes are known, come by their places.
-    pub(super) fn settle_source(&mut self, (x, y): (usize, usize), pressed: bool, tolerance: f32) {
-        if pressed {
-            return;
-        }
-        let known = |i: usize| {
-            let at = (y + i / 3 * KEPT_STEP) * self.width + x + i % 3 * KEPT_STEP;
-            self.known.get(at).copied().unwrap_or(Known::Misses)
-        };
-        let count = |of: Known| (0..9).filter(|i| known(*i) == of).count();
-        let source = if count(Known::Moved) == 0 {
-            Source::Still
-        } else if self.bends_mildly((x, y), |motion| motion.tilt, SMOOTH_RAD) {
-            let little = self.bends_mildly((x, y), |motion| motion.change, LITTLE * tolerance);
-            if little { Source::Little } else { Source::Smooth }
-        } else {
-            return;
-        };
-        let at = y / LARGEST * (self.width / LARGEST) + x / LARGEST;
-        if let Some(place) = self.sources.get_mut(at) {
-            *place = source;
-        }
-    }
-
-    fn kept(&self, (x, y): (usize, usize)) -> Motion {
-        let at = y / KEPT_STEP * self.kept_across() + x / KEPT_STEP;
-        self.motions.get(at).copied().unwrap_or_default()
-    }
-
-    /// Whether a part of the motion in the middles is what the straight lines through their neighbours say, within some
-    /// room.
-    fn bends_mildly(&self, (x, y): (usize, usize), part: impl Fn(Motion) -> Vec3A, room: f32) -> bool {
-        let at = |i: usize, j: usize| part(self.kept((x + i * KEPT_STEP, y + j * KEPT_STEP)));
-        let mild = |a: Vec3A, b: Vec3A, c: Vec3A| (0.5 * (a + c) - b).abs().max_element() <= room;
-        (0..3).all(|k| mild(at(k, 0), at(k, 1), at(k, 2)) && mild(at(0, k), at(1, k), at(2, k)))
-            && mild(at(0, 0), at(1, 1), at(2, 2))
-            && mild(at(2, 0), at(1, 1), at(0, 2))
-    }
-
-    /// How far the light may be from the surface through the nodes of a part of a largest square, where it is that of
-    /// the undeformed membrane or little else; full scales. `None` where nothing is known of it.
-    pub(super) fn bend(&self, surface: &LitSurface<'_>, (x, y): (usize, usize), side: usize) -> Option<Bend> {
-        let largest = (x / LARGEST * LARGEST, y / LARGEST * LARGEST);
-        let source = self.source(largest);
-        if source == Source::Exact {
-            return None;
-        }
-        let (dx, dy) = (x - largest.0, y - largest.1);
-        let corners = [(dx, dy), (dx + side, dy), (dx, dy + side), (dx + side, dy + side)];
-        let places = corners.map(|at| self.motion(largest, at).place_mm.as_dvec3());
-        let per_radius = 1.0 / surface.at(y)?.optics.dome_radius_mm();
-        let places = places.map(|place| place * per_radius);
-        // Nodes without a ray have no place.
-        let lit = (0..9).all(|i| {
-            self.kept((largest.0 + i % 3 * KEPT_STEP, largest.1 + i / 3 * KEPT_STEP)).place_mm != Vec3A::ZERO
-        });
-        let is_inside = lit && source != Source::Smooth && places.iter().all(|place| place.z > GRAZING);
-        let most = surface.shading.bend(&places) * if source == Source::Smooth { ALSO } else { 1.0 };
-        Some(Bend { most, is_inside })
-    }
-
-    /// The motion at a place of a largest square, by the parabolas through its nine nodes.
-    fn motion(&self, (x, y): (usize, usize), (dx, dy): (usize, usize)) -> Motion {
-        let (wx, wy) = (WEIGHTS[dx.min(LARGEST)], WEIGHTS[dy.min(LARGEST)]);
-        let mut sum = Motion::default();
-        for (j, wy) in wy.iter().enumerate() {
-            for (i, wx) in wx.iter().enumerate() {
-                let node = self.kept((x + i * KEPT_STEP, y + j * KEPT_STEP));
-                sum.place_mm += node.place_mm * (wx * wy);
-                sum.shift_mm += node.shift_mm * (wx * wy);
-                sum.tilt += node.tilt * (wx * wy);
-                sum.change += node.change * (wx * wy);
-            }
-        }
-        sum
     }
 }
 

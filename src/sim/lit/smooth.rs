@@ -2,8 +2,10 @@
 
 use super::{Known, LARGEST, Lit};
 
-/// Part of the tolerance within which a square's nodes are foreseen.
-const FORESEEN: f32 = 1.0;
+/// Parts of the tolerance: within the first a square's middles are what its corners promise, for what a surface of the
+/// second order then leaves, of the third, is a fraction of that; within the second its nodes are foreseen.
+const PROMISED: f32 = 2.0;
+const FORESEEN: f32 = 2.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
@@ -33,14 +35,8 @@ impl Parabola {
 }
 
 impl<const N: usize> Lit<N> {
-    pub(super) fn judge(
-        &self,
-        (x, y): (usize, usize),
-        half: usize,
-        creased: bool,
-        tolerance: f32,
-    ) -> Verdict {
-        let nine = match self.nine((x, y), half, creased) {
+    pub(super) fn judge(&self, (x, y): (usize, usize), half: usize, tolerance: f32) -> Verdict {
+        let nine = match self.nine((x, y), half) {
             Ok(nine) => nine,
             Err(verdict) => return verdict,
         };
@@ -54,13 +50,9 @@ impl<const N: usize> Lit<N> {
                 m[n] - 0.25 * (a[n] + b[n] + c[n] + d[n]),
             ];
             // Written so that a NaN, which no light gives, counts as rough.
-            off.iter().all(|off| off.abs() <= tolerance)
+            off.iter().all(|off| off.abs() <= PROMISED * tolerance)
         });
-        if smooth || self.foreseen((x, y), half, creased, tolerance) {
-            Verdict::Smooth
-        } else {
-            Verdict::Rough
-        }
+        if smooth || self.foreseen((x, y), half, tolerance) { Verdict::Smooth } else { Verdict::Rough }
     }
 
     /// The levels of a square's nine nodes.
@@ -79,26 +71,16 @@ impl<const N: usize> Lit<N> {
     }
 
     /// The nine nodes of a square, or what it is if they do not belong together.
-    fn nine(
-        &self,
-        (x, y): (usize, usize),
-        half: usize,
-        creased: bool,
-    ) -> Result<[[[f32; N]; 3]; 3], Verdict> {
+    fn nine(&self, (x, y): (usize, usize), half: usize) -> Result<[[[f32; N]; 3]; 3], Verdict> {
         let nine = self.levels_at((x, y), half);
-        let (mut misses, mut moved) = (0, 0);
+        let mut misses = 0;
         for j in 0..3 {
             let start = (y + j * half) * self.width + x;
             let row = self.known.get(start..=start + 2 * half).unwrap_or_default();
-            for i in 0..3 {
-                let known = row.get(i * half).copied().unwrap_or(Known::Misses);
-                misses += usize::from(!known.is_lit());
-                moved += usize::from(known == Known::Moved);
-            }
+            misses += (0..3).filter(|i| row.get(i * half) != Some(&Known::Lit)).count();
         }
         match misses {
-            // Between nodes in the dent and beside it there may be a crease that none of them shows.
-            0 if !creased || moved == 0 || moved == 9 => Ok(nine),
+            0 => Ok(nine),
             9 => Err(Verdict::Misses),
             _ => Err(Verdict::Rough),
         }
@@ -106,13 +88,13 @@ impl<const N: usize> Lit<N> {
 
     /// Whether the surface through the nine nodes of the square that this one is a quarter of has told this one's own new
     /// nodes beforehand: it is of the third order, so what is left between this one's nodes is an eighth of its misses.
-    fn foreseen(&self, (x, y): (usize, usize), half: usize, creased: bool, tolerance: f32) -> bool {
+    fn foreseen(&self, (x, y): (usize, usize), half: usize, tolerance: f32) -> bool {
         let side = 2 * half;
         if side >= LARGEST {
             return false;
         }
         let (left, top) = (x / (2 * side) * (2 * side), y / (2 * side) * (2 * side));
-        let Ok(nine) = self.nine((left, top), side, creased) else { return false };
+        let Ok(nine) = self.nine((left, top), side) else { return false };
         let (x0, y0) = ((x - left) / half, (y - top) / half);
         let new = [(1, 0), (0, 1), (1, 1), (2, 1), (1, 2)];
         (0..N).all(|lane| {
@@ -139,12 +121,10 @@ impl<const N: usize> Lit<N> {
             _ => self.lay::<33>(x, y, &nine),
         }
         let side = 2 * half;
-        let moved = (0..9).any(|i| self.node(x + i % 3 * half, y + i / 3 * half).0 == Known::Moved);
-        let known = if moved { Known::Moved } else { Known::Still };
         for j in 0..=side {
             let start = (y + j) * self.width + x;
             if let Some(row) = self.known.get_mut(start..=start + side) {
-                row.fill(known);
+                row.fill(Known::Lit);
             }
         }
     }

@@ -5,9 +5,12 @@
 //! for those points there are tables of the *vector* irradiance on three shells inside the dome, whose product
 //! with the normal is the irradiance.
 
+mod bend;
+
 use glam::{DVec2, DVec3, Vec3A, Vec4};
 use rayon::prelude::*;
 
+use self::bend::Bends;
 use super::direct::EmitterRule;
 use super::dome_map::{DomeGrid, bicubic, direction_from_disc, disc_continued};
 use super::radiosity::Rings;
@@ -15,9 +18,6 @@ use super::tables::{Prepared, SHELLS, Tables, Ways};
 
 /// Fine cells in a coarse one: the shells' look-up is linear in the fine table, which is cubic in the coarse one.
 const FINE_SHELL: usize = 2;
-/// A parabola through three nodes leaves a third difference between four of the same distance over this: 9 times the root
-/// of 3.
-const REST: f32 = 15.59;
 /// Places in a cell, each way, at which the undeformed membrane's brightest and steepest light is looked for.
 const LOOKS: usize = 6;
 
@@ -39,9 +39,9 @@ pub struct FieldParts {
 pub struct LightField {
     radius_mm: f64,
     grid: DomeGrid,
+    /// Coefficients of a cubic spline.
     still: Vec<Vec4>,
-    /// Largest third difference about each of its cells.
-    third: Vec<f32>,
+    bends: Bends,
     shell_grid: DomeGrid,
     shells: Vec<Vec<ShellNode>>,
     brightest: [f64; 3],
@@ -72,7 +72,7 @@ impl LightField {
             radius_mm: ways.radius_mm(),
             grid: DomeGrid::with_cells(8),
             still: Vec::new(),
-            third: Vec::new(),
+            bends: Bends::default(),
             shell_grid: DomeGrid::with_cells(8),
             shells: Vec::new(),
             brightest: [0.0; 3],
@@ -106,8 +106,8 @@ impl LightField {
         field
     }
 
-    /// The table is small, so that it stays in the nearest caches, and looked up by cubics: smooth, so that a picture of
-    /// it has no creases of the table's making.
+    /// The table is small, so that it stays in the nearest caches, and looked up as a cubic spline: a picture of it has no
+    /// creases of the table's making.
     fn set_still(&mut self, grid: &DomeGrid, table: &[[f64; 3]], own: Option<&OwnLight>) {
         let more = |place: DVec2| own.map_or([0.0; 3], |own| own.at(direction_from_disc(place)));
         let inside = |place: DVec2| -> [f64; 3] {
@@ -126,8 +126,9 @@ impl LightField {
             Vec4::new(r as f32, g as f32, b as f32, 0.0)
         };
         self.still = (0..grid.nodes * grid.nodes).into_par_iter().map(node).collect();
+        bend::to_coefficients(&mut self.still, grid.nodes);
         self.grid = *grid;
-        self.find_third();
+        self.bends.find_third(&self.still, grid.nodes);
         self.look_over();
     }
 
@@ -189,6 +190,7 @@ impl LightField {
             })
             .collect();
         self.shell_grid = fine;
+        self.bends.find_kinks(&self.shells, fine.nodes);
     }
 
     /// Irradiance of an undeformed point in this direction, for the channels red, green, blue.
@@ -285,46 +287,6 @@ impl LightField {
     /// Points at which every light was worked out exactly to make the tables.
     pub fn evaluations(&self) -> u64 {
         self.evaluations
-    }
-
-    /// How far the undeformed membrane's light may be from the surface of the second order through nine nodes, in rows
-    /// of three, whose corners lie in these directions: two parabolas' rests, from the largest third difference of the
-    /// table's cells about.
-    pub fn bend(&self, corners: &[DVec3; 4]) -> f32 {
-        let places = corners.map(|at| {
-            let last = DVec2::splat(self.grid.nodes as f64 - 2.0);
-            self.grid.coordinates_of_disc(disc_continued(at)).clamp(DVec2::ONE, last)
-        });
-        let low = places.iter().copied().fold(DVec2::INFINITY, DVec2::min);
-        let high = places.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
-        let mut most = 0.0_f32;
-        for row in low.y as usize..=high.y as usize {
-            let start = row * self.grid.nodes;
-            let cells = self.third.get(start + low.x as usize..=start + high.x as usize);
-            most = cells.unwrap_or_default().iter().copied().fold(most, f32::max);
-        }
-        let apart = 0.5 * (high - low).max_element() as f32;
-        2.0 * most * apart * apart * apart / REST
-    }
-
-    /// Largest third difference about each cell of the undeformed membrane's table.
-    fn find_third(&mut self) {
-        let nodes = self.grid.nodes;
-        let at = |column: usize, row: usize| {
-            // A clamped look-up is level beyond the table.
-            self.still.get(row.min(nodes - 1) * nodes + column.min(nodes - 1)).copied().unwrap_or(Vec4::ZERO)
-        };
-        let third = |v: [Vec4; 4]| (v[3] - v[0] + (v[1] - v[2]) * 3.0).abs().max_element();
-        let cell = |i: usize| {
-            let (column, row) = ((i % nodes).max(1), (i / nodes).max(1));
-            let mut most = 0.0_f32;
-            for k in 0..4 {
-                most = most.max(third(std::array::from_fn(|j| at(column + j - 1, row + k - 1))));
-                most = most.max(third(std::array::from_fn(|j| at(column + k - 1, row + j - 1))));
-            }
-            most
-        };
-        self.third = (0..nodes * nodes).map(cell).collect();
     }
 
     /// Largest difference of the undeformed membrane's light between near places over their distance, 1/mm.
@@ -428,14 +390,16 @@ fn shell_weights(part: f64) -> [f32; 3] {
     ]
 }
 
-/// Weights of the four nodes about a place between the middle two (Catmull and Rom).
+/// Weights of the four nodes about a place between the middle two: the cubic spline's.
 #[inline]
 fn cubic(t: f32) -> [f32; 4] {
+    let s = 1.0 - t;
+    let sixth = 1.0 / 6.0;
     [
-        0.5 * t * ((2.0 - t) * t - 1.0),
-        0.5 * (t * t * (3.0 * t - 5.0) + 2.0),
-        0.5 * t * ((4.0 - 3.0 * t) * t + 1.0),
-        0.5 * t * t * (t - 1.0),
+        s * s * s * sixth,
+        (t * t * (3.0 * t - 6.0) + 4.0) * sixth,
+        (s * s * (3.0 * s - 6.0) + 4.0) * sixth,
+        t * t * t * sixth,
     ]
 }
 

@@ -2,25 +2,30 @@
 //!
 //! The chart is Lambert's equal-area map about the middle of the touched region: `p = R (1 - s/2) e + k (x t1 + y t2)`
 //! with `s = (x^2 + y^2) / R^2`, `k = sqrt(1 - s/4)`; it is smooth over the whole dome. Between the nodes the
-//! displacement is Catmull and Rom's cubic in each direction, whose derivative is continuous: the normals have no
-//! steps.
+//! displacement is a cubic spline in each direction, whose second derivative is continuous: the normals have neither
+//! steps nor kinks of the table's making, and how far they bend between two places is known from the table itself.
 //!
 //! About the pressed part the nodes lie close; where the rest of the dome moves as well, it does so smoothly, and a wide
 //! chart with fewer nodes serves.
 
-use glam::{DVec3, Vec4};
+mod bends;
+mod chart;
 
+use glam::DVec3;
+
+use self::chart::{Chart, Moved};
+use super::shading::Turned;
 use super::touch::Between;
 use crate::mechanics::contact::Extent;
-
-/// Fewest and most nodes along a side.
-const NODES: [usize; 2] = [12, 160];
 
 /// Displacements of less than this bend nothing that a picture shows, mm.
 const STILL_MM: f64 = 1e-4;
 
 /// Distance of the wide chart's nodes, mm.
 const WIDE_STEP_MM: f64 = 0.6;
+
+/// Slope of the displacement from which on the membrane may fold over a slanting ray.
+const FOLDING: f32 = 0.4;
 
 /// How far beyond the pressed part the nodes lie close, mm.
 const CLOSE_MARGIN_MM: f64 = 1.5;
@@ -30,21 +35,6 @@ const CLOSE_MARGIN_MM: f64 = 1.5;
 pub struct Dent {
     close: Option<Chart>,
     wide: Option<Chart>,
-}
-
-/// One table.
-#[derive(Debug, Clone)]
-struct Chart {
-    middle: DVec3,
-    side: DVec3,
-    up: DVec3,
-    radius_mm: f64,
-    /// Half the chart's width, mm.
-    half_mm: f64,
-    nodes: usize,
-    per_step: f64,
-    /// Displacements, mm; the fourth number is nothing.
-    moved: Vec<Vec4>,
 }
 
 /// A point of the deformed membrane.
@@ -118,7 +108,7 @@ impl Dent {
 
     /// Nodes of the tables.
     pub fn node_count(&self) -> u64 {
-        self.close.iter().chain(&self.wide).map(|chart| chart.moved.len() as u64).sum()
+        self.close.iter().chain(&self.wide).map(Chart::node_count).sum()
     }
 
     /// The tables a part of the way from these to others of the same layout.
@@ -128,6 +118,27 @@ impl Dent {
             _ => None,
         };
         Self { close: mix(&self.close, &to.close), wide: mix(&self.wide, &to.wide) }
+    }
+
+    /// How the membrane may bend over a part of the dome that holds some points of the undeformed one, seen along rays
+    /// whose angle with the normal has a tangent of at most `slant`. The bound on the tilt is for nine nodes in rows
+    /// of three over the part, half as far apart as it is wide.
+    pub fn bend(&self, places_mm: &[DVec3], slant: f64) -> Turned {
+        let mut all = Turned::default();
+        for chart in [&self.close, &self.wide].into_iter().flatten() {
+            let (bend, is_whole) = chart.bend(places_mm, slant);
+            all = all.or(bend);
+            if is_whole {
+                break;
+            }
+        }
+        all
+    }
+
+    /// Whether the membrane is so steep somewhere that a ray may meet it more than once: then what a search finds depends
+    /// on where it begins.
+    pub fn may_fold(&self) -> bool {
+        self.close.iter().chain(&self.wide).any(|chart| chart.steepest() > FOLDING)
     }
 
     /// The place of a chart that serves a point of the undeformed dome best.
@@ -159,7 +170,7 @@ impl Dent {
             let miss = rest_mm + inside * along - surface;
             let miss2 = miss.length_squared();
             let found = |place: DVec3, displacement_mm| {
-                let normal = normal.try_normalize().unwrap_or(place / chart.radius_mm);
+                let normal = normal.try_normalize().unwrap_or(place / chart.radius_mm());
                 Some((place, Dented { displacement_mm, normal }))
             };
             if miss2 < least {
@@ -172,7 +183,7 @@ impl Dent {
                 let per = normal.length_squared().recip();
                 [miss.cross(moved.along_y).dot(normal) * per, moved.along_x.cross(miss).dot(normal) * per]
             };
-            let near_mm = NEAR_PART / chart.per_step;
+            let near_mm = NEAR_PART / chart.per_step();
             if miss2 < near_mm * near_mm {
                 // So near that the tangent plane is the membrane: the point on it, and where that was.
                 let [a, b] = on_plane();
@@ -209,97 +220,6 @@ fn back_on_sphere(rest_mm: DVec3, inside: DVec3, displacement_mm: DVec3) -> DVec
     next * (radius_mm / next.length().max(1e-12))
 }
 
-/// The membrane at a place of a chart.
-struct Moved {
-    displacement_mm: DVec3,
-    /// Tangents of the moved membrane: its derivatives by the chart's coordinates.
-    along_x: DVec3,
-    along_y: DVec3,
-}
-
-impl Chart {
-    /// The empty chart of a cap.
-    fn new(radius_mm: f64, middle: DVec3, angle: f64, step_mm: f64) -> Self {
-        let side = middle.any_orthonormal_vector();
-        let up = middle.cross(side);
-        let reach_mm = 2.0 * radius_mm * (0.5 * angle).sin();
-        let nodes = ((2.0 * reach_mm / step_mm).ceil() as usize).clamp(NODES[0], NODES[1]);
-        // Two nodes beyond the edge on each side, for the cubics.
-        let half_mm = reach_mm * (nodes as f64 + 4.0) / nodes as f64;
-        let per_step = (nodes as f64 - 1.0) / (2.0 * half_mm);
-        Self { middle, side, up, radius_mm, half_mm, nodes, per_step, moved: Vec::new() }
-    }
-
-    /// The chart with its displacements.
-    fn filled(&self, between: &Between) -> Self {
-        let mut at_mm = Vec::with_capacity(self.nodes * self.nodes);
-        for row in 0..self.nodes {
-            for column in 0..self.nodes {
-                let place = |i: usize| i as f64 / self.per_step - self.half_mm;
-                at_mm.push(self.point(place(column), place(row)));
-            }
-        }
-        let moved = between.displacements_mm(&at_mm);
-        Self { moved: moved.into_iter().map(|u| u.as_vec3().extend(0.0)).collect(), ..*self }
-    }
-
-    fn towards(&self, to: &Self, part: f32) -> Self {
-        let moved = self.moved.iter().zip(&to.moved).map(|(a, b)| a.lerp(*b, part)).collect();
-        Self { moved, ..*self }
-    }
-
-    fn point(&self, x: f64, y: f64) -> DVec3 {
-        let s = ((x * x + y * y) / (self.radius_mm * self.radius_mm)).min(4.0);
-        let k = (1.0 - 0.25 * s).max(0.0).sqrt();
-        self.middle * (self.radius_mm * (1.0 - 0.5 * s)) + (self.side * x + self.up * y) * k
-    }
-
-    /// Coordinates of a point of the undeformed dome, mm.
-    #[inline]
-    fn place(&self, rest_mm: DVec3) -> [f64; 2] {
-        let along = rest_mm.dot(self.middle) / self.radius_mm;
-        let stretch = (2.0 / (1.0 + along).max(1e-9)).sqrt();
-        [rest_mm.dot(self.side) * stretch, rest_mm.dot(self.up) * stretch]
-    }
-
-    /// The membrane at a place; `None` outside the chart.
-    #[inline]
-    fn at(&self, [x, y]: [f64; 2]) -> Option<Moved> {
-        let (gx, gy) = ((x + self.half_mm) * self.per_step, (y + self.half_mm) * self.per_step);
-        let last = self.nodes as f64 - 2.0;
-        if !(gx >= 1.0 && gy >= 1.0 && gx < last && gy < last) {
-            return None;
-        }
-        let (i, j) = (gx as usize, gy as usize);
-        let (wx, dx) = cubic((gx - i as f64) as f32);
-        let (wy, dy) = cubic((gy - j as f64) as f32);
-        let (mut u, mut by_x, mut by_y) = (Vec4::ZERO, Vec4::ZERO, Vec4::ZERO);
-        for row in 0..4 {
-            let start = (j - 1 + row) * self.nodes + i - 1;
-            let [a, b, c, d] = *self.moved.get(start..start + 4)? else { return None };
-            let across = (a * wx[0] + b * wx[1]) + (c * wx[2] + d * wx[3]);
-            let slope = (a * dx[0] + b * dx[1]) + (c * dx[2] + d * dx[3]);
-            u += across * wy[row];
-            by_x += slope * wy[row];
-            by_y += across * dy[row];
-        }
-        // Tangents of the chart, then of the moved surface.
-        let r2 = self.radius_mm * self.radius_mm;
-        let k = (1.0 - (x * x + y * y) / (4.0 * r2)).max(1e-12).sqrt();
-        let bend = 1.0 / (4.0 * r2 * k);
-        let (side, up) = (self.side, self.up);
-        let per_radius = 1.0 / self.radius_mm;
-        let tangent_x = side * (k - x * x * bend) - up * (x * y * bend) - self.middle * (x * per_radius);
-        let tangent_y = up * (k - y * y * bend) - side * (x * y * bend) - self.middle * (y * per_radius);
-        let wide = |v: Vec4| v.truncate().as_dvec3();
-        Some(Moved {
-            displacement_mm: wide(u),
-            along_x: tangent_x + wide(by_x) * self.per_step,
-            along_y: tangent_y + wide(by_y) * self.per_step,
-        })
-    }
-}
-
 /// Repetitions of [`Dent::meet`]; a slope of 0.5 leaves a thousandth after ten.
 const MOST_STEPS: u32 = 10;
 /// More of them, each half of the plain one's way, where those do not end.
@@ -311,21 +231,3 @@ const CLOSE_MM: f64 = 3e-4;
 const NEAR_PART: f64 = 0.01;
 /// A step longer than this is none of Newton's, mm.
 const FARTHEST_MM: f64 = 1.0;
-
-/// Weights of the four nodes around a place between the middle two, and their derivatives.
-fn cubic(t: f32) -> ([f32; 4], [f32; 4]) {
-    let (t2, t3) = (t * t, t * t * t);
-    let weights = [
-        0.5 * (2.0 * t2 - t - t3),
-        0.5 * (2.0 - 5.0 * t2 + 3.0 * t3),
-        0.5 * (t + 4.0 * t2 - 3.0 * t3),
-        0.5 * (t3 - t2),
-    ];
-    let slopes = [
-        0.5 * (4.0 * t - 1.0 - 3.0 * t2),
-        0.5 * (9.0 * t2 - 10.0 * t),
-        0.5 * (1.0 + 8.0 * t - 9.0 * t2),
-        0.5 * (3.0 * t2 - 2.0 * t),
-    ];
-    (weights, slopes)
-}

@@ -1,0 +1,224 @@
+//! One table of the displaced membrane: a spline over a chart of a cap of the dome.
+
+use glam::{DVec3, Vec4};
+
+use super::bends::Bends;
+use crate::sim::shading::Turned;
+use crate::sim::touch::Between;
+
+/// Fewest and most nodes along a side.
+const NODES: [usize; 2] = [12, 160];
+
+/// How far the outline of a small part of the dome may bulge beyond the box around its corners in the chart, as a part of
+/// the box's width; parts are at most some tenths of the radius wide.
+const BULGE: f64 = 0.1;
+
+/// The membrane at a place of a chart.
+pub(super) struct Moved {
+    pub displacement_mm: DVec3,
+    /// Tangents of the moved membrane: its derivatives by the chart's coordinates.
+    pub along_x: DVec3,
+    pub along_y: DVec3,
+}
+
+/// One table.
+#[derive(Debug, Clone)]
+pub(super) struct Chart {
+    middle: DVec3,
+    side: DVec3,
+    up: DVec3,
+    radius_mm: f64,
+    /// Half the chart's width, mm.
+    half_mm: f64,
+    nodes: usize,
+    per_step: f64,
+    /// The spline's coefficients, mm; the fourth number is nothing.
+    moved: Vec<Vec4>,
+    bends: Bends,
+}
+
+impl Chart {
+    /// The empty chart of a cap.
+    pub fn new(radius_mm: f64, middle: DVec3, angle: f64, step_mm: f64) -> Self {
+        let side = middle.any_orthonormal_vector();
+        let up = middle.cross(side);
+        let reach_mm = 2.0 * radius_mm * (0.5 * angle).sin();
+        let nodes = ((2.0 * reach_mm / step_mm).ceil() as usize).clamp(NODES[0], NODES[1]);
+        // Two nodes beyond the edge on each side, for the cubics.
+        let half_mm = reach_mm * (nodes as f64 + 4.0) / nodes as f64;
+        let per_step = (nodes as f64 - 1.0) / (2.0 * half_mm);
+        let (moved, bends) = (Vec::new(), Bends::default());
+        Self { middle, side, up, radius_mm, half_mm, nodes, per_step, moved, bends }
+    }
+
+    /// The chart with its displacements.
+    pub fn filled(&self, between: &Between) -> Self {
+        let mut at_mm = Vec::with_capacity(self.nodes * self.nodes);
+        for row in 0..self.nodes {
+            for column in 0..self.nodes {
+                let place = |i: usize| i as f64 / self.per_step - self.half_mm;
+                at_mm.push(self.point(place(column), place(row)));
+            }
+        }
+        let found = between.displacements_mm(&at_mm).into_iter();
+        let mut moved: Vec<Vec4> = found.map(|u| u.as_vec3().extend(0.0)).collect();
+        for i in 0..self.nodes {
+            to_coefficients(&mut moved, self.nodes, (i * self.nodes, 1));
+        }
+        for i in 0..self.nodes {
+            to_coefficients(&mut moved, self.nodes, (i, self.nodes));
+        }
+        let bends = Bends::new(&moved, self.nodes, self.per_step as f32);
+        Self { moved, bends, ..*self }
+    }
+
+    /// The chart a part of the way to another one of the same layout.
+    pub fn towards(&self, to: &Self, part: f32) -> Self {
+        let moved = self.moved.iter().zip(&to.moved).map(|(a, b)| a.lerp(*b, part)).collect();
+        Self { moved, bends: self.bends.towards(&to.bends, part), ..*self }
+    }
+
+    /// Nodes.
+    pub fn node_count(&self) -> u64 {
+        self.moved.len() as u64
+    }
+
+    /// Radius of the dome, mm.
+    pub fn radius_mm(&self) -> f64 {
+        self.radius_mm
+    }
+
+    /// Nodes in a mm.
+    pub fn per_step(&self) -> f64 {
+        self.per_step
+    }
+
+    /// Bound on the steepest slope of the displacement.
+    pub fn steepest(&self) -> f32 {
+        self.bends.steepest
+    }
+
+    /// How the membrane may bend where the chart holds a part of the dome, and whether it holds all of it.
+    pub fn bend(&self, places_mm: &[DVec3], slant: f64) -> (Turned, bool) {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for at in places_mm {
+            let place = self.place(*at);
+            low = [0, 1].map(|k| low[k].min(place[k]));
+            high = [0, 1].map(|k| high[k].max(place[k]));
+        }
+        let wide_mm = (high[0] - low[0]).max(high[1] - low[1]);
+        if wide_mm.is_nan() || wide_mm < 0.0 {
+            return (Turned::default(), false);
+        }
+        // Cells, as far as the chart reaches.
+        let last = self.nodes as f64 - 2.0;
+        let cells = |margin_mm: f64| {
+            let margin_mm = margin_mm + BULGE * wide_mm;
+            let [low, high] = [low.map(|v| v - margin_mm), high.map(|v| v + margin_mm)]
+                .map(|v| v.map(|v| (v + self.half_mm) * self.per_step));
+            let is_whole = low.iter().all(|v| *v >= 1.0) && high.iter().all(|v| *v < last);
+            let meets = low.iter().all(|v| *v < last) && high.iter().all(|v| *v >= 1.0);
+            let range = |k: usize| low[k].max(1.0) as usize..high[k].min(last - 1.0).max(1.0) as usize + 1;
+            (meets.then(|| [range(0), range(1)]), is_whole)
+        };
+        let (about, _) = cells(0.0);
+        let Some(about) = about else { return (Turned::default(), false) };
+        // A slanting ray meets the moved membrane beside the place where it met the undeformed one.
+        let beside_mm = f64::from(self.bends.farthest(self.nodes, &about)) * slant;
+        let (about, is_whole) = cells(beside_mm);
+        let Some(about) = about else { return (Turned::default(), false) };
+        (self.bends.over(self.nodes, &about, (0.5 * wide_mm * self.per_step) as f32), is_whole)
+    }
+
+    /// The point of the undeformed dome at a place.
+    pub fn point(&self, x: f64, y: f64) -> DVec3 {
+        let s = ((x * x + y * y) / (self.radius_mm * self.radius_mm)).min(4.0);
+        let k = (1.0 - 0.25 * s).max(0.0).sqrt();
+        self.middle * (self.radius_mm * (1.0 - 0.5 * s)) + (self.side * x + self.up * y) * k
+    }
+
+    /// Coordinates of a point of the undeformed dome, mm.
+    #[inline]
+    pub fn place(&self, rest_mm: DVec3) -> [f64; 2] {
+        let along = rest_mm.dot(self.middle) / self.radius_mm;
+        let stretch = (2.0 / (1.0 + along).max(1e-9)).sqrt();
+        [rest_mm.dot(self.side) * stretch, rest_mm.dot(self.up) * stretch]
+    }
+
+    /// The membrane at a place; `None` outside the chart.
+    #[inline]
+    pub fn at(&self, [x, y]: [f64; 2]) -> Option<Moved> {
+        let (gx, gy) = ((x + self.half_mm) * self.per_step, (y + self.half_mm) * self.per_step);
+        let last = self.nodes as f64 - 2.0;
+        if !(gx >= 1.0 && gy >= 1.0 && gx < last && gy < last) {
+            return None;
+        }
+        let (i, j) = (gx as usize, gy as usize);
+        let (wx, dx) = spline((gx - i as f64) as f32);
+        let (wy, dy) = spline((gy - j as f64) as f32);
+        let start = (j - 1) * self.nodes + i - 1;
+        let corner = self.moved.get(start..start + 3 * self.nodes + 4)?;
+        let (mut u, mut by_x, mut by_y) = (Vec4::ZERO, Vec4::ZERO, Vec4::ZERO);
+        for row in 0..4 {
+            let nodes = &corner[row * self.nodes..row * self.nodes + 4];
+            let across = (nodes[0] * wx[0] + nodes[1] * wx[1]) + (nodes[2] * wx[2] + nodes[3] * wx[3]);
+            let slope = (nodes[0] * dx[0] + nodes[1] * dx[1]) + (nodes[2] * dx[2] + nodes[3] * dx[3]);
+            u += across * wy[row];
+            by_x += slope * wy[row];
+            by_y += across * dy[row];
+        }
+        // Tangents of the chart, then of the moved surface.
+        let r2 = self.radius_mm * self.radius_mm;
+        let k = (1.0 - (x * x + y * y) / (4.0 * r2)).max(1e-12).sqrt();
+        let bend = 1.0 / (4.0 * r2 * k);
+        let (side, up) = (self.side, self.up);
+        let per_radius = 1.0 / self.radius_mm;
+        let tangent_x = side * (k - x * x * bend) - up * (x * y * bend) - self.middle * (x * per_radius);
+        let tangent_y = up * (k - y * y * bend) - side * (x * y * bend) - self.middle * (y * per_radius);
+        let wide = |v: Vec4| v.truncate().as_dvec3();
+        Some(Moved {
+            displacement_mm: wide(u),
+            along_x: tangent_x + wide(by_x) * self.per_step,
+            along_y: tangent_y + wide(by_y) * self.per_step,
+        })
+    }
+}
+
+/// Turns a row or column of values (its first place, and the way to the next) into a cubic spline's coefficients: each
+/// value less a sixth of the second difference there, which is right for cubics and needs no more than the neighbours.
+/// At the ends, where only what is next to the chart's edge looks, the second difference is the neighbour's.
+fn to_coefficients(values: &mut [Vec4], count: usize, (start, stride): (usize, usize)) {
+    let at = |values: &[Vec4], i: usize| values.get(start + i * stride).copied().unwrap_or(Vec4::ZERO);
+    if count < 3 {
+        return;
+    }
+    let second = |a: Vec4, b: Vec4, c: Vec4| (a - b * 2.0 + c) / 6.0;
+    let (mut before, mut here) = (at(values, 0), at(values, 1));
+    let mut bend = second(before, here, at(values, 2));
+    let set = |values: &mut [Vec4], i: usize, value: Vec4| {
+        values.get_mut(start + i * stride).into_iter().for_each(|place| *place = value);
+    };
+    set(values, 0, before - bend);
+    for i in 1..count - 1 {
+        let after = at(values, i + 1);
+        bend = second(before, here, after);
+        set(values, i, here - bend);
+        (before, here) = (here, after);
+    }
+    set(values, count - 1, here - bend);
+}
+
+/// Weights of the four nodes around a place between the middle two, and their derivatives: the cubic spline's.
+fn spline(t: f32) -> ([f32; 4], [f32; 4]) {
+    let s = 1.0 - t;
+    let (t2, s2) = (t * t, s * s);
+    let sixth = 1.0 / 6.0;
+    let weights = [
+        s * s2 * sixth,
+        (t2 * (3.0 * t - 6.0) + 4.0) * sixth,
+        (s2 * (3.0 * s - 6.0) + 4.0) * sixth,
+        t * t2 * sixth,
+    ];
+    let slopes = [-0.5 * s2, t * (1.5 * t - 2.0), s * (2.0 - 1.5 * s), 0.5 * t2];
+    (weights, slopes)
+}

@@ -19,6 +19,8 @@ pub(super) struct Bends {
     /// Third derivative of the displacement in any three directions, by the width of a cell: as the spline's derivatives
     /// are means of its coefficients' differences, the largest of those about the cell.
     third: Vec<f32>,
+    /// Second derivative of the displacement in any two directions, 1/mm.
+    pub second: Vec<f32>,
     /// Slope of the displacement.
     slope: Vec<f32>,
     /// Displacement, mm.
@@ -41,14 +43,22 @@ impl Bends {
                 (at(i + 2 * way) - at(i.wrapping_sub(way)) + (at(i) - at(i + way)) * 3.0).length_squared()
             })
         };
+        let pure = |way: usize| table(&|i| second(i, way).length_squared());
+        let [xx, yy] = [x, y].map(pure);
+        let xy = table(&|i| (at(i + x + y) - at(i + x) - at(i + y) + at(i)).length_squared());
         let mixed = |twice: usize, once: usize| {
             table(&|i| (second(i + once, twice) - second(i, twice)).length_squared())
         };
         let [xxx, yyy, xxy, xyy] = [third(x), third(y), mixed(x, y), mixed(y, x)];
         let [along_x, along_y] = [x, y].map(|way| table(&|i| (at(i + way) - at(i)).length_squared()));
         let lengths = table(&|i| at(i).length_squared());
-        let mut bends =
-            Self { third: vec![0.0; count], slope: vec![0.0; count], moved: vec![0.0; count], steepest: 0.0 };
+        let mut bends = Self {
+            third: vec![0.0; count],
+            second: vec![0.0; count],
+            slope: vec![0.0; count],
+            moved: vec![0.0; count],
+            steepest: 0.0,
+        };
         let most = |table: &[f32], columns: Range<usize>, rows: Range<usize>| {
             let mut most = 0.0_f32;
             for row in rows {
@@ -64,9 +74,13 @@ impl Bends {
                 let third = most(&xxx, i..i + 1, j - 1..j + 3)
                     + most(&yyy, i - 1..i + 3, j..j + 1)
                     + 3.0 * (most(&xxy, i..i + 2, j - 1..j + 2) + most(&xyy, i - 1..i + 2, j..j + 2));
+                let twice = most(&xx, i..i + 2, j - 1..j + 3)
+                    + most(&yy, i - 1..i + 3, j..j + 2)
+                    + 2.0 * most(&xy, i - 1..i + 2, j - 1..j + 2);
                 let slope =
                     most(&along_x, i - 1..i + 2, j - 1..j + 3) + most(&along_y, i - 1..i + 3, j - 1..j + 2);
                 bends.third[cell] = third.sqrt() * per_step;
+                bends.second[cell] = twice.sqrt() * per_step * per_step;
                 bends.slope[cell] = slope.sqrt() * per_step;
                 bends.moved[cell] = most(&lengths, i - 1..i + 3, j - 1..j + 3).sqrt();
                 bends.steepest = bends.steepest.max(bends.slope[cell]);
@@ -81,6 +95,7 @@ impl Bends {
         let all = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| mix(*a, *b)).collect();
         Self {
             third: all(&self.third, &to.third),
+            second: all(&self.second, &to.second),
             slope: all(&self.slope, &to.slope),
             moved: all(&self.moved, &to.moved),
             steepest: mix(self.steepest, to.steepest),

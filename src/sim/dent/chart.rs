@@ -9,6 +9,9 @@ use crate::sim::touch::Between;
 /// Fewest and most nodes along a side.
 const NODES: [usize; 2] = [12, 160];
 
+/// So many nodes below the rim the table still goes on; deeper no ray looks.
+const BELOW_STEPS: f64 = 8.0;
+
 /// How far the outline of a small part of the dome may bulge beyond the box around its corners in the chart, as a part of
 /// the box's width; parts are at most some tenths of the radius wide.
 const BULGE: f64 = 0.1;
@@ -19,6 +22,8 @@ pub(super) struct Moved {
     /// Tangents of the moved membrane: its derivatives by the chart's coordinates.
     pub along_x: DVec3,
     pub along_y: DVec3,
+    /// Bound on how much the normal turns with the way about there, rad/mm.
+    pub turn: f64,
 }
 
 /// One table.
@@ -51,17 +56,34 @@ impl Chart {
         Self { middle, side, up, radius_mm, half_mm, nodes, per_step, moved, bends }
     }
 
-    /// The chart with its displacements.
+    /// The chart with its displacements. Below the rim, where there is no dome, they go on as they came: what the rim has
+    /// twice, less what the dome has as far above it. So the spline has no crease there.
     pub fn filled(&self, between: &Between) -> Self {
-        let mut at_mm = Vec::with_capacity(self.nodes * self.nodes);
-        for row in 0..self.nodes {
-            for column in 0..self.nodes {
-                let place = |i: usize| i as f64 / self.per_step - self.half_mm;
-                at_mm.push(self.point(place(column), place(row)));
+        let count = self.nodes * self.nodes;
+        let place = |i: usize| i as f64 / self.per_step - self.half_mm;
+        let below_mm = -BELOW_STEPS / self.per_step;
+        let mut at_mm: Vec<DVec3> = Vec::with_capacity(count + count / 4);
+        let mut below = Vec::new();
+        at_mm.extend((0..count).map(|i| self.point(place(i % self.nodes), place(i / self.nodes))));
+        for i in 0..count {
+            let Some(at) = at_mm.get_mut(i).filter(|at| at.z < 0.0) else { continue };
+            if at.z > below_mm {
+                at.z = -at.z;
+                let rim = at.truncate().normalize_or_zero() * self.radius_mm;
+                below.push((i, at_mm.len()));
+                at_mm.push(rim.extend(0.0));
+            } else {
+                below.push((i, usize::MAX));
             }
         }
-        let found = between.displacements_mm(&at_mm).into_iter();
-        let mut moved: Vec<Vec4> = found.map(|u| u.as_vec3().extend(0.0)).collect();
+        let found = between.displacements_mm(&at_mm);
+        let mut moved: Vec<Vec4> = found.iter().take(count).map(|u| u.as_vec3().extend(0.0)).collect();
+        for (i, rim) in below {
+            let rim = found.get(rim).map(|u| u.as_vec3().extend(0.0));
+            if let Some(moved) = moved.get_mut(i) {
+                *moved = rim.map_or(Vec4::ZERO, |rim| rim * 2.0 - *moved);
+            }
+        }
         for i in 0..self.nodes {
             to_coefficients(&mut moved, self.nodes, (i * self.nodes, 1));
         }
@@ -86,11 +108,6 @@ impl Chart {
     /// Radius of the dome, mm.
     pub fn radius_mm(&self) -> f64 {
         self.radius_mm
-    }
-
-    /// Nodes in a mm.
-    pub fn per_step(&self) -> f64 {
-        self.per_step
     }
 
     /// Bound on the steepest slope of the displacement.
@@ -180,6 +197,7 @@ impl Chart {
             displacement_mm: wide(u),
             along_x: tangent_x + wide(by_x) * self.per_step,
             along_y: tangent_y + wide(by_y) * self.per_step,
+            turn: per_radius + f64::from(self.bends.second.get(j * self.nodes + i).copied().unwrap_or(0.0)),
         })
     }
 }

@@ -176,15 +176,14 @@ impl Dent {
             if miss2 < least {
                 (nearest_mm, least) = (moved.displacement_mm, miss2);
             }
-            if miss2 < CLOSE_MM * CLOSE_MM || step == MOST_STEPS + PLAIN_STEPS {
+            if step == MOST_STEPS + PLAIN_STEPS {
                 return found(place, moved.displacement_mm);
             }
             let on_plane = || {
                 let per = normal.length_squared().recip();
                 [miss.cross(moved.along_y).dot(normal) * per, moved.along_x.cross(miss).dot(normal) * per]
             };
-            let near_mm = NEAR_PART / chart.per_step();
-            if miss2 < near_mm * near_mm {
+            if miss2 * moved.turn * moved.turn < NEAR_RAD * NEAR_RAD {
                 // So near that the tangent plane is the membrane: the point on it, and where that was.
                 let [a, b] = on_plane();
                 let place = chart.point(x + a, y + b);
@@ -224,10 +223,8 @@ fn back_on_sphere(rest_mm: DVec3, inside: DVec3, displacement_mm: DVec3) -> DVec
 const MOST_STEPS: u32 = 10;
 /// More of them, each half of the plain one's way, where those do not end.
 const PLAIN_STEPS: u32 = 16;
-/// A step this short ends it, mm: hundredths of a pixel.
-const CLOSE_MM: f64 = 3e-4;
-/// The same as a part of the distance of a chart's nodes, over which the membrane may bend: what the tangent plane
-/// leaves is of the second order.
-const NEAR_PART: f64 = 0.01;
+/// A step over which the membrane turns by no more than this ends it, rad: tenths of a grey level, and what the tangent
+/// plane leaves of the place is far less.
+const NEAR_RAD: f64 = 4e-4;
 /// A step longer than this is none of Newton's, mm.
 const FARTHEST_MM: f64 = 1.0;

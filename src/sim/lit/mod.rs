@@ -1,6 +1,6 @@
 //! The lit membrane in the picture: exact at as few pixels as smoothness allows, a smooth surface in between.
 //!
-//! The picture is divided into squares of 32 px. Of each the brightness at its corners, sides' middles and middle is
+//! The picture is divided into squares of 16 px. Of each the brightness at its corners, sides' middles and middle is
 //! worked out exactly (ray, deformed membrane, light). Where the middles are what the corners promise, within a
 //! tolerance, or what the square of twice the size foretold, the square is filled by the biquadratic surface through
 //! the nine; else it falls into four, down to single pixels. Pixels are their own nodes, so nothing is worked out twice.
@@ -28,12 +28,13 @@ use super::work::Work;
 use crate::optics::SensorOptics;
 
 /// Side of the largest squares, px; a power of two.
-pub(super) const LARGEST: usize = 32;
+pub(super) const LARGEST: usize = 16;
 /// Parts of the tolerance: a bound on what the surface through the nodes leaves that is above the first divides a
 /// square whatever its nodes say; one below the second does not, for then the nodes only differ as a surface of the
-/// second order does.
-const HIDDEN: f32 = 1.5;
-const TOLD: f32 = 0.5;
+/// second order does. The bounds take the worst of all directions, cells and phases at once: what was ever found
+/// where they are that large is below an eighth of them.
+const HIDDEN: f32 = 8.0;
+const TOLD: f32 = 1.0;
 /// Squares up to this size, px, whose nine rays miss the dome show none of it.
 const MISSED: usize = 8;
 

@@ -14,8 +14,8 @@ const STILL_MM: f32 = 1e-6;
 /// Parts of the tolerance. The motion is told from nine nodes where the bound on what that leaves in the light is below the
 /// first; the change of the light is, where it is also nearer than the second to what straight lines through its
 /// neighbours say.
-const SMOOTH: f32 = 0.3;
-const LITTLE: f32 = 0.6;
+const SMOOTH: f32 = 4.0;
+const LITTLE: f32 = 1.0;
 /// Where the edge of the dome cuts a square, the tables know less of it: there no normal in the middle may be further than
 /// this from what those on both sides say, rad.
 const AT_EDGE_RAD: f32 = 2e-3;
@@ -44,6 +44,8 @@ pub(super) struct Motion {
     pub slant: f32,
     /// From the undeformed point on the ray to the deformed one, mm.
     pub shift_mm: Vec3A,
+    /// How the point of the membrane on the ray moved, mm.
+    pub moved_mm: Vec3A,
     /// Change of the unit normal.
     pub tilt: Vec3A,
     /// Change of the light, full scales.
@@ -196,7 +198,7 @@ impl<const N: usize> Lit<N> {
         let mut places = [DVec3::ZERO; 4];
         for (place, (x, y)) in places.iter_mut().zip(corners) {
             *place = if is_whole {
-                self.place(largest, (x - largest.0, y - largest.1)).as_dvec3()
+                self.told(largest, (x - largest.0, y - largest.1), |motion| motion.place_mm).as_dvec3()
             } else {
                 seen.optics.follow_continued(surface.rays?.at(x, y)?).ok()?.0
             };
@@ -215,29 +217,50 @@ impl<const N: usize> Lit<N> {
                 if turned.moved_mm > STILL_MM { further(turned) } else { 0.0 }
             }
         };
-        let is_inside = is_whole && more == 0.0 && places.iter().all(|place| place.z * per_radius > GRAZING);
+        let is_known = source != Source::Exact || more == 0.0;
+        let is_inside = is_whole && is_known && places.iter().all(|place| place.z * per_radius > GRAZING);
         Some(Bend { most: still + more, is_inside })
     }
 
-    /// The place on the undeformed dome of a pixel of a largest square, by the parabolas through its nine nodes.
-    fn place(&self, (x, y): (usize, usize), (dx, dy): (usize, usize)) -> Vec3A {
+    /// A part of the motion at a pixel of a largest square, by the parabolas through its nine nodes.
+    fn told(
+        &self,
+        (x, y): (usize, usize),
+        (dx, dy): (usize, usize),
+        part: impl Fn(&Motion) -> Vec3A,
+    ) -> Vec3A {
         let (wx, wy) = (WEIGHTS[dx.min(LARGEST)], WEIGHTS[dy.min(LARGEST)]);
+        let across = self.kept_across();
+        let start = y / KEPT_STEP * across + x / KEPT_STEP;
         let mut sum = Vec3A::ZERO;
         for (j, wy) in wy.iter().enumerate() {
-            for (i, wx) in wx.iter().enumerate() {
-                sum += self.kept((x + i * KEPT_STEP, y + j * KEPT_STEP)).place_mm * (wx * wy);
+            let row = self.motions.get(start + j * across..start + j * across + 3).unwrap_or_default();
+            for (node, wx) in row.iter().zip(wx) {
+                sum += part(node) * (wx * wy);
             }
         }
         sum
     }
 
+    /// How the membrane moves about a pixel of a largest square whose nodes are known, mm: there a search begins.
+    pub(super) fn foretold_mm(&self, corner: (usize, usize), (x, y): (usize, usize)) -> DVec3 {
+        self.told(corner, (x - corner.0, y - corner.1), |motion| motion.moved_mm).as_dvec3()
+    }
+
+    /// Whether all nine nodes of a largest square have rays; not before they are known.
+    pub(super) fn is_whole(&self, corner: (usize, usize)) -> bool {
+        self.square(corner).is_whole
+    }
+
     /// The motion at a place of a largest square, by the parabolas through its nine nodes.
     pub(super) fn motion(&self, (x, y): (usize, usize), (dx, dy): (usize, usize)) -> Motion {
         let (wx, wy) = (WEIGHTS[dx.min(LARGEST)], WEIGHTS[dy.min(LARGEST)]);
+        let across = self.kept_across();
+        let start = y / KEPT_STEP * across + x / KEPT_STEP;
         let mut sum = Motion::default();
         for (j, wy) in wy.iter().enumerate() {
-            for (i, wx) in wx.iter().enumerate() {
-                let node = self.kept((x + i * KEPT_STEP, y + j * KEPT_STEP));
+            let row = self.motions.get(start + j * across..start + j * across + 3).unwrap_or_default();
+            for (node, wx) in row.iter().zip(wx) {
                 sum.shift_mm += node.shift_mm * (wx * wy);
                 sum.tilt += node.tilt * (wx * wy);
                 sum.change += node.change * (wx * wy);

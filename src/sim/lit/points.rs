@@ -12,7 +12,7 @@ use crate::sim::work::Work;
 /// Rays are traced and lit this many at a time.
 const BATCH: usize = 512;
 /// Squares that reach further than this beyond the lens's field are all outside it, px.
-const BEYOND_PX: f64 = 2.0 * LARGEST as f64;
+const BEYOND_PX: f64 = 4.0 * LARGEST as f64;
 /// What moves by less is not dented, mm.
 const STILL_MM: f64 = 1e-6;
 
@@ -32,7 +32,7 @@ impl<const N: usize> Lit<N> {
                 continue;
             }
             let Some(seen) = surface.at(y) else { continue };
-            let ray = surface.rays.filter(|_| surface.tolerance > 0.0).and_then(|rays| rays.at(x, y));
+            let ray = surface.rays.and_then(|rays| rays.at(x, y));
             let pixel = DVec2::new(x as f64, y as f64);
             let hit = match ray {
                 Some(ray) => seen.optics.follow_continued(ray),
@@ -126,12 +126,16 @@ impl<const N: usize> Lit<N> {
         }
         work.add(EffectName::Contact, units::DENT);
         // Where a ray may meet the membrane more than once, what it shows may not depend on what was asked before.
-        let near_mm = if dent.may_fold() { DVec3::ZERO } else { self.moved_mm };
+        let near_mm = match kept {
+            _ if dent.may_fold() => DVec3::ZERO,
+            None if self.is_whole(corner) => self.foretold_mm(corner, (x, y)),
+            _ => self.moved_mm,
+        };
         let Some((rest_mm, dented)) = dent.meet(surface_mm, inside, near_mm) else {
             self.moved_mm = DVec3::ZERO;
             return still;
         };
-        // Neighbours move alike: the last one's motion is where the next one's search begins.
+        // Neighbours move alike: the last one's motion is where the next node's search begins.
         self.moved_mm = dented.displacement_mm;
         if self.moved_mm.length_squared() <= STILL_MM * STILL_MM {
             return still;
@@ -139,6 +143,7 @@ impl<const N: usize> Lit<N> {
         let point_mm = rest_mm + dented.displacement_mm;
         if let Some(motion) = kept.and_then(|at| self.motions.get_mut(at)) {
             motion.shift_mm = (point_mm - surface_mm).as_vec3a();
+            motion.moved_mm = self.moved_mm.as_vec3a();
             motion.tilt = (dented.normal - still.normal).as_vec3a();
             let change = surface.shading.change(point_mm, dented.normal);
             motion.change = Vec3A::from_array(change);

@@ -5,7 +5,7 @@ use super::{Known, LARGEST, Lit};
 /// Parts of the tolerance: within the first a square's middles are what its corners promise, for what a surface of the
 /// second order then leaves, of the third, is a fraction of that; within the second its nodes are foreseen.
 const PROMISED: f32 = 2.0;
-const FORESEEN: f32 = 2.0;
+const FORESEEN: f32 = 3.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
@@ -117,8 +117,7 @@ impl<const N: usize> Lit<N> {
             1 => self.lay::<3>(x, y, &nine),
             2 => self.lay::<5>(x, y, &nine),
             4 => self.lay::<9>(x, y, &nine),
-            8 => self.lay::<17>(x, y, &nine),
-            _ => self.lay::<33>(x, y, &nine),
+            _ => self.lay::<17>(x, y, &nine),
         }
         let side = 2 * half;
         for j in 0..=side {

@@ -98,7 +98,7 @@ pub fn ladder(scene: &Scene, quick: bool) -> Result<(Ladder, Sequence), SimError
     let frames = if quick { QUICK_FRAMES } else { FRAMES };
     let own = changed(scene, 1.0, frames)?;
     let count = own.frame_count();
-    let everything = Plan::everything(&own)?;
+    let everything = Plan::exact(&own)?;
     let mut scratch = Scratch::default();
     let renderer = Renderer::new(&own, &everything)?;
     // To warm up: the reference is a rung, too.

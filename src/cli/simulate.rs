@@ -123,10 +123,8 @@ fn explain(output: &Output, scene: &Scene, plan: &Plan) -> Result<(), Failure> {
         plan.left_out.px, tolerance.px, plan.left_out.grey, tolerance.grey
     ))?;
     if plan.filled_grey > 0.0 {
-        output.say(&format!(
-            "  filled in between rays: <= {:.2} grey levels, twice counted in the tolerance",
-            plan.filled_grey
-        ))?;
+        output
+            .say(&format!("  filled in between rays: <= {:.2} of the same grey levels", plan.filled_grey))?;
     }
     Ok(())
 }

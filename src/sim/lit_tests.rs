@@ -7,9 +7,9 @@ use glam::DVec2;
 use super::coverage::{Coverage, LEAST_SHARE, clip_to_image};
 use super::eye::Eye;
 use super::field::{LensField, rim_polygon};
+use super::fill::{fill_grey, fill_tolerance};
 use super::instant::dent_step_mm;
 use super::lit::{Lit, LitSlice, LitSurface};
-use super::picture::fill_tolerance;
 use super::shapes::Shape;
 use super::touch::Between;
 use super::*;
@@ -146,7 +146,10 @@ fn pressed(design: &str, level: &str, object: &str, grey: f64) -> Scene {
 /// grey levels: no pixel may be further off.
 fn keeps_within(design: &str, level: &str, (name, object): (&str, &str), greys: &[f64]) {
     let scene = pressed(design, level, object, 1.0);
-    let tolerance = |grey: &f64| fill_tolerance(&pressed(design, level, object, *grey));
+    let tolerance = |grey: &f64| {
+        let scene = pressed(design, level, object, *grey);
+        fill_tolerance(&scene, fill_grey(&scene))
+    };
     let tolerances: Vec<f32> = greys.iter().map(tolerance).chain([0.0]).collect();
     let (mut all, places) = levels(&scene, 0, &tolerances);
     let (exact, every) = all.pop().unwrap();
@@ -167,9 +170,9 @@ fn keeps_within(design: &str, level: &str, (name, object): (&str, &str), greys: 
             rank(0.999).0,
             f64::from(worst) / grey
         );
-        if std::env::var_os("DOMECAST_LOOK").is_none() {
-            assert!(f64::from(worst) <= *grey, "{design} {name} {level} {grey}: {worst} at {at:?}");
-        }
+        // What the plan counts on, a part of the tolerance.
+        let most = fill_grey(&pressed(design, level, object, *grey));
+        assert!(f64::from(worst) <= most, "{design} {name} {level} {grey}: {worst} at {at:?}");
     }
 }
 
@@ -178,8 +181,8 @@ fn what_is_filled_in_is_what_each_ray_shows() {
     for level in ["geometric", "closed_form", "linear"] {
         keeps_within("thumb24", level, OBJECTS[0], &[1.0, 4.0]);
     }
-    keeps_within("thumb24-pinhole", "geometric", OBJECTS[2], &[0.5, 2.0]);
-    keeps_within("thumb24", "linear", OBJECTS[1], &[0.5, 2.0]);
+    keeps_within("thumb24-pinhole", "geometric", OBJECTS[2], &[1.0, 2.0]);
+    keeps_within("thumb24", "linear", OBJECTS[1], &[1.0, 2.0]);
 }
 
 #[test]
@@ -189,7 +192,7 @@ fn long_objects_are_filled_in_as_each_ray_shows_them() {
             for level in ["geometric", "closed_form", "linear"] {
                 // The closed form knows balls.
                 if level != "closed_form" || object.0 == "ball" {
-                    keeps_within(design, level, object, &[0.5, 1.0, 2.0, 4.0]);
+                    keeps_within(design, level, object, &[1.0, 2.0, 4.0]);
                 }
             }
         }

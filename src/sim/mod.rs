@@ -12,6 +12,7 @@ mod effects;
 mod error;
 mod eye;
 mod field;
+mod fill;
 mod frame;
 mod geometry_bound;
 mod instant;

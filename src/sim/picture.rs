@@ -169,7 +169,7 @@ impl Painter {
             rays: Some(parts.field.rays()),
             shading,
             channel: channels.start,
-            tolerance: fill_tolerance(parts.scene),
+            tolerance: parts.pipeline.fill_tolerance,
         };
         let at = |k: usize| 0.5 * (low[k].min(high[k]) + high[k]) as f64;
         let center = DVec2::new(at(0), at(1));
@@ -264,32 +264,6 @@ fn clip_to_rows(polygon: Vec<DVec2>, rows: &Range<usize>, height: usize) -> Vec<
     let kept = clip(&polygon, -DVec2::Y, 0.5 - rows.start as f64);
     clip(&kept, DVec2::Y, rows.end as f64 - 0.5)
 }
-
-/// Part of a scene's grey tolerance that pixels which are filled in between rays may be off; another such part is what the
-/// picture that it is compared with may be off, and the last is the plan's.
-const FILL_PART: f64 = 1.0 / 3.0;
-/// Grey levels. Nothing finer than the first part of a code shows: a scene that asks for less gets each pixel's own ray. More
-/// than the second, the nodes of a square of the largest size would hardly tell.
-const FILL_GREY: [f64; 2] = [1.0 / 6.0, 2.0];
-
-/// How far a pixel of the lit membrane that is filled in between rays may be from what its own ray shows, grey levels: a
-/// third of the scene's tolerance, but 2 at most; 0, where the scene's tolerance is below half a level, for then each
-/// pixel has its own ray.
-pub(super) fn fill_grey(scene: &Scene) -> f64 {
-    let part = FILL_PART * scene.file().tolerance.grey;
-    if part < FILL_GREY[0] * (1.0 - 1e-12) { 0.0 } else { part.min(FILL_GREY[1]) }
-}
-
-/// [`fill_grey`] in the light of the picture, full scales, where the code is steepest: in the dark, of which the stray light
-/// is the end.
-pub(super) fn fill_tolerance(scene: &Scene) -> f32 {
-    let file = scene.file();
-    let darkest = file.light.leds.as_ref().map_or(0.0, |leds| leds.stray_level).max(DARKEST);
-    (fill_grey(scene) / 255.0 / file.electronics.steepest_code(darkest)) as f32
-}
-
-/// Below this the light of a code is not worked out finer, full scales: a tenth of the first code of a linear picture.
-const DARKEST: f64 = 0.0004;
 
 /// What is beside the sensor.
 #[derive(Clone, Copy)]

@@ -28,6 +28,8 @@ pub struct Pipeline {
     pub coded_passes: Vec<Box<dyn CodedPass>>,
     /// The brightness of the membrane; made from `light` after all effects are applied. `None`: evenly lit.
     pub shading: Option<Box<dyn Shading>>,
+    /// How far pixels of a lit membrane that are filled in between rays may be off, full scales; 0: each has its own ray.
+    pub fill_tolerance: f32,
 }
 
 /// Which geometric effects take part.

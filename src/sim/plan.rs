@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::effect::{Bound, Cost, Effect, EffectChoice, EffectName};
 use super::effects;
+use super::fill::{fill_grey, fill_tolerance};
 use super::geometry_bound::shift_px;
-use super::picture::fill_grey;
 use super::pipeline::Geometry;
 use super::scene::Scene;
 use super::scene::file::{LevelName, ToleranceSection};
@@ -40,8 +40,7 @@ pub struct Plan {
     /// scene forbids); within the scene's tolerance.
     pub left_out: Bound,
     /// How far pixels of a lit membrane that are filled in between rays may be from what their own rays show, grey levels; 0
-    /// where each has its own. Twice that, as a picture with everything is filled in too, and what is left out are within
-    /// the scene's tolerance.
+    /// where each has its own. That and what is left out are within the scene's tolerance.
     #[serde(skip_serializing_if = "is_none")]
     pub filled_grey: f64,
     /// The level of contact where it is coarser than the scene's own.
@@ -76,6 +75,14 @@ impl Plan {
     /// As [`Plan::of`].
     pub fn everything(scene: &Scene) -> Result<Self, SimError> {
         Self::made(scene, false)
+    }
+
+    /// The same with a ray of its own for each pixel of a lit membrane: what the other plans may be compared with.
+    ///
+    /// # Errors
+    /// As [`Plan::of`].
+    pub fn exact(scene: &Scene) -> Result<Self, SimError> {
+        Ok(Self { filled_grey: 0.0, ..Self::made(scene, false)? })
     }
 
     fn made(scene: &Scene, spare: bool) -> Result<Self, SimError> {
@@ -167,7 +174,7 @@ impl Plan {
 
     fn leave_out(&mut self, scene: &Scene) -> Result<(), SimError> {
         let mut tolerance = scene.file().tolerance;
-        tolerance.grey -= 2.0 * self.filled_grey;
+        tolerance.grey -= self.filled_grey;
         let left = tolerance;
         let frames = u64::from(scene.frame_count());
         let per_px = grey_per_px(scene);
@@ -270,6 +277,7 @@ impl Plan {
             pipeline.contact = Some(effects::contact::level_named(scene, name));
         }
         pipeline.passes.sort_by_key(|pass| pass.stage());
+        pipeline.fill_tolerance = fill_tolerance(scene, self.filled_grey);
         pipeline.shading = light::shading(scene, &pipeline.light, work)?;
         Ok(pipeline)
     }

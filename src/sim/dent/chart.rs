@@ -12,6 +12,11 @@ const NODES: [usize; 2] = [12, 160];
 /// So many nodes below the rim the table still goes on; deeper no ray looks.
 const BELOW_STEPS: f64 = 8.0;
 
+/// Towards its edge a chart becomes the one around it, over so many mm, and is it over the last nodes, on which the spline
+/// leans at the edge.
+const EDGE_MM: f64 = 1.0;
+const EDGE_STEPS: f64 = 2.5;
+
 /// How far the outline of a small part of the dome may bulge beyond the box around its corners in the chart, as a part of
 /// the box's width; parts are at most some tenths of the radius wide.
 const BULGE: f64 = 0.1;
@@ -57,8 +62,9 @@ impl Chart {
     }
 
     /// The chart with its displacements. Below the rim, where there is no dome, they go on as they came: what the rim has
-    /// twice, less what the dome has as far above it. So the spline has no crease there.
-    pub fn filled(&self, between: &Between) -> Self {
+    /// twice, less what the dome has as far above it. So the spline has no crease there; nor has it one at the chart's edge,
+    /// towards which it becomes that of the chart `around`.
+    pub fn filled(&self, between: &Between, around: Option<&Self>) -> Self {
         let count = self.nodes * self.nodes;
         let place = |i: usize| i as f64 / self.per_step - self.half_mm;
         let below_mm = -BELOW_STEPS / self.per_step;
@@ -82,6 +88,20 @@ impl Chart {
             let rim = found.get(rim).map(|u| u.as_vec3().extend(0.0));
             if let Some(moved) = moved.get_mut(i) {
                 *moved = rim.map_or(Vec4::ZERO, |rim| rim * 2.0 - *moved);
+            }
+        }
+        if let Some(around) = around {
+            for (i, (moved, at)) in moved.iter_mut().zip(&at_mm).enumerate() {
+                let out_mm = place(i % self.nodes).abs().max(place(i / self.nodes).abs());
+                let part = 1.0 - (self.half_mm - out_mm - EDGE_STEPS / self.per_step) / EDGE_MM;
+                let part = part.clamp(0.0, 1.0) as f32;
+                if part > 0.0
+                    && at.z >= 0.0
+                    && let Some(theirs) = around.at(around.place(*at))
+                {
+                    let theirs = theirs.displacement_mm.as_vec3().extend(0.0);
+                    *moved = moved.lerp(theirs, part * part * (3.0 - 2.0 * part));
+                }
             }
         }
         for i in 0..self.nodes {

@@ -21,8 +21,10 @@ use crate::mechanics::contact::Extent;
 /// Displacements of less than this bend nothing that a picture shows, mm.
 const STILL_MM: f64 = 1e-4;
 
-/// Distance of the wide chart's nodes, mm.
+/// Distance of the wide chart's nodes, mm, and as a part of that of the close one's, where that is more: then they are as far
+/// apart as the finite elements, between which slopes jump that a finer table would only copy.
 const WIDE_STEP_MM: f64 = 0.6;
+const WIDER: f64 = 2.0;
 
 /// Slope of the displacement from which on the membrane may fold over a slanting ray.
 const FOLDING: f32 = 0.4;
@@ -81,7 +83,7 @@ impl DentLayout {
         Some(match pressed {
             Some((at, half)) => Self {
                 close: Some(chart(at, half, step_mm)),
-                wide: chart(middle, angle, step_mm.max(WIDE_STEP_MM)),
+                wide: chart(middle, angle, (WIDER * step_mm).max(WIDE_STEP_MM)),
             },
             None => Self { close: None, wide: chart(middle, angle, step_mm) },
         })
@@ -89,10 +91,8 @@ impl DentLayout {
 
     /// The tables of a dome; zero where it does not move.
     pub fn dent(&self, between: &Between) -> Dent {
-        Dent {
-            close: self.close.as_ref().map(|chart| chart.filled(between)),
-            wide: Some(self.wide.filled(between)),
-        }
+        let wide = self.wide.filled(between, None);
+        Dent { close: self.close.as_ref().map(|chart| chart.filled(between, Some(&wide))), wide: Some(wide) }
     }
 }
 

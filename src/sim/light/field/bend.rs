@@ -138,19 +138,25 @@ fn largest(table: &[f32], nodes: usize, low: DVec2, high: DVec2) -> f32 {
     (low.y as usize..=high.y as usize).map(row).fold(0.0, f32::max)
 }
 
-/// Turns the values of a square table into a cubic spline's coefficients: along each row, then each column, each value
-/// less a sixth of the second difference there, which is right for cubics and needs no more than the neighbours.
+/// Turns the values of a square table into the coefficients of the cubic spline through them, along each row, then each
+/// column. The ends, where nothing looks, keep their values as coefficients.
 pub(super) fn to_coefficients(values: &mut [Vec4], nodes: usize) {
-    let mut line = vec![Vec4::ZERO; nodes];
+    let mut line = vec![(Vec4::ZERO, 0.0_f32); nodes];
     for (next, step) in [(nodes, 1), (1, nodes)] {
         for start in (0..nodes).map(|i| i * next) {
-            for (i, value) in line.iter_mut().enumerate() {
-                *value = values.get(start + i * step).copied().unwrap_or(Vec4::ZERO);
+            // A coefficient, four times it and the next sum to six values: eliminated forwards, then put in backwards.
+            let mut before = (Vec4::ZERO, 0.0);
+            for (i, place) in line.iter_mut().enumerate() {
+                let value = values.get(start + i * step).copied().unwrap_or(Vec4::ZERO);
+                let part = 1.0 / (4.0 - before.1);
+                let is_end = i == 0 || i + 1 == nodes;
+                *place = if is_end { (value, 0.0) } else { ((value * 6.0 - before.0) * part, part) };
+                before = *place;
             }
-            for (i, three) in line.windows(3).enumerate() {
-                if let ([a, b, c], Some(place)) = (three, values.get_mut(start + (i + 1) * step)) {
-                    *place = *b - (*a - *b * 2.0 + *c) / 6.0;
-                }
+            let mut after = Vec4::ZERO;
+            for (i, (sum, part)) in line.iter().enumerate().rev() {
+                after = *sum - after * *part;
+                values.get_mut(start + i * step).into_iter().for_each(|place| *place = after);
             }
         }
     }

@@ -120,6 +120,10 @@ impl LightField {
             let [r, g, b] = if place.length() <= 1.0 {
                 let more = more(place);
                 std::array::from_fn(|c| table[i][c].max(0.0) + more[c])
+            } else if table[i] != [0.0; 3] {
+                // Next to the rim the table goes on by itself.
+                let more = continued(place, more);
+                std::array::from_fn(|c| table[i][c] + more[c])
             } else {
                 continued(place, inside)
             };

@@ -3,14 +3,14 @@
 use super::scene::Scene;
 
 /// Part of a scene's grey tolerance that the filling takes; the rest is for the effects that are left out.
-const PART: f64 = 0.75;
+const PART: f64 = 0.9;
 /// More than this, grey levels, the nodes of a square of the largest size would hardly tell.
-const MOST_GREY: f64 = 3.0;
+const MOST_GREY: f64 = 3.6;
 /// Light below which codes are not told apart, full scales: a tenth of the first code of a linear picture.
 const DARKEST: f64 = 0.0004;
 
-/// How far a pixel that is filled in may be from what its own ray shows, grey levels: three quarters of the scene's
-/// tolerance, but so much less that both round to codes within the tolerance, and 3 at most; 0 where the tolerance is below
+/// How far a pixel that is filled in may be from what its own ray shows, grey levels: nine tenths of the scene's
+/// tolerance, but so much less that both round to codes within the tolerance, and 3.6 at most; 0 where the tolerance is below
 /// one level, finer than which codes are not: then each pixel has its own ray.
 pub(super) fn fill_grey(scene: &Scene) -> f64 {
     let grey = scene.file().tolerance.grey;

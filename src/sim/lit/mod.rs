@@ -33,8 +33,8 @@ pub(super) const LARGEST: usize = 16;
 /// square whatever its nodes say; one below the second does not, for then the nodes only differ as a surface of the
 /// second order does. The bounds take the worst of all directions, cells and phases at once, some ten times what is
 /// found; with these parts no pixel of many objects' pictures was found further off than the tolerance.
-const HIDDEN: f32 = 3.5;
-const TOLD: f32 = 0.45;
+const HIDDEN: f32 = 2.3;
+const TOLD: f32 = 0.3;
 /// Squares up to this size, px, whose nine rays miss the dome show none of it.
 const MISSED: usize = 8;
 

@@ -14,8 +14,8 @@ const STILL_MM: f32 = 1e-6;
 /// Parts of the tolerance. The motion is told from nine nodes where the bound on what that leaves in the light is below the
 /// first; the change of the light is, where it is also nearer than the second to what straight lines through its
 /// neighbours say.
-const SMOOTH: f32 = 2.7;
-const LITTLE: f32 = 0.45;
+const SMOOTH: f32 = 1.8;
+const LITTLE: f32 = 0.3;
 /// Where the edge of the dome cuts a square, the tables know less of it: there no normal in the middle may be further than
 /// this from what those on both sides say, rad.
 const AT_EDGE_RAD: f32 = 2e-3;

@@ -4,8 +4,8 @@ use super::{Known, LARGEST, Lit};
 
 /// Parts of the tolerance: within the first a square's middles are what its corners promise, for what a surface of the
 /// second order then leaves, of the third, is a fraction of that; within the second its nodes are foreseen.
-const PROMISED: f32 = 0.9;
-const FORESEEN: f32 = 1.3;
+const PROMISED: f32 = 0.6;
+const FORESEEN: f32 = 0.85;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {

@@ -113,6 +113,10 @@ fn way_out(error: &ContactError) -> Option<String> {
             "move `position_mm` away from the dome by at least {:.3} mm, or leave the depth to a force (`press`)",
             (depth_mm - limit_mm).max(0.0)
         )),
+        ContactError::Unseen { .. } => Some(
+            "take smaller elements (`contact.element_mm`), a thicker object, or the geometric level (`contact.level`)"
+                .into(),
+        ),
         ContactError::BadPose(_) => Some(
             "let `position_mm` start outside the dome and `press.direction` point from there to the dome"
                 .into(),

@@ -47,6 +47,13 @@ pub enum ContactError {
         /// How far it may, mm.
         limit_mm: f64,
     },
+    /// The object is so thin that it passes between the places where the level's surface can be touched.
+    Unseen {
+        /// How far it reaches into the undeformed dome, mm.
+        depth_mm: f64,
+        /// Distance of the level's nodes, mm.
+        spacing_mm: f64,
+    },
     /// The springs have no force at the pose that was asked for.
     Springs(MechanicsError),
     /// The stiffness matrix has no factors: the elastomer's constants make it singular.
@@ -82,6 +89,10 @@ impl fmt::Display for ContactError {
                     "the object lies {depth_mm:.3} mm inside the dome, at most {limit_mm:.3} is modelled"
                 )
             }
+            Self::Unseen { depth_mm, spacing_mm } => write!(
+                f,
+                "the object reaches {depth_mm:.3} mm into the dome between the surface's nodes, which are {spacing_mm:.3} mm apart"
+            ),
             Self::Springs(error) => write!(f, "{error}"),
             Self::Factorisation(why) => write!(f, "the dome's stiffness has no factors: {why}"),
             Self::TooFine { element_mm, least_mm } => {

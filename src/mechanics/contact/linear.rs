@@ -1,5 +1,6 @@
 //! The linear level: the elastic dome's own compliance under unilateral contact with Coulomb friction.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
@@ -8,12 +9,15 @@ use super::elastomer::{Elastomer, Indenter};
 use super::error::ContactError;
 use super::fem::{Compliance, SurfaceField};
 use super::field::Field;
+use super::finer::{Fine, fine};
 use super::geometric::{Placed, deepest, deepest_from};
 use super::local::DEEPEST;
 use super::state::{ContactState, Status};
 use super::touch::{Candidate, PENETRATION, Rounds, Touch, Way};
 use crate::numeric::Rigid;
 
+/// Part of the nodes' distance by which an object that touches nothing may reach into the dome.
+const LEAST_SEEN: f64 = 0.5;
 /// Looks for nodes that no plane held back.
 const MOST_LOOKS: u32 = 8;
 
@@ -26,6 +30,8 @@ pub(super) struct Solver<'a> {
     touch: Touch<'a>,
     /// Object, place of the deepest node, and the margin that the candidates were chosen for.
     looked: Option<(Rigid, DVec3, f64)>,
+    /// What takes part instead of the nodes near by where the object is finer than they are.
+    fine: Option<Fine>,
 }
 
 impl<'a> Solver<'a> {
@@ -38,7 +44,7 @@ impl<'a> Solver<'a> {
     ) -> Self {
         let placed = Placed::new(indenter.solid.clone(), Rigid::identity());
         let touch = Touch::new(elastomer, placed, 1.0 + indenter.yield_ratio(elastomer));
-        Self { elastomer, compliance, before, touch, looked: None }
+        Self { elastomer, compliance, before, touch, looked: None, fine: None }
     }
 
     /// The contact at a pose, until nothing moves by more than `settled_mm`. Only with `whole` are nodes looked for
@@ -60,6 +66,7 @@ impl<'a> Solver<'a> {
         if near {
             for candidate in &mut self.touch.candidates {
                 candidate.carried_mm = way.carried(&self.touch.placed, candidate);
+                candidate.follow_face(sensor_from_object);
             }
         } else {
             let chosen = self.choose();
@@ -72,7 +79,7 @@ impl<'a> Solver<'a> {
             return self.solve(sensor_from_object, settled_mm, whole);
         }
         let mut field = self.field();
-        for look in 0..if whole { MOST_LOOKS } else { 0 } {
+        for look in 0..if whole && self.fine.is_none() { MOST_LOOKS } else { 0 } {
             let missed = self.missed(&field);
             if missed.is_empty() {
                 break;
@@ -83,7 +90,24 @@ impl<'a> Solver<'a> {
             // The last ones were not looked at again.
             ended.settled &= look + 1 < MOST_LOOKS;
         }
-        Ok(self.state(state, ended, field))
+        let state = self.state(state, ended, field);
+        if state.status == Status::Free {
+            self.check_seen()?;
+        }
+        Ok(state)
+    }
+
+    /// Where nothing bears a force, the object must not reach far into the dome.
+    fn check_seen(&self) -> Result<(), ContactError> {
+        let Some((_, deepest_mm, spacing_mm)) = self.looked else { return Ok(()) };
+        let radius = self.elastomer.dome_radius_mm;
+        let reach = self.touch.placed.walk_out(deepest_mm, -deepest_mm / radius, radius);
+        match reach {
+            Some((depth_mm, _)) if depth_mm > LEAST_SEEN * spacing_mm => {
+                Err(ContactError::Unseen { depth_mm, spacing_mm })
+            }
+            _ => Ok(()),
+        }
     }
 
     fn state(&self, mut state: ContactState, ended: Rounds, field: SurfaceField) -> ContactState {
@@ -139,6 +163,22 @@ impl<'a> Solver<'a> {
     fn choose(&mut self) -> Vec<usize> {
         let grid = &self.compliance.grid;
         let Some((_, deepest_mm, spacing)) = self.looked else { return Vec::new() };
+        let queries;
+        (self.fine, queries) = fine(&self.touch.placed, self.compliance);
+        self.touch.work += 30.0 * queries;
+        if let Some(fine) = &self.fine {
+            let chosen: Vec<usize> = fine.faces.keys().copied().collect();
+            let sensor_from_object = self.touch.placed.sensor_from_object();
+            self.touch.candidates.retain_mut(|candidate| {
+                candidate.face = fine.faces.get(&candidate.node).copied();
+                candidate.follow_face(&sensor_from_object);
+                candidate.face.is_some()
+            });
+            return chosen;
+        }
+        for candidate in &mut self.touch.candidates {
+            candidate.face = None;
+        }
         let depth_mm = -self.touch.placed.distance(deepest_mm).0;
         let most_mm = 0.25 * spacing - 0.45 * depth_mm;
         let mut chosen = self.nearer_than(most_mm);
@@ -187,9 +227,16 @@ impl<'a> Solver<'a> {
         }
         let known: Vec<usize> = touch.candidates.iter().map(|c| c.node).collect();
         for &number in numbers.iter().filter(|number| known.binary_search(number).is_err()) {
-            let node = grid.node(number);
-            let place = (number, grid.place(node), grid.areas_mm2[node.ring], grid.spread(node));
-            touch.candidates.push(Candidate::new(place, &touch.placed, way, touch.sharing)?);
+            let parts = self.compliance.places.parts(grid, number);
+            let area_mm2 =
+                parts.iter().map(|(node, part)| part * grid.areas_mm2[grid.node(*node).ring]).sum();
+            let spread_mm =
+                if number < grid.len() { grid.spread(grid.node(number)) } else { [DVec3::ZERO; 2] };
+            let place = (number, self.compliance.places.place(grid, number), area_mm2, spread_mm);
+            let mut candidate = Candidate::new(place, &touch.placed, way, touch.sharing)?;
+            candidate.face = self.fine.as_ref().and_then(|fine| fine.faces.get(&number)).copied();
+            candidate.follow_face(&touch.placed.sensor_from_object());
+            touch.candidates.push(candidate);
         }
         touch.candidates.sort_by_key(|candidate| candidate.node);
         self.fill_blocks();
@@ -201,14 +248,42 @@ impl<'a> Solver<'a> {
         let n = touch.candidates.len();
         let width = 3 * n;
         let grid = &self.compliance.grid;
-        let nodes: Vec<_> = touch.candidates.iter().map(|candidate| grid.node(candidate.node)).collect();
+        let parts: Vec<Vec<(usize, f64)>> =
+            touch.candidates.iter().map(|c| self.compliance.places.parts(grid, c.node)).collect();
+        // The nodes that take part, in order, and the compliance between them.
+        let mut numbers: Vec<usize> = parts.iter().flatten().map(|(number, _)| *number).collect();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let nodes: Vec<_> = numbers.iter().map(|number| grid.node(*number)).collect();
         let frames: Vec<DMat3> = nodes.iter().map(|node| grid.frame(*node)).collect();
+        let mut between = vec![DMat3::ZERO; nodes.len() * nodes.len()];
+        for i in 0..nodes.len() {
+            for j in 0..=i {
+                let local = self.compliance.between(nodes[i], nodes[j]);
+                let block = frames[i] * local * frames[j].transpose() * touch.sharing;
+                between[i * nodes.len() + j] = block;
+                between[j * nodes.len() + i] = block.transpose();
+            }
+        }
+        // Each candidate's shares by the nodes' places in that list.
+        let shares: Vec<Vec<(usize, f64)>> = parts
+            .iter()
+            .map(|parts| {
+                let place = |number: usize| numbers.binary_search(&number).unwrap_or(0);
+                parts.iter().map(|(number, share)| (place(*number), *share)).collect()
+            })
+            .collect();
         touch.blocks.clear();
         touch.blocks.resize(width * width, 0.0);
         for i in 0..n {
             for j in 0..=i {
-                let local = self.compliance.between(nodes[i], nodes[j]);
-                let block = (frames[i] * local * frames[j].transpose() * touch.sharing).to_cols_array();
+                let mut block = DMat3::ZERO;
+                for (a, share_a) in &shares[i] {
+                    for (b, share_b) in &shares[j] {
+                        block += between[a * nodes.len() + b] * (share_a * share_b);
+                    }
+                }
+                let block = block.to_cols_array();
                 for row in 0..3 {
                     for column in 0..3 {
                         let value = block[3 * column + row];
@@ -223,13 +298,14 @@ impl<'a> Solver<'a> {
 
     fn field(&self) -> SurfaceField {
         let grid = &self.compliance.grid;
-        let forces = self
-            .touch
-            .candidates
-            .iter()
-            .filter(|c| c.force_n != DVec3::ZERO)
-            .map(|c| (c.node, grid.frame(grid.node(c.node)).transpose() * c.force_n))
-            .collect();
+        let mut forces: BTreeMap<usize, DVec3> = BTreeMap::new();
+        for candidate in self.touch.candidates.iter().filter(|c| c.force_n != DVec3::ZERO) {
+            for (node, share) in self.compliance.places.parts(grid, candidate.node) {
+                let local = grid.frame(grid.node(node)).transpose() * (candidate.force_n * share);
+                *forces.entry(node).or_insert(DVec3::ZERO) += local;
+            }
+        }
+        let forces = forces.into_iter().collect();
         SurfaceField::new(Arc::clone(self.compliance), forces)
     }
 

@@ -47,6 +47,10 @@ impl Cornered for Face {
     }
 }
 
+/// Ways shorter than these parts of the mesh's size take the direction of the pseudonormal.
+const SHORT_OVER_FACE: f64 = 1e-6;
+const SHORT: f64 = 1e-10;
+
 /// What of a triangle is nearest to a point.
 #[derive(Clone, Copy)]
 enum Feature {
@@ -124,7 +128,10 @@ impl MeshDistance {
         let away = point - nearest;
         let length = away.length();
         let sign = if away.dot(normal) < 0.0 { -1.0 } else { 1.0 };
-        let outward = if length > 0.0 { away * (sign / length) } else { normal.normalize_or(DVec3::Z) };
+        // A short way is what rounding left of it, and has no direction; over a face that is the normal anyway.
+        let short = if matches!(feature, Feature::Face) { SHORT_OVER_FACE } else { SHORT };
+        let known = length > short * (self.radius_mm + self.center_mm.length());
+        let outward = if known { away * (sign / length) } else { normal.normalize_or(DVec3::Z) };
         Distance { value_mm: sign * length, outward }
     }
 }

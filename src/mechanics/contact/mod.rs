@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | [`Level::Geometric`] | what lies inside the object is pushed out of it; force of an elastic foundation | any shape; nothing outside the object moves |
 //! | [`Level::ClosedForm`] | Hertz' ellipse, Sneddon's cone, Mindlin's friction, with the bonded base's correction | smooth faces and apices, contacts well inside the face and the dome |
-//! | [`Level::Linear`] | linear elasticity of the whole dome bonded to the sheet, unilateral contact with Coulomb friction on the object's true surface | small strain |
+//! | [`Level::Linear`] | linear elasticity of the whole dome bonded to the sheet, unilateral contact with Coulomb friction on the object's true surface; where that is finer than the elements, on its faces as they come down | small strain; walls of half an element and more |
 //! | [`Level::NeoHookean`] | the same body at large strain | elements that collapse |
 //!
 //! Everything is in the *sensor* frame: origin at the centre of the dome's base, +z through the pole; lengths mm,
@@ -16,6 +16,7 @@ mod error;
 mod estimate;
 mod fem;
 mod field;
+mod finer;
 mod finite_body;
 mod geometric;
 mod hertz;
@@ -46,6 +47,8 @@ use std::sync::Arc;
 use crate::numeric::Rigid;
 use fem::Compliance;
 
+#[cfg(test)]
+mod finer_tests;
 #[cfg(test)]
 mod tests;
 

@@ -27,8 +27,10 @@ pub(super) struct Node {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Settled {
     pub sweeps: u32,
-    /// The most that the last sweep moved a node by its own force, mm.
+    /// The most that the last sweep over all nodes moved one by its own force, mm.
     pub change_mm: f64,
+    /// Multiplications.
+    pub work: f64,
 }
 
 /// A sum of products in eight lanes, in a fixed order.
@@ -70,8 +72,14 @@ fn own(rows: &[f64], width: usize, at: usize, normal: DVec3) -> Own {
     Own { block, normal: normal.dot(block * normal), along }
 }
 
-/// Sweeps over the nodes until one moves none by more than `wanted_mm`. `blocks` is the symmetric compliance, three
-/// rows and columns a node, row by row; `forces` starts and ends it, three numbers a node.
+/// Sweeps over the nodes that bear a force between two over all of them.
+const SWEEPS_OF_FEW: u32 = 12;
+
+/// Sweeps over the nodes until one over all of them moves none by more than `wanted_mm`. `blocks` is the symmetric
+/// compliance, three rows and columns a node, row by row; `forces` starts and ends it, three numbers a node.
+///
+/// Most nodes bear no force for long: between two sweeps over all, only those that do are looked at, with the part of
+/// the compliance that couples them.
 pub(super) fn sweeps(
     blocks: &[f64],
     nodes: &[Node],
@@ -84,30 +92,70 @@ pub(super) fn sweeps(
     let rows = |i: usize| &blocks[3 * i * width..3 * (i + 1) * width];
     let owns: Vec<Own> =
         nodes.iter().enumerate().map(|(i, n)| own(rows(i), width, 3 * i, n.normal)).collect();
-    let mut ended = Settled { sweeps: 0, change_mm: f64::INFINITY };
+    let mut ended = Settled { sweeps: 0, change_mm: f64::INFINITY, work: 0.0 };
+    let (mut bearing, mut few_blocks, mut few_forces): (Vec<usize>, Vec<f64>, Vec<f64>) = Default::default();
     while ended.change_mm > wanted_mm && ended.sweeps < most {
         ended.sweeps += 1;
+        ended.work += (width * width) as f64;
         ended.change_mm = 0.0;
         for (i, (node, own)) in nodes.iter().zip(&owns).enumerate() {
-            let old = DVec3::from_slice(&forces[3 * i..3 * i + 3]);
-            let mut u = displacement(rows(i), forces);
-            let pressed = old.dot(node.normal);
-            let gap = node.rest_gap_mm + node.normal.dot(u);
-            let press = (pressed - RELAXATION * gap / own.normal).max(0.0);
-            let mut rub = DVec3::ZERO;
-            if friction > 0.0 && press > 0.0 {
-                u += own.block * node.normal * (press - pressed);
-                let slip = u - node.carried_mm;
-                let along = |v: DVec3| v - node.normal * v.dot(node.normal);
-                rub = along(old - slip * (RELAXATION / own.along)).clamp_length_max(friction * press);
+            let change_mm = turn(rows(i), (node, own), friction, 3 * i, forces);
+            ended.change_mm = ended.change_mm.max(change_mm);
+        }
+        let bears = |i: &usize| forces[3 * i..3 * i + 3].iter().any(|f| *f != 0.0);
+        bearing.clear();
+        bearing.extend((0..nodes.len()).filter(bears));
+        if ended.change_mm <= wanted_mm || 4 * bearing.len() > 3 * nodes.len() {
+            continue;
+        }
+        let few = 3 * bearing.len();
+        few_blocks.clear();
+        few_forces.clear();
+        for &i in &bearing {
+            few_forces.extend_from_slice(&forces[3 * i..3 * i + 3]);
+            for row in rows(i).chunks_exact(width) {
+                for &j in &bearing {
+                    few_blocks.extend_from_slice(&row[3 * j..3 * j + 3]);
+                }
             }
-            let new = node.normal * press + rub;
-            if new != old {
-                let step = new - old;
-                ended.change_mm = ended.change_mm.max((own.block * step).length());
-                forces[3 * i..3 * i + 3].copy_from_slice(&new.to_array());
+        }
+        let (mut change_mm, mut count) = (f64::INFINITY, 0);
+        while change_mm > wanted_mm && count < SWEEPS_OF_FEW && ended.sweeps < most {
+            change_mm = 0.0;
+            count += 1;
+            ended.sweeps += 1;
+            for ((k, &i), rows) in bearing.iter().enumerate().zip(few_blocks.chunks_exact(3 * few)) {
+                change_mm =
+                    change_mm.max(turn(rows, (&nodes[i], &owns[i]), friction, 3 * k, &mut few_forces));
             }
+        }
+        ended.work += f64::from(count + 1) * (few * few) as f64;
+        for (&i, force) in bearing.iter().zip(few_forces.chunks_exact(3)) {
+            forces[3 * i..3 * i + 3].copy_from_slice(force);
         }
     }
     ended
+}
+
+/// A node takes the force that its gap and slip ask for, the others held; how far that moves it, mm. `rows` are its
+/// three of the compliance, `at` is the place of its force.
+fn turn(rows: &[f64], (node, own): (&Node, &Own), friction: f64, at: usize, forces: &mut [f64]) -> f64 {
+    let old = DVec3::from_slice(&forces[at..at + 3]);
+    let mut u = displacement(rows, forces);
+    let pressed = old.dot(node.normal);
+    let gap = node.rest_gap_mm + node.normal.dot(u);
+    let press = (pressed - RELAXATION * gap / own.normal).max(0.0);
+    let mut rub = DVec3::ZERO;
+    if friction > 0.0 && press > 0.0 {
+        u += own.block * node.normal * (press - pressed);
+        let slip = u - node.carried_mm;
+        let along = |v: DVec3| v - node.normal * v.dot(node.normal);
+        rub = along(old - slip * (RELAXATION / own.along)).clamp_length_max(friction * press);
+    }
+    let new = node.normal * press + rub;
+    if new == old {
+        return 0.0;
+    }
+    forces[at..at + 3].copy_from_slice(&new.to_array());
+    (own.block * (new - old)).length()
 }

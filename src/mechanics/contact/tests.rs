@@ -6,7 +6,7 @@ use super::*;
 use crate::mechanics::{EndType, Spring, SpringSpec, Suspension, SuspensionSpec};
 use crate::mesh::TriMesh;
 
-fn silicone() -> Elastomer {
+pub(super) fn silicone() -> Elastomer {
     Elastomer { dome_radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, friction: 0.6 }
 }
 
@@ -329,7 +329,7 @@ fn unusable_tasks_have_named_errors() {
 }
 
 /// A box of twelve triangles.
-fn box_mesh(size: DVec3) -> TriMesh {
+pub(super) fn box_mesh(size: DVec3) -> TriMesh {
     let corner = |i: u32| {
         let sign = |bit: u32| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
         DVec3::new(sign(0), sign(1), sign(2)) * size

@@ -52,6 +52,8 @@ pub(super) struct Candidate {
     pub rest_gap_mm: f64,
     /// Distance to the object where it is now.
     pub gap_mm: f64,
+    /// The face that has come over it, where that stays its plane.
+    pub face: Option<Face>,
     /// Where it would be carried if it stuck: displacement before, and the object's since they met.
     pub carried_mm: DVec3,
     /// Displacement in the frame before, and whether it touched the object then.
@@ -103,7 +105,24 @@ impl<'a> Way<'a> {
     }
 }
 
+/// A face of the object as a plane of its own frame, and the place of the dome that sees it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Face {
+    /// A point of the face and its outward normal, in the object's frame.
+    pub at_object_mm: DVec3,
+    pub normal_object: DVec3,
+    /// The place that the gap is measured from: the middle of the node's hat, sensor frame.
+    pub from_mm: DVec3,
+}
+
 impl Candidate {
+    /// Lays the plane of its face where the object is; the plane goes with the object.
+    pub fn follow_face(&mut self, sensor_from_object: &Rigid) {
+        let Some(face) = self.face else { return };
+        self.normal = sensor_from_object.vector(face.normal_object);
+        self.rest_gap_mm = self.normal.dot(face.from_mm - sensor_from_object.point(face.at_object_mm));
+    }
+
     /// A node at rest, on its first plane: where a walk along the dome's inward normal leaves the object.
     pub fn new(
         (node, at_mm, area_mm2, spread_mm): (usize, DVec3, f64, [DVec3; 2]),
@@ -125,6 +144,7 @@ impl Candidate {
             normal: DVec3::Z,
             rest_gap_mm: 0.0,
             gap_mm: 0.0,
+            face: None,
             carried_mm: DVec3::ZERO,
             was_mm: match (memory, way.before) {
                 (Some(memory), _) => memory.displacement_mm,
@@ -154,6 +174,9 @@ impl Candidate {
     /// places that have the hat's second moments. A node stands for a patch; measured at its middle alone, the gap of
     /// two round bodies would be short by a twelfth of their relative curvature times the patch's area.
     pub fn gap(&self, placed: &Placed) -> (f64, DVec3) {
+        if self.face.is_some() {
+            return (self.rest_gap_mm + self.normal.dot(self.u_mm), self.normal);
+        }
         let (mut distance, mut outward) = (0.0, DVec3::ZERO);
         for [u, v] in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
             let beside = self.at_mm + self.spread_mm[0] * u + self.spread_mm[1] * v;
@@ -218,6 +241,9 @@ impl<'a> Touch<'a> {
         for candidate in &mut self.candidates {
             let (distance, outward) = candidate.gap(&self.placed);
             candidate.gap_mm = distance;
+            if candidate.face.is_some() {
+                continue;
+            }
             candidate.normal = candidate.normal.lerp(outward, part).normalize_or(outward);
             candidate.rest_gap_mm = distance - candidate.normal.dot(candidate.u_mm);
         }
@@ -269,7 +295,7 @@ impl<'a> Touch<'a> {
             .collect();
         let ended =
             sweeps(&self.blocks, &nodes, self.elastomer.friction, &mut forces, wanted_mm, MOST_SWEEPS);
-        self.work += f64::from(ended.sweeps) * (forces.len() * forces.len()) as f64;
+        self.work += ended.work;
         for (candidate, force) in self.candidates.iter_mut().zip(forces.chunks_exact(3)) {
             candidate.force_n = DVec3::from_slice(force);
         }

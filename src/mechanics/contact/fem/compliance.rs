@@ -6,6 +6,7 @@ use faer::Mat;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+use super::between::Places;
 use super::body::Body;
 use super::grid::{Grid, GridNode};
 use crate::mechanics::contact::{ContactError, Elastomer};
@@ -17,6 +18,8 @@ const AXES: usize = 3;
 #[derive(Debug)]
 pub(crate) struct Compliance {
     pub grid: Grid,
+    /// Places between its nodes.
+    pub places: Places,
     /// For ring pairs i >= j and azimuth steps 0..=azimuths/2: displacement at ring i for a force at ring j, the
     /// azimuth of i less that of j, row by row, mm/N.
     table: Vec<[f64; 9]>,
@@ -49,7 +52,8 @@ impl Compliance {
             fill_pair(&grid, &solved, i, j, entries);
         });
         let spectrum = solved.into_iter().map(|(spectrum, _)| spectrum).collect();
-        Ok(Self { grid, table, spectrum })
+        let places = Places::new(&grid);
+        Ok(Self { grid, places, table, spectrum })
     }
 
     /// Displacement at node `at` for a unit force at node `by`, each in its own frame (r, z, phi), mm/N.

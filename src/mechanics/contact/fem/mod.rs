@@ -5,6 +5,7 @@
 //! frame lives on the surface: forces on the nodes of a [`grid`], and the field that they make ([`field`]). Loads that are the same at
 //! every azimuth need one harmonic only ([`revolved`]).
 
+mod between;
 mod body;
 mod compliance;
 mod element;

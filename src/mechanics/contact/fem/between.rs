@@ -1,0 +1,112 @@
+//! Places of the surface halfway between neighbouring nodes: there an object finer than the nodes is met.
+//!
+//! On a ring they lie between its nodes, between two rings at the azimuths of the nodes. What lies in the middle of four
+//! nodes is the mean of such places, and would only say again what they say.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::grid::Grid;
+
+/// Rows of places to a ring of nodes.
+const FINER: usize = 2;
+
+/// The places of a grid, numbered after its nodes.
+#[derive(Debug, Clone)]
+pub(crate) struct Places {
+    /// Places of each row, and the number of its first; an even row lies on a ring of nodes and has the places between
+    /// them.
+    counts: Vec<usize>,
+    first: Vec<usize>,
+}
+
+/// One row of places.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    /// Number of its first place, and how many there are.
+    pub first: usize,
+    pub count: usize,
+    /// Their distance, mm.
+    pub step_mm: f64,
+    /// The surface that each stands for among the places, mm2.
+    pub area_mm2: f64,
+}
+
+impl Places {
+    pub fn new(grid: &Grid) -> Self {
+        let (mut counts, mut first, mut next) = (Vec::new(), Vec::new(), grid.len());
+        for row in 0..FINER * grid.elements {
+            let ring = row / FINER;
+            let count = match (row % FINER, ring) {
+                (0, 0) => 0,
+                (0, _) => grid.counts[ring],
+                _ => grid.counts[ring].max(grid.counts.get(ring + 1).copied().unwrap_or(0)),
+            };
+            counts.push(count);
+            first.push(next);
+            next += count;
+        }
+        Self { counts, first }
+    }
+
+    /// The rows with their places.
+    pub fn rows(&self, grid: &Grid) -> impl Iterator<Item = Row> + '_ {
+        let (radius_mm, elements) = (grid.radius_mm, grid.elements);
+        self.counts.iter().zip(&self.first).enumerate().map(move |(row, (&count, &first))| {
+            let polar = polar_of(row, elements);
+            let step_mm = if count > 0 { polar.sin() * radius_mm * TAU / count as f64 } else { 0.0 };
+            let band_mm = radius_mm * std::f64::consts::FRAC_PI_2 / (FINER * elements) as f64;
+            Row { first, count, step_mm, area_mm2: step_mm * band_mm }
+        })
+    }
+
+    /// Row, polar angle and azimuth of a number beyond the nodes'.
+    fn angles(&self, grid: &Grid, number: usize) -> (usize, f64, f64) {
+        let row = self.first.partition_point(|first| *first <= number).saturating_sub(1);
+        let count = self.counts.get(row).copied().unwrap_or(1).max(1) as f64;
+        let along = (number - self.first.get(row).copied().unwrap_or(number)) as f64;
+        // On a ring the nodes lie at the whole steps.
+        let along = if row % FINER == 0 { along + 0.5 } else { along };
+        (row, polar_of(row, grid.elements), TAU * along / count)
+    }
+
+    /// Where a node or a place lies on the dome, mm.
+    pub fn place(&self, grid: &Grid, number: usize) -> DVec3 {
+        if number < grid.len() {
+            return grid.place(grid.node(number));
+        }
+        let (_, polar, azimuth) = self.angles(grid, number);
+        let ((sine, cosine), (s, c)) = (polar.sin_cos(), azimuth.sin_cos());
+        DVec3::new(sine * c, sine * s, cosine) * grid.radius_mm
+    }
+
+    /// The nodes that tell what a place moves by, with their shares: bilinear, towards zero at the bonded rim. A force
+    /// on the place is shared out alike.
+    pub fn parts(&self, grid: &Grid, number: usize) -> Vec<(usize, f64)> {
+        if number < grid.len() {
+            return vec![(number, 1.0)];
+        }
+        let (row, _, azimuth) = self.angles(grid, number);
+        let (ring, over) = (row / FINER, (row % FINER) as f64 / FINER as f64);
+        let mut parts: Vec<(usize, f64)> = Vec::with_capacity(4);
+        for (ring, weight) in [(ring, 1.0 - over), (ring + 1, over)] {
+            let Some(&count) = grid.counts.get(ring).filter(|_| weight > 0.0) else { continue };
+            let along = azimuth / TAU * count as f64;
+            let (at, part) = (along.floor(), along - along.floor());
+            for (step, share) in [(at as usize, 1.0 - part), (at as usize + 1, part)] {
+                let number = grid.first[ring] + step % count;
+                match parts.iter_mut().find(|(known, _)| *known == number) {
+                    Some((_, sum)) => *sum += weight * share,
+                    None if share > 0.0 => parts.push((number, weight * share)),
+                    None => {}
+                }
+            }
+        }
+        parts
+    }
+}
+
+fn polar_of(row: usize, elements: usize) -> f64 {
+    std::f64::consts::FRAC_PI_2 * row as f64 / (FINER * elements) as f64
+}

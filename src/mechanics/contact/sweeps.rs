@@ -105,7 +105,7 @@ pub(super) fn sweeps(
         let bears = |i: &usize| forces[3 * i..3 * i + 3].iter().any(|f| *f != 0.0);
         bearing.clear();
         bearing.extend((0..nodes.len()).filter(bears));
-        if ended.change_mm <= wanted_mm || 4 * bearing.len() > 3 * nodes.len() {
+        if ended.change_mm <= wanted_mm || bearing.is_empty() || 4 * bearing.len() > 3 * nodes.len() {
             continue;
         }
         let few = 3 * bearing.len();

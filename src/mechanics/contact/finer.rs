@@ -5,7 +5,8 @@
 //! nodes and missed by others, and its nearest face is a flank. Where that is so, the object is taken as the faces that
 //! a look along its way into the dome shows, each place keeps the face that has come over it, and places between the
 //! nodes take part ([`super::fem::Places`]). The task is then convex: it has one answer, which follows the pose smoothly.
-//! Flanks steeper than [`FACING`] do not push.
+//! Flanks steeper than [`FACING`] do not push. Forces are those of the surface that the nodes carry: a pressure is a force
+//! over a node's area, and less than that of an edge.
 
 use std::collections::BTreeMap;
 
@@ -18,6 +19,8 @@ use super::touch::Face;
 /// A place between the nodes takes part where the object reaches deeper than the nodes tell by more than this part of
 /// their distance. A ball does so where its radius is below 1.25 of them.
 const UNSEEN: f64 = 0.1;
+/// Balls of so many of the nodes' distances are looked at no closer.
+const ROUND: f64 = 2.0;
 /// Faces this far ahead of the dome take part as well, as a part of the nodes' distance: more than a pose may move
 /// before all is looked at anew.
 const AHEAD: f64 = 0.75;
@@ -43,6 +46,9 @@ struct Over {
 pub(super) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Fine>, f64) {
     let (grid, places) = (&compliance.grid, &compliance.places);
     let spacing_mm = grid.radius_mm * std::f64::consts::FRAC_PI_2 / grid.elements as f64;
+    if placed.ball().is_some_and(|(_, radius_mm)| radius_mm > ROUND * spacing_mm) {
+        return (None, 0.0);
+    }
     let ahead_mm = AHEAD * spacing_mm;
     let (mut near, mut queries) = (Vec::new(), 0.0);
     let mut inward = DVec3::ZERO;

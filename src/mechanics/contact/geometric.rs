@@ -48,7 +48,7 @@ impl Placed {
     }
 
     /// Centre and radius, if the object is a ball.
-    fn ball(&self) -> Option<(DVec3, f64)> {
+    pub fn ball(&self) -> Option<(DVec3, f64)> {
         self.solid.is_ball().then(|| {
             let (center, radius_mm) = self.solid.bounding_sphere();
             (self.sensor_from_object.point(center), radius_mm)

@@ -23,6 +23,7 @@ mod picture;
 pub mod pipeline;
 mod plan;
 mod render;
+mod rests;
 mod rolled;
 pub mod run;
 pub mod scene;

@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use super::fem::Compliance;
 use super::geometric::Placed;
-use super::touch::Face;
+use super::touch::{Face, hat_places};
 
 /// A place between the nodes takes part where the object reaches deeper than the nodes tell by more than this part of
 /// their distance. A ball does so where its radius is below 1.25 of them.
@@ -27,12 +27,8 @@ const AHEAD: f64 = 0.75;
 /// Least cosine between a face's outward normal and the way into the dome.
 const FACING: f64 = 0.3;
 
-/// What takes part where an object is finer than the nodes.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Fine {
-    /// Nodes and places by number, each with its face.
-    pub faces: BTreeMap<usize, Face>,
-}
+/// What takes part where an object is finer than the nodes: nodes and places by number, each with its face.
+pub(super) type Faces = BTreeMap<usize, Face>;
 
 /// A face over a place: a point of it, its outward normal, and the place's signed distance.
 #[derive(Clone, Copy)]
@@ -43,7 +39,7 @@ struct Over {
 }
 
 /// The faces of an object over the dome, if it is finer than the nodes there; and the distances asked for.
-pub(super) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Fine>, f64) {
+pub(super) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, f64) {
     let (grid, places) = (&compliance.grid, &compliance.places);
     let spacing_mm = grid.radius_mm * std::f64::consts::FRAC_PI_2 / grid.elements as f64;
     if placed.ball().is_some_and(|(_, radius_mm)| radius_mm > ROUND * spacing_mm) {
@@ -103,11 +99,7 @@ pub(super) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Fine>, f
     for (number, seen) in nodes {
         let Some(seen) = seen else { continue };
         let node = grid.node(number);
-        let (at_mm, spread_mm) = (grid.place(node), grid.spread(node));
-        let hat = [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|[u, v]| {
-            let beside = at_mm + spread_mm[0] * u + spread_mm[1] * v;
-            beside * (grid.radius_mm / beside.length())
-        });
+        let hat = hat_places(grid.place(node), grid.spread(node));
         // What its hat tells of a node, a wall that runs over it does not show in.
         let told_mm: f64 =
             hat.iter().map(|at_mm| over(*at_mm).map_or(0.25 * ahead_mm, |over| 0.25 * over.gap_mm)).sum();
@@ -126,5 +118,5 @@ pub(super) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Fine>, f
         normal_object: object_from_sensor.vector(over.normal),
         from_mm,
     };
-    (Some(Fine { faces: faces.into_iter().map(|(number, seen)| (number, face(seen))).collect() }), queries)
+    (Some(faces.into_iter().map(|(number, seen)| (number, face(seen))).collect()), queries)
 }

@@ -9,7 +9,7 @@ use super::elastomer::{Elastomer, Indenter};
 use super::error::ContactError;
 use super::fem::{Compliance, SurfaceField};
 use super::field::Field;
-use super::finer::{Fine, fine};
+use super::finer::{Faces, fine};
 use super::geometric::{Placed, deepest, deepest_from};
 use super::local::DEEPEST;
 use super::state::{ContactState, Status};
@@ -31,7 +31,7 @@ pub(super) struct Solver<'a> {
     /// Object, place of the deepest node, and the margin that the candidates were chosen for.
     looked: Option<(Rigid, DVec3, f64)>,
     /// What takes part instead of the nodes near by where the object is finer than they are.
-    fine: Option<Fine>,
+    fine: Option<Faces>,
 }
 
 impl<'a> Solver<'a> {
@@ -167,10 +167,10 @@ impl<'a> Solver<'a> {
         (self.fine, queries) = fine(&self.touch.placed, self.compliance);
         self.touch.work += 30.0 * queries;
         if let Some(fine) = &self.fine {
-            let chosen: Vec<usize> = fine.faces.keys().copied().collect();
+            let chosen: Vec<usize> = fine.keys().copied().collect();
             let sensor_from_object = self.touch.placed.sensor_from_object();
             self.touch.candidates.retain_mut(|candidate| {
-                candidate.face = fine.faces.get(&candidate.node).copied();
+                candidate.face = fine.get(&candidate.node).copied();
                 candidate.follow_face(&sensor_from_object);
                 candidate.face.is_some()
             });
@@ -234,7 +234,7 @@ impl<'a> Solver<'a> {
                 if number < grid.len() { grid.spread(grid.node(number)) } else { [DVec3::ZERO; 2] };
             let place = (number, self.compliance.places.place(grid, number), area_mm2, spread_mm);
             let mut candidate = Candidate::new(place, &touch.placed, way, touch.sharing)?;
-            candidate.face = self.fine.as_ref().and_then(|fine| fine.faces.get(&number)).copied();
+            candidate.face = self.fine.as_ref().and_then(|fine| fine.get(&number)).copied();
             candidate.follow_face(&touch.placed.sensor_from_object());
             touch.candidates.push(candidate);
         }

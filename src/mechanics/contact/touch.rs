@@ -105,6 +105,15 @@ impl<'a> Way<'a> {
     }
 }
 
+/// Four places of the dome that have the second moments of a node's hat.
+pub(super) fn hat_places(at_mm: DVec3, spread_mm: [DVec3; 2]) -> [DVec3; 4] {
+    [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|[u, v]| {
+        let beside = at_mm + spread_mm[0] * u + spread_mm[1] * v;
+        // Back on the dome.
+        beside * (at_mm.length() / beside.length())
+    })
+}
+
 /// A face of the object as a plane of its own frame, and the place of the dome that sees it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Face {
@@ -174,14 +183,8 @@ impl Candidate {
     /// places that have the hat's second moments. A node stands for a patch; measured at its middle alone, the gap of
     /// two round bodies would be short by a twelfth of their relative curvature times the patch's area.
     pub fn gap(&self, placed: &Placed) -> (f64, DVec3) {
-        if self.face.is_some() {
-            return (self.rest_gap_mm + self.normal.dot(self.u_mm), self.normal);
-        }
         let (mut distance, mut outward) = (0.0, DVec3::ZERO);
-        for [u, v] in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
-            let beside = self.at_mm + self.spread_mm[0] * u + self.spread_mm[1] * v;
-            // Back on the dome.
-            let place = beside * (self.at_mm.length() / beside.length());
+        for place in hat_places(self.at_mm, self.spread_mm) {
             let (d, n) = placed.distance(place + self.u_mm);
             distance += 0.25 * d;
             outward += n;
@@ -239,11 +242,12 @@ impl<'a> Touch<'a> {
     /// Distances where the nodes are now, and planes there, turned from the last ones by a part of the way.
     fn lay_planes(&mut self, part: f64) {
         for candidate in &mut self.candidates {
-            let (distance, outward) = candidate.gap(&self.placed);
-            candidate.gap_mm = distance;
             if candidate.face.is_some() {
+                candidate.gap_mm = candidate.rest_gap_mm + candidate.normal.dot(candidate.u_mm);
                 continue;
             }
+            let (distance, outward) = candidate.gap(&self.placed);
+            candidate.gap_mm = distance;
             candidate.normal = candidate.normal.lerp(outward, part).normalize_or(outward);
             candidate.rest_gap_mm = distance - candidate.normal.dot(candidate.u_mm);
         }

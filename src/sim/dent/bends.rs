@@ -4,14 +4,8 @@ use std::ops::Range;
 
 use glam::Vec4;
 
+use crate::sim::rests::{largest, rest};
 use crate::sim::shading::Turned;
-
-/// A parabola through three nodes leaves a third derivative times the cube of their distance over this: 9 times the root
-/// of 3.
-const REST: f32 = 15.59;
-/// Two parabolas' rests, one across the other: the second sees the first one's through its weights, whose sizes add to at
-/// most 1.25.
-const BOTH: f32 = 2.25;
 
 /// Bounds of a spline by cell, at the place of the cell's lower node.
 #[derive(Debug, Clone, Default)]
@@ -103,25 +97,17 @@ impl Bends {
     }
 
     /// The most that anything moves in some cells, mm.
-    pub fn farthest(&self, nodes: usize, cells: &[Range<usize>; 2]) -> f32 {
-        largest(&self.moved, nodes, cells)
+    pub fn farthest(&self, nodes: usize, [columns, rows]: &[Range<usize>; 2]) -> f32 {
+        largest(&self.moved, nodes, columns, rows)
     }
 
     /// Over some cells, with nodes so many cells apart.
-    pub fn over(&self, nodes: usize, cells: &[Range<usize>; 2], apart: f32) -> Turned {
+    pub fn over(&self, nodes: usize, [columns, rows]: &[Range<usize>; 2], apart: f32) -> Turned {
+        let most = |table: &[f32]| largest(table, nodes, columns, rows);
         Turned {
-            tilt_rad: BOTH * largest(&self.third, nodes, cells) * apart * apart * apart / REST,
-            slope: largest(&self.slope, nodes, cells),
-            moved_mm: largest(&self.moved, nodes, cells),
+            tilt_rad: rest(most(&self.third), apart),
+            slope: most(&self.slope),
+            moved_mm: most(&self.moved),
         }
     }
-}
-
-fn largest(table: &[f32], nodes: usize, [columns, rows]: &[Range<usize>; 2]) -> f32 {
-    let row = |row: usize| {
-        let row = table.get(row * nodes + columns.start..row * nodes + columns.end).unwrap_or_default();
-        // Plain choices, of which machines make several at once; no value is NaN.
-        row.iter().fold(0.0_f32, |a, b| if *b > a { *b } else { a })
-    };
-    rows.clone().map(row).fold(0.0, f32::max)
 }

@@ -198,7 +198,7 @@ impl<const N: usize> Lit<N> {
         let mut places = [DVec3::ZERO; 4];
         for (place, (x, y)) in places.iter_mut().zip(corners) {
             *place = if is_whole {
-                self.told(largest, (x - largest.0, y - largest.1), |motion| motion.place_mm).as_dvec3()
+                self.told(largest, (x - largest.0, y - largest.1), |motion| [motion.place_mm])[0].as_dvec3()
             } else {
                 seen.optics.follow_continued(surface.rays?.at(x, y)?).ok()?.0
             };
@@ -222,29 +222,31 @@ impl<const N: usize> Lit<N> {
         Some(Bend { most: still + more, is_inside })
     }
 
-    /// A part of the motion at a pixel of a largest square, by the parabolas through its nine nodes.
-    fn told(
+    /// Parts of the motion at a pixel of a largest square, by the parabolas through its nine nodes.
+    fn told<const K: usize>(
         &self,
         (x, y): (usize, usize),
         (dx, dy): (usize, usize),
-        part: impl Fn(&Motion) -> Vec3A,
-    ) -> Vec3A {
+        parts: impl Fn(&Motion) -> [Vec3A; K],
+    ) -> [Vec3A; K] {
         let (wx, wy) = (WEIGHTS[dx.min(LARGEST)], WEIGHTS[dy.min(LARGEST)]);
         let across = self.kept_across();
         let start = y / KEPT_STEP * across + x / KEPT_STEP;
-        let mut sum = Vec3A::ZERO;
+        let mut sums = [Vec3A::ZERO; K];
         for (j, wy) in wy.iter().enumerate() {
             let row = self.motions.get(start + j * across..start + j * across + 3).unwrap_or_default();
             for (node, wx) in row.iter().zip(wx) {
-                sum += part(node) * (wx * wy);
+                for (sum, part) in sums.iter_mut().zip(parts(node)) {
+                    *sum += part * (wx * wy);
+                }
             }
         }
-        sum
+        sums
     }
 
     /// How the membrane moves about a pixel of a largest square whose nodes are known, mm: there a search begins.
     pub(super) fn foretold_mm(&self, corner: (usize, usize), (x, y): (usize, usize)) -> DVec3 {
-        self.told(corner, (x - corner.0, y - corner.1), |motion| motion.moved_mm).as_dvec3()
+        self.told(corner, (x - corner.0, y - corner.1), |motion| [motion.moved_mm])[0].as_dvec3()
     }
 
     /// Whether all nine nodes of a largest square have rays; not before they are known.
@@ -253,19 +255,9 @@ impl<const N: usize> Lit<N> {
     }
 
     /// The motion at a place of a largest square, by the parabolas through its nine nodes.
-    pub(super) fn motion(&self, (x, y): (usize, usize), (dx, dy): (usize, usize)) -> Motion {
-        let (wx, wy) = (WEIGHTS[dx.min(LARGEST)], WEIGHTS[dy.min(LARGEST)]);
-        let across = self.kept_across();
-        let start = y / KEPT_STEP * across + x / KEPT_STEP;
-        let mut sum = Motion::default();
-        for (j, wy) in wy.iter().enumerate() {
-            let row = self.motions.get(start + j * across..start + j * across + 3).unwrap_or_default();
-            for (node, wx) in row.iter().zip(wx) {
-                sum.shift_mm += node.shift_mm * (wx * wy);
-                sum.tilt += node.tilt * (wx * wy);
-                sum.change += node.change * (wx * wy);
-            }
-        }
-        sum
+    pub(super) fn motion(&self, corner: (usize, usize), place: (usize, usize)) -> Motion {
+        let parts = |motion: &Motion| [motion.shift_mm, motion.tilt, motion.change];
+        let [shift_mm, tilt, change] = self.told(corner, place, parts);
+        Motion { shift_mm, tilt, change, ..Motion::default() }
     }
 }

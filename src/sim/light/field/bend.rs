@@ -4,14 +4,9 @@ use glam::{DVec2, DVec3, Vec3A, Vec4};
 
 use super::super::dome_map::{DomeGrid, disc_continued};
 use super::{LightField, ShellNode};
+use crate::sim::rests::{BOTH, largest, rest};
 use crate::sim::shading::Turned;
 
-/// A parabola through three nodes leaves a third derivative times the cube of their distance over this: 9 times the root
-/// of 3.
-const REST: f32 = 15.59;
-/// Two parabolas' rests, one across the other: the second sees the first one's through its weights, whose sizes add to at
-/// most 1.25.
-const BOTH: f32 = 2.25;
 /// A kink between a parabola's nodes leaves at most this part of the change of slope times their distance: 3/16.
 const KINK: f32 = 0.1875;
 /// Straight pieces leave at most an eighth of the second difference, and the parabola through them that much and a quarter
@@ -97,7 +92,7 @@ impl LightField {
     pub fn bend(&self, directions: &[DVec3]) -> f32 {
         let (low, high) = self.cells(&self.grid, directions);
         let apart = 0.5 * (high - low).max_element() as f32;
-        BOTH * largest(&self.bends.third, self.grid.nodes, low, high) * apart * apart * apart / REST
+        rest(most(&self.bends.third, self.grid.nodes, low, high), apart)
     }
 
     /// The same for what the shells add where the membrane has moved: their kinks, and what they give a normal that is not
@@ -108,8 +103,8 @@ impl LightField {
         }
         let (low, high) = self.cells(&self.shell_grid, directions);
         let apart = 0.5 * (high - low).max_element() as f32;
-        let kink = largest(&self.bends.kink, self.shell_grid.nodes, low, high + 1.0);
-        let turn = largest(&self.bends.turn, self.shell_grid.nodes, low, high + 1.0);
+        let kink = most(&self.bends.kink, self.shell_grid.nodes, low, high + 1.0);
+        let turn = most(&self.bends.turn, self.shell_grid.nodes, low, high + 1.0);
         // Near the undeformed membrane its own smooth table stands in for the outer shell.
         let part = (2.0 * turned.slope + NEAR * turned.moved_mm / self.radius_mm as f32).min(1.0);
         let kinks = BOTH * (KINK * apart * (2.0 * apart + 1.0)).min(PIECES) * kink * part;
@@ -129,13 +124,11 @@ impl LightField {
     }
 }
 
-fn largest(table: &[f32], nodes: usize, low: DVec2, high: DVec2) -> f32 {
-    let row = |row: usize| {
-        let row = table.get(row * nodes + low.x as usize..=row * nodes + high.x as usize).unwrap_or_default();
-        // Plain choices, of which machines make several at once; no value is NaN.
-        row.iter().fold(0.0_f32, |a, b| if *b > a { *b } else { a })
-    };
-    (low.y as usize..=high.y as usize).map(row).fold(0.0, f32::max)
+/// The largest value in a box of cells.
+fn most(table: &[f32], nodes: usize, low: DVec2, high: DVec2) -> f32 {
+    let [columns, rows] =
+        [(low.x, high.x), (low.y, high.y)].map(|(low, high)| low as usize..high as usize + 1);
+    largest(table, nodes, &columns, &rows)
 }
 
 /// Turns the values of a square table into the coefficients of the cubic spline through them, along each row, then each

@@ -105,7 +105,7 @@ const RAY_WEIGHTS: [[f64; 4]; RAY_STEP] = {
 };
 
 /// Lagrange's weights of values at -1, 0, 1 and 2.
-const fn lagrange(t: f64) -> [f64; 4] {
+pub(super) const fn lagrange(t: f64) -> [f64; 4] {
     let (p, q, r) = (t + 1.0, t - 1.0, t - 2.0);
     [-t * q * r / 6.0, p * q * r / 2.0, -p * t * r / 2.0, p * t * q / 6.0]
 }

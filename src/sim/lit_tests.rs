@@ -64,11 +64,11 @@ fn levels(scene: &Scene, frame: u32, tolerances: &[f32]) -> (Vec<Levels>, Vec<(u
     let shading = pipeline.shading.as_deref().unwrap();
     let slices = [LitSlice { end: height, optics, dent: instant.shape.dent.as_ref() }];
     let center = DVec2::new(width as f64, height as f64) * 0.5;
-    let mut lit = Lit::<3>::default();
+    let mut lit = Lit::default();
     let mut places = Vec::new();
     let mut filled = |tolerance: f32| {
         let surface =
-            LitSurface { slices: &slices, rays: Some(field.rays()), shading, channel: 0, tolerance };
+            LitSurface { slices: &slices, rays: Some(field.rays()), shading, channels: 0..3, tolerance };
         let mut spent = Work::default();
         lit.fill(&surface, (width, height), &spans, &mut spent);
         let rays = spent.of(EffectName::Fresnel) / light::shade::LEAVING_UNITS;
@@ -78,9 +78,9 @@ fn levels(scene: &Scene, frame: u32, tolerances: &[f32]) -> (Vec<Levels>, Vec<(u
             let columns = spans[y].clone();
             let shares = &part[columns.start - x..columns.end - x];
             lit.complete(y, columns.clone(), shares, center);
-            let lanes = [0, 1, 2].map(|lane| lit.row(lane, y, columns.clone()));
+            let found = lit.row(y, columns.clone());
             for k in (0..columns.len()).filter(|k| shares[*k] > LEAST_SHARE) {
-                out.push([lanes[0][k], lanes[1][k], lanes[2][k]]);
+                out.push([found[k].x, found[k].y, found[k].z]);
                 places.push((columns.start + k, y));
             }
         }

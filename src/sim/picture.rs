@@ -39,8 +39,7 @@ pub struct Painter {
     /// Rows whose surround is laid with the membrane.
     later: Vec<bool>,
     spans: Vec<Range<usize>>,
-    one: Lit<1>,
-    three: Lit<3>,
+    lit: Lit,
 }
 
 impl Painter {
@@ -168,24 +167,16 @@ impl Painter {
             slices: &seen,
             rays: Some(parts.field.rays()),
             shading,
-            channel: channels.start,
+            channels: channels.clone(),
             tolerance: parts.pipeline.fill_tolerance,
         };
         let at = |k: usize| 0.5 * (low[k].min(high[k]) + high[k]) as f64;
         let center = DVec2::new(at(0), at(1));
-        if channels.len() == 3 {
-            self.three.fill(&surface, (width, height), &self.spans, work);
-        } else {
-            self.one.fill(&surface, (width, height), &self.spans, work);
-        }
+        self.lit.fill(&surface, (width, height), &self.spans, work);
+        let surround = (channels.len() == 3).then(|| Surround::of(parts));
         for (dome, slice) in self.domes.iter().zip(slices) {
             let over = (dome, &slice.rows());
-            if channels.len() == 3 {
-                let ground = (parts.field, Some(Surround::of(parts)));
-                blend(&mut self.three, over, ground, center, frame, channels.start);
-            } else {
-                blend(&mut self.one, over, (parts.field, None), center, frame, channels.start);
-            }
+            blend(&mut self.lit, over, (parts.field, surround), center, frame, channels.clone());
             work.add_base(dome.area() as u64 * units::PIXEL * channels.len() as u64);
         }
     }
@@ -291,13 +282,13 @@ impl<'a> Surround<'a> {
 }
 
 /// Lays the lit membrane over the ground.
-fn blend<const N: usize>(
-    lit: &mut Lit<N>,
+fn blend(
+    lit: &mut Lit,
     (coverage, rows): (&Coverage, &Range<usize>),
     (field, surround): (&LensField, Option<Surround<'_>>),
     center: DVec2,
     frame: &mut Frame,
-    first: usize,
+    channels: Range<usize>,
 ) {
     let (width, height) = (frame.width(), frame.height());
     for (y, x, part) in coverage.rows(width, height).filter(|(y, ..)| rows.contains(y)) {
@@ -305,15 +296,15 @@ fn blend<const N: usize>(
         lit.complete(y, seen.clone(), part, center);
         let whole = whole_of(part);
         let (left, right) = (seen.start + whole.start, seen.start + whole.end);
+        let levels = lit.row(y, seen.clone());
         // A picture has one plane or three.
-        for (lane, plane) in frame.planes.iter_mut().skip(first).take(N).enumerate() {
+        for (lane, plane) in frame.planes.iter_mut().enumerate().take(channels.end).skip(channels.start) {
             let Some(row) = plane.get_mut(y * width..(y + 1) * width) else { continue };
             if let Some(surround) = surround {
                 surround.lay(y, row, 0..left);
                 surround.lay(y, row, right..width);
             }
             let Some(values) = row.get_mut(seen.clone()) else { continue };
-            let levels = lit.row(lane, y, seen.clone());
             let edge = |values: &mut [f32], columns: Range<usize>| {
                 let (Some(values), Some(part), Some(levels)) =
                     (values.get_mut(columns.clone()), part.get(columns.clone()), levels.get(columns))
@@ -321,13 +312,13 @@ fn blend<const N: usize>(
                     return;
                 };
                 for ((value, share), level) in values.iter_mut().zip(part).zip(levels) {
-                    *value += share * (level - *value);
+                    *value += share * (level[lane] - *value);
                 }
             };
             edge(values, 0..whole.start);
             edge(values, whole.end..part.len());
             if let (Some(values), Some(levels)) = (values.get_mut(whole.clone()), levels.get(whole.clone())) {
-                values.copy_from_slice(levels);
+                values.iter_mut().zip(levels).for_each(|(value, level)| *value = level[lane]);
             }
         }
     }

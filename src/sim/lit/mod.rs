@@ -12,13 +12,16 @@
 
 mod motion;
 mod points;
+mod rays;
+mod settle;
 mod smooth;
 
 use std::ops::Range;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec4};
 
-use self::motion::{Motion, Square};
+use self::motion::{Motion, SMALLEST, Square};
+use self::rays::Rays;
 use self::smooth::Verdict;
 use super::coverage::LEAST_SHARE;
 use super::dent::Dent;
@@ -42,6 +45,8 @@ const MISSED: usize = 8;
 pub(super) mod units {
     /// A ray through lens, layers and dome.
     pub const RAY: u64 = 60;
+    /// The same told from nine nodes.
+    pub const TOLD_RAY: u64 = 12;
     /// Its way to the deformed membrane.
     pub const DENT: u64 = 250;
     /// The same told from nine nodes.
@@ -60,17 +65,23 @@ enum Known {
     Misses,
 }
 
-/// Brightness of the membrane over the picture, for `N` channels that share their rays.
-#[derive(Debug, Clone)]
-pub struct Lit<const N: usize> {
+/// Brightness of the membrane over the picture, for channels that share their rays.
+#[derive(Debug, Clone, Default)]
+pub struct Lit {
     width: usize,
     height: usize,
-    /// Channel by channel.
-    levels: [Vec<f32>; N],
+    /// Red, green and blue; the fourth number is nothing.
+    levels: Vec<Vec4>,
+    /// 1 for the channels whose brightness is asked, else 0.
+    asked: Vec4,
     known: Vec<Known>,
-    /// How the membrane moved at the nodes of the largest squares; only where it did.
+    /// Rays and motions of nodes.
     motions: Vec<Motion>,
+    /// Of each pixel that may be a node, which of these is its own.
+    kept: Vec<u32>,
+    /// By the smallest squares of which something is known as a whole.
     squares: Vec<Square>,
+    rays: Vec<Rays>,
     /// The motion of the pixel that was asked last, mm.
     moved_mm: DVec3,
     samples: Vec<SurfaceSample>,
@@ -87,8 +98,8 @@ pub struct LitSurface<'a> {
     pub rays: Option<&'a LensRays>,
     /// The light.
     pub shading: &'a dyn Shading,
-    /// The first channel whose brightness is wanted, 0 to 2.
-    pub channel: usize,
+    /// The channels whose brightness is wanted, of 0 to 2.
+    pub channels: Range<usize>,
     /// How far a pixel that is filled in may be from what its own ray shows, full scales; with 0 every pixel has its own
     /// ray, followed all the way.
     pub tolerance: f32,
@@ -102,6 +113,18 @@ pub struct LitSlice<'a> {
     pub optics: &'a SensorOptics,
     /// The deformed part.
     pub dent: Option<&'a Dent>,
+}
+
+/// Whether pixels of some spans, by row, lie in a square. Squares that share their sides share their nodes, of which one of
+/// them shows the dome: nothing else is asked.
+fn shows(spans: &[Range<usize>], (x, y): (usize, usize), side: usize) -> bool {
+    let rows = spans.get(y..(y + side + 1).min(spans.len())).unwrap_or_default();
+    rows.iter().any(|span| span.start <= x + side && span.end > x)
+}
+
+/// The nodes of a square, row by row.
+fn nine((x, y): (usize, usize), side: usize) -> [(usize, usize); 9] {
+    std::array::from_fn(|i| (x + i % 3 * (side / 2), y + i / 3 * (side / 2)))
 }
 
 impl<'a> LitSurface<'a> {
@@ -123,24 +146,7 @@ impl<'a> LitSurface<'a> {
     }
 }
 
-impl<const N: usize> Default for Lit<N> {
-    fn default() -> Self {
-        Self {
-            width: 0,
-            height: 0,
-            levels: [const { Vec::new() }; N],
-            known: Vec::new(),
-            motions: Vec::new(),
-            squares: Vec::new(),
-            moved_mm: DVec3::ZERO,
-            samples: Vec::new(),
-            places: Vec::new(),
-            answers: Vec::new(),
-        }
-    }
-}
-
-impl<const N: usize> Lit<N> {
+impl Lit {
     /// Works out the brightness of the pixels of `spans`, by row, those of the picture that show the dome.
     pub fn fill(
         &mut self,
@@ -153,40 +159,53 @@ impl<const N: usize> Lit<N> {
         let grid = |n: usize| n.div_ceil(LARGEST) * LARGEST + 1;
         (self.width, self.height) = (grid(size.0), grid(size.1));
         let count = self.width * self.height;
-        self.levels.iter_mut().for_each(|levels| levels.resize(count, 0.0));
+        self.levels.resize(count, Vec4::ZERO);
+        let asked = |lane: usize| if surface.channels.contains(&lane) { 1.0 } else { 0.0 };
+        self.asked = Vec4::new(asked(0), asked(1), asked(2), 0.0);
         self.known.clear();
         self.known.resize(count, Known::Nothing);
-        let mut squares = Vec::new();
-        // Squares that share their sides share their nodes, of which one of them shows the dome: nothing else is asked.
-        let shows = |(x, y): &(usize, usize), side: usize| {
-            let rows = spans.get(*y..(y + side + 1).min(spans.len())).unwrap_or_default();
-            rows.iter().any(|span| span.start <= x + side && span.end > *x)
-        };
-        for y in (0..size.1).step_by(LARGEST) {
-            for x in (0..size.0).step_by(LARGEST) {
-                if shows(&(x, y), LARGEST) {
-                    squares.push((x, y));
-                }
-            }
-        }
         self.lay_out_motions();
-        let mut side = LARGEST;
-        for (x, y) in &squares {
-            let corners = [(*x, *y), (x + side, *y), (*x, y + side), (x + side, y + side)];
-            self.ask(surface, (*x, *y), corners, work);
-        }
-        while side >= 2 && !squares.is_empty() {
-            let half = side / 2;
-            for (x, y) in &squares {
-                let inner = [(half, 0), (0, half), (half, half), (side, half), (half, side)];
-                let largest = (x / LARGEST * LARGEST, y / LARGEST * LARGEST);
-                self.ask(surface, largest, inner.map(|(dx, dy)| (x + dx, y + dy)), work);
+        // Rows of squares one after the other, so that what a row is made of stays near at hand; each once the nodes of the
+        // next are known as well.
+        let rows = size.1.div_ceil(LARGEST);
+        let (mut squares, mut next) = (Vec::new(), Vec::new());
+        for row in 0..=rows {
+            std::mem::swap(&mut squares, &mut next);
+            next.clear();
+            let columns = (0..size.0).step_by(LARGEST).map(|x| (x, row * LARGEST));
+            next.extend(columns.filter(|corner| row < rows && shows(spans, *corner, LARGEST)));
+            for (x, y) in &next {
+                self.ask(surface, (*x, *y), nine((*x, *y), LARGEST), work);
             }
             self.light(surface, work);
-            let mut next = Vec::new();
-            for (x, y) in squares {
-                if side == LARGEST && surface.tolerance > 0.0 {
-                    self.settle(surface, (x, y));
+            self.divide(surface, spans, &mut squares, work);
+        }
+    }
+
+    /// Fills in largest squares of which the nodes are known, or divides them.
+    fn divide(
+        &mut self,
+        surface: &LitSurface<'_>,
+        spans: &[Range<usize>],
+        squares: &mut Vec<(usize, usize)>,
+        work: &mut Work,
+    ) {
+        let mut next = Vec::new();
+        let mut side = LARGEST;
+        while side >= 2 && !squares.is_empty() {
+            let half = side / 2;
+            if side < LARGEST {
+                for (x, y) in squares.iter() {
+                    if side == SMALLEST && surface.tolerance > 0.0 {
+                        self.find_rays(surface, (*x, *y), work);
+                    }
+                    self.ask(surface, (*x, *y), nine((*x, *y), side), work);
+                }
+                self.light(surface, work);
+            }
+            for (x, y) in squares.drain(..) {
+                if side >= SMALLEST && surface.tolerance > 0.0 && self.square((x, y)).is_open() {
+                    self.settle(surface, (x, y), side);
                 }
                 // The smallest squares have no pixels between their nodes.
                 if half == 1 {
@@ -202,13 +221,14 @@ impl<const N: usize> Lit<N> {
                     Verdict::Misses if side <= MISSED => {}
                     _ => {
                         let parts = [(x, y), (x + half, y), (x, y + half), (x + half, y + half)];
-                        next.extend(parts.into_iter().filter(|part| shows(part, half)));
+                        next.extend(parts.into_iter().filter(|part| shows(spans, *part, half)));
                     }
                 }
             }
-            squares = next;
+            std::mem::swap(squares, &mut next);
             side = half;
         }
+        squares.clear();
     }
 
     /// Whether a square may be filled in: what its nodes say, and what the tables say that none of them shows.
@@ -225,11 +245,11 @@ impl<const N: usize> Lit<N> {
         }
     }
 
-    /// Brightness of a row's pixels in a channel. Only what [`Self::complete`] was told of has a meaning.
-    pub fn row(&self, lane: usize, y: usize, columns: Range<usize>) -> &[f32] {
+    /// Brightness of a row's pixels, red, green, blue. Only the channels asked for, and what [`Self::complete`] was told of,
+    /// have a meaning.
+    pub fn row(&self, y: usize, columns: Range<usize>) -> &[Vec4] {
         let place = |x: usize| y * self.width + x;
-        let levels = self.levels.get(lane);
-        levels.and_then(|levels| levels.get(place(columns.start)..place(columns.end))).unwrap_or_default()
+        self.levels.get(place(columns.start)..place(columns.end)).unwrap_or_default()
     }
 
     /// Gives the pixels of a row that have a share in the dome but no ray of their own the brightness of the nearest one
@@ -246,17 +266,13 @@ impl<const N: usize> Lit<N> {
             let at = y * self.width + x;
             if *share > LEAST_SHARE && self.known.get(at).is_some_and(|known| *known != Known::Lit) {
                 let near = self.near(x, y, inwards);
-                for (levels, value) in self.levels.iter_mut().zip(near) {
-                    if let Some(level) = levels.get_mut(at) {
-                        *level = value;
-                    }
-                }
+                self.levels.get_mut(at).into_iter().for_each(|level| *level = near);
             }
         }
     }
 
     #[cold]
-    fn near(&self, x: usize, y: usize, inwards: DVec2) -> [f32; N] {
+    fn near(&self, x: usize, y: usize, inwards: DVec2) -> Vec4 {
         let from = DVec2::new(x as f64, y as f64);
         let step = (inwards - from).normalize_or_zero();
         let beside = |k: u32| {
@@ -264,13 +280,12 @@ impl<const N: usize> Lit<N> {
             let (known, level) = self.node(place.x as usize, place.y as usize);
             (known == Known::Lit).then_some(level)
         };
-        (0..=4).find_map(beside).unwrap_or([0.0; N])
+        (0..=4).find_map(beside).unwrap_or(Vec4::ZERO)
     }
 
-    fn node(&self, x: usize, y: usize) -> (Known, [f32; N]) {
+    fn node(&self, x: usize, y: usize) -> (Known, Vec4) {
         let at = y * self.width + x;
         let known = self.known.get(at).copied().unwrap_or(Known::Misses);
-        let level = |lane: usize| self.levels[lane].get(at).copied().unwrap_or(0.0);
-        (known, std::array::from_fn(level))
+        (known, self.levels.get(at).copied().unwrap_or(Vec4::ZERO))
     }
 }

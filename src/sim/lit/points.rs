@@ -1,10 +1,11 @@
 //! What single pixels of the lit membrane show: their rays, where these meet the membrane, and the light there.
 
-use glam::{DVec2, DVec3, Vec3A};
+use glam::{DVec2, DVec3, Vec3A, Vec4};
 
-use super::motion::{Motion, Source};
+use super::motion::{Motion, Source, Square};
 use super::{Known, LARGEST, Lit, LitSlice, LitSurface, units};
 use crate::optics::SensorOptics;
+use crate::sim::dent::Dent;
 use crate::sim::effect::EffectName;
 use crate::sim::shading::{Moved, SurfaceSample};
 use crate::sim::work::Work;
@@ -16,7 +17,7 @@ const BEYOND_PX: f64 = 4.0 * LARGEST as f64;
 /// What moves by less is not dented, mm.
 const STILL_MM: f64 = 1e-6;
 
-impl<const N: usize> Lit<N> {
+impl Lit {
     /// Traces and lights those of some pixels of a square that are not known yet; the square lies in the largest one
     /// at `corner`.
     pub(super) fn ask(
@@ -26,36 +27,49 @@ impl<const N: usize> Lit<N> {
         pixels: impl IntoIterator<Item = (usize, usize)>,
         work: &mut Work,
     ) {
+        let (square, rays) = (self.square(corner), self.rays(corner));
         for (x, y) in pixels {
             let at = y * self.width + x;
             if self.known.get(at) != Some(&Known::Nothing) {
                 continue;
             }
             let Some(seen) = surface.at(y) else { continue };
-            let ray = surface.rays.and_then(|rays| rays.at(x, y));
             let pixel = DVec2::new(x as f64, y as f64);
-            let hit = match ray {
-                Some(ray) => seen.optics.follow_continued(ray),
-                None => seen.optics.trace_continued(pixel),
-            };
-            let rays = match hit {
-                Ok(hit) => [Some((hit, 1.0)), None],
-                Err(_) => continued(seen.optics, pixel),
-            };
-            let mut known = Known::Misses;
-            for ((surface_mm, inside), weight) in rays.into_iter().flatten() {
-                self.places.push((at, weight));
-                let sample = self.sample((surface, seen), (surface_mm, inside), corner, (x, y), work);
-                known = Known::Lit;
-                self.samples.push(sample);
-            }
-            if known == Known::Misses {
-                // The rim is bonded, and what is beyond it does not move.
-                if let Some(motion) = self.kept_at((x, y)).and_then(|at| self.motions.get_mut(at)) {
-                    *motion = Motion::default();
-                }
+            let told = if rays.are_told {
+                work.add_base(units::TOLD_RAY);
+                self.told_ray(&rays, (x, y), seen.optics.dome_radius_mm())
             } else {
-                self.levels.iter_mut().filter_map(|levels| levels.get_mut(at)).for_each(|level| *level = 0.0);
+                None
+            };
+            let trace = || {
+                work.add_base(units::RAY);
+                match surface.rays.and_then(|rays| rays.at(x, y)) {
+                    Some(ray) => seen.optics.follow_continued(ray),
+                    None => seen.optics.trace_continued(pixel),
+                }
+            };
+            let hit = told.map_or_else(trace, Ok);
+            let mut known = Known::Lit;
+            match hit {
+                Ok(hit) => {
+                    let asked = Asked { pixel: (x, y), is_kept: self.is_kept((x, y)) };
+                    let sample = self.sample((surface, seen), hit, &square, asked, work);
+                    self.samples.push(sample);
+                    self.places.push((at, 1.0));
+                }
+                Err(_) => {
+                    known = Known::Misses;
+                    for (hit, weight) in continued(seen.optics, pixel).into_iter().flatten() {
+                        known = Known::Lit;
+                        let asked = Asked { pixel: (x, y), is_kept: false };
+                        let sample = self.sample((surface, seen), hit, &square, asked, work);
+                        self.samples.push(sample);
+                        self.places.push((at, weight));
+                    }
+                }
+            }
+            if known == Known::Lit {
+                self.levels.get_mut(at).into_iter().for_each(|level| *level = Vec4::ZERO);
             }
             if let Some(place) = self.known.get_mut(at) {
                 *place = known;
@@ -71,12 +85,9 @@ impl<const N: usize> Lit<N> {
         self.answers.clear();
         self.answers.resize(self.samples.len(), [0.0; 3]);
         surface.shading.levels(&self.samples, &mut self.answers, work);
-        work.add_base(self.samples.len() as u64 * units::RAY);
         for ((at, weight), answer) in self.places.iter().zip(&self.answers) {
-            for (lane, levels) in self.levels.iter_mut().enumerate() {
-                if let Some(level) = levels.get_mut(*at) {
-                    *level += weight * answer[(surface.channel + lane).min(2)];
-                }
+            if let Some(level) = self.levels.get_mut(*at) {
+                *level += Vec4::new(answer[0], answer[1], answer[2], 0.0) * *weight;
             }
         }
         self.samples.clear();
@@ -88,69 +99,90 @@ impl<const N: usize> Lit<N> {
         &mut self,
         (surface, seen): (&LitSurface<'_>, &LitSlice<'_>),
         (surface_mm, inside): (DVec3, DVec3),
-        corner: (usize, usize),
-        (x, y): (usize, usize),
+        square: &Square,
+        asked: Asked,
         work: &mut Work,
     ) -> SurfaceSample {
-        let per_radius = 1.0 / seen.optics.dome_radius_mm();
-        let still = SurfaceSample {
-            point_mm: surface_mm,
-            normal: surface_mm * per_radius,
-            to_camera: -inside,
-            moved: Moved::Not,
-        };
-        let kept = self.kept_at((x, y));
-        if let Some(motion) = kept.and_then(|at| self.motions.get_mut(at)) {
-            let cosine = inside.dot(still.normal).abs();
-            *motion = Motion {
-                place_mm: surface_mm.as_vec3a(),
-                slant: ((1.0 - cosine * cosine).max(0.0).sqrt() / cosine.max(1e-3)) as f32,
-                ..Motion::default()
-            };
-        }
-        let Some(dent) = seen.dent else { return still };
-        match self.source(corner) {
-            Source::Still => return still,
-            source @ (Source::Smooth | Source::Little) => {
+        let normal = surface_mm / seen.optics.dome_radius_mm();
+        let mut sample =
+            SurfaceSample { point_mm: surface_mm, normal, to_camera: -inside, moved: Moved::Not };
+        let mut motion = Motion::default();
+        if let Some(dent) = seen.dent.filter(|_| square.source != Source::Still) {
+            if square.source == Source::Exact {
+                work.add(EffectName::Contact, units::DENT);
+                if let Some(found) = self.dented(dent, &sample, square, asked.pixel) {
+                    (sample.point_mm, sample.normal) = (found.point_mm, found.normal);
+                    sample.moved = Moved::Far;
+                    if asked.is_kept {
+                        motion.shift_mm = (found.point_mm - surface_mm).as_vec3a();
+                        motion.moved_mm = self.moved_mm.as_vec3a();
+                        motion.tilt = (found.normal - normal).as_vec3a();
+                        let change = surface.shading.change(found.point_mm, found.normal);
+                        motion.change = Vec3A::from_array(change);
+                        sample.moved = Moved::Little(change);
+                    }
+                }
+            } else {
                 work.add(EffectName::Contact, units::SMOOTH);
-                let motion = self.motion(corner, (x - corner.0, y - corner.1));
-                let little = source == Source::Little;
-                return SurfaceSample {
-                    point_mm: surface_mm + motion.shift_mm.as_dvec3(),
-                    normal: (still.normal + motion.tilt.as_dvec3()).normalize_or(still.normal),
-                    moved: if little { Moved::Little(motion.change.to_array()) } else { Moved::Far },
-                    ..still
-                };
+                let parts = |node: &Motion| [node.shift_mm, node.tilt, node.change];
+                [motion.shift_mm, motion.tilt, motion.change] = self.told(square, asked.pixel, parts);
+                if asked.is_kept {
+                    motion.moved_mm = self.foretold_mm(square, asked.pixel).as_vec3a();
+                }
+                sample.point_mm += motion.shift_mm.as_dvec3();
+                sample.normal = (normal + motion.tilt.as_dvec3()).normalize_or(normal);
+                let is_little = square.source == Source::Little;
+                sample.moved = if is_little { Moved::Little(motion.change.to_array()) } else { Moved::Far };
             }
-            Source::Exact => {}
         }
-        work.add(EffectName::Contact, units::DENT);
-        // Where a ray may meet the membrane more than once, what it shows may not depend on what was asked before.
-        let near_mm = match kept {
-            _ if dent.may_fold() => DVec3::ZERO,
-            None if self.is_whole(corner) => self.foretold_mm(corner, (x, y)),
-            _ => self.moved_mm,
-        };
-        let Some((rest_mm, dented)) = dent.meet(surface_mm, inside, near_mm) else {
-            self.moved_mm = DVec3::ZERO;
-            return still;
-        };
-        // Neighbours move alike: the last one's motion is where the next node's search begins.
-        self.moved_mm = dented.displacement_mm;
-        if self.moved_mm.length_squared() <= STILL_MM * STILL_MM {
-            return still;
+        if asked.is_kept {
+            let cosine = inside.dot(normal).abs();
+            motion.slant = ((1.0 - cosine * cosine).max(0.0).sqrt() / cosine.max(1e-3)) as f32;
+            let base_mm = surface_mm - inside * (surface_mm.z / inside.z);
+            motion.base_mm = base_mm.as_vec3a();
+            (motion.place_mm, motion.inside) = (surface_mm.as_vec3a(), inside.as_vec3a());
+            self.keep(asked.pixel, motion);
         }
-        let point_mm = rest_mm + dented.displacement_mm;
-        if let Some(motion) = kept.and_then(|at| self.motions.get_mut(at)) {
-            motion.shift_mm = (point_mm - surface_mm).as_vec3a();
-            motion.moved_mm = self.moved_mm.as_vec3a();
-            motion.tilt = (dented.normal - still.normal).as_vec3a();
-            let change = surface.shading.change(point_mm, dented.normal);
-            motion.change = Vec3A::from_array(change);
-            return SurfaceSample { point_mm, moved: Moved::Little(change), ..still };
-        }
-        SurfaceSample { point_mm, normal: dented.normal, to_camera: -inside, moved: Moved::Far }
+        sample
     }
+
+    /// Where a ray that would meet the undeformed dome meets the membrane; `None` where it stands still.
+    fn dented(
+        &mut self,
+        dent: &Dent,
+        still: &SurfaceSample,
+        square: &Square,
+        pixel: (usize, usize),
+    ) -> Option<Found> {
+        // Where a ray may meet the membrane more than once, what it shows may not depend on what was asked before.
+        let near_mm = if dent.may_fold() {
+            DVec3::ZERO
+        } else if square.is_whole {
+            self.foretold_mm(square, pixel)
+        } else {
+            self.moved_mm
+        };
+        let met = dent.meet(still.point_mm, -still.to_camera, near_mm);
+        // Neighbours move alike: the last one's motion is where the next node's search begins.
+        self.moved_mm = met.map_or(DVec3::ZERO, |(_, dented)| dented.displacement_mm);
+        let (rest_mm, dented) = met?;
+        let has_moved = self.moved_mm.length_squared() > STILL_MM * STILL_MM;
+        has_moved.then_some(Found { point_mm: rest_mm + dented.displacement_mm, normal: dented.normal })
+    }
+}
+
+/// A pixel that is asked for.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    pixel: (usize, usize),
+    /// Whether its ray and motion are kept.
+    is_kept: bool,
+}
+
+/// A point of the moved membrane.
+struct Found {
+    point_mm: DVec3,
+    normal: DVec3,
 }
 
 /// Stands in for a pixel without a ray, a little beyond the end of the lens's field: twice the brightness at the end less

@@ -3,7 +3,8 @@
 use glam::{DVec2, DVec3, Vec3A, Vec4};
 
 use super::super::dome_map::{DomeGrid, disc_continued};
-use super::{LightField, ShellNode};
+use super::super::tables::SHELLS;
+use super::{LightField, ShellNode, ShellNodes};
 use crate::sim::rests::{BOTH, largest, rest};
 use crate::sim::shading::Turned;
 
@@ -58,27 +59,27 @@ impl Bends {
     }
 
     /// Of the shells.
-    pub fn find_kinks(&mut self, shells: &[Vec<ShellNode>], nodes: usize) {
+    pub fn find_kinks(&mut self, shells: &[ShellNodes], nodes: usize) {
         let longest = |along: [Vec3A; 3], own: Vec3A| {
             let [x, y, z] = along;
             ((x * x + y * y + z * z).max_element().sqrt()) + own.abs().max_element()
         };
         let turn = |i: usize| {
-            let of =
-                |shell: &Vec<ShellNode>| shell.get(i).map_or(0.0, |node| longest(node.along, Vec3A::ZERO));
-            shells.iter().map(of).fold(0.0, f32::max)
+            let of = |node: &ShellNode| longest(node.along, Vec3A::ZERO);
+            shells.get(i).map_or(0.0, |nodes| nodes.iter().map(of).fold(0.0, f32::max))
         };
         let kink = |i: usize| {
             let (column, row) = (i % nodes, i / nodes);
             if column < 1 || row < 1 || column + 1 >= nodes || row + 1 >= nodes {
                 return 0.0;
             }
-            let of = |shell: &Vec<ShellNode>, way: usize| {
-                let [a, b, c] = [i - way, i, i + way].map(|i| shell.get(i).copied().unwrap_or_default());
+            let of = |shell: usize, way: usize| {
+                let [a, b, c] = [i - way, i, i + way]
+                    .map(|i| shells.get(i).map_or(ShellNode::default(), |all| all[shell]));
                 let along = std::array::from_fn(|k| a.along[k] - b.along[k] * 2.0 + c.along[k]);
                 longest(along, a.own - b.own * 2.0 + c.own)
             };
-            shells.iter().map(|shell| of(shell, 1).max(of(shell, nodes))).fold(0.0, f32::max)
+            (0..SHELLS.len()).map(|shell| of(shell, 1).max(of(shell, nodes))).fold(0.0, f32::max)
         };
         self.turn = (0..nodes * nodes).map(turn).collect();
         self.kink = (0..nodes * nodes).map(kink).collect();

@@ -43,7 +43,7 @@ pub struct LightField {
     still: Vec<Vec4>,
     bends: Bends,
     shell_grid: DomeGrid,
-    shells: Vec<Vec<ShellNode>>,
+    shells: Vec<ShellNodes>,
     brightest: [f64; 3],
     steepest_per_mm: f64,
     error: f64,
@@ -57,6 +57,9 @@ struct ShellNode {
     along: [Vec3A; 3],
     own: Vec3A,
 }
+
+/// A node on each of the shells, side by side: a look-up asks all of them.
+type ShellNodes = [ShellNode; SHELLS.len()];
 
 /// The membrane's own light at the patches of a room.
 #[derive(Debug, Clone)]
@@ -168,7 +171,7 @@ impl LightField {
         let Some(first) = tables.first() else { return };
         let grid = first.grid;
         let fine = DomeGrid::with_cells(grid.cells() * FINE_SHELL);
-        self.shells = tables
+        let shells = tables
             .iter()
             .map(|tables| {
                 self.evaluations += tables.evaluations;
@@ -192,7 +195,10 @@ impl LightField {
                 };
                 (0..fine.nodes * fine.nodes).into_par_iter().map(node).collect()
             })
-            .collect();
+            .collect::<Vec<Vec<ShellNode>>>();
+        let of = |shell: usize, i: usize| shells.get(shell).and_then(|nodes| nodes.get(i)).copied();
+        let nodes = |i: usize| std::array::from_fn(|shell| of(shell, i).unwrap_or_default());
+        self.shells = (0..fine.nodes * fine.nodes).map(nodes).collect();
         self.shell_grid = fine;
         self.bends.find_kinks(&self.shells, fine.nodes);
     }
@@ -237,7 +243,8 @@ impl LightField {
             return self.still(if distance > 0.0 { point_mm / distance } else { DVec3::Z });
         }
         let direction = point_mm / distance;
-        let (at, x, y) = cell_of(&self.shell_grid, direction);
+        let disc = disc_continued(direction);
+        let (at, x, y) = cell_of(&self.shell_grid, disc);
         let nodes = self.shell_grid.nodes;
         let weights = shell_weights(distance / self.radius_mm);
         // What the outer shell's coarser table lacks of the undeformed membrane's light belongs to that one's own place and
@@ -246,18 +253,21 @@ impl LightField {
             * smooth_step(1.0 - (1.0 - normal.dot(direction)) / LACKING_TILT);
         let (normal, outward) = (normal.as_vec3a(), direction.as_vec3a());
         let mut light = Vec3A::ZERO;
-        let across = |corner: &[ShellNode], normal: Vec3A| {
-            let low = corner[0].light(normal) * (1.0 - x) + corner[1].light(normal) * x;
-            let high = corner[nodes].light(normal) * (1.0 - x) + corner[nodes + 1].light(normal) * x;
-            low * (1.0 - y) + high * y
-        };
-        for (number, (shell, weight)) in self.shells.iter().zip(weights).enumerate() {
-            let Some(corner) = shell.get(at..at + nodes + 2) else { return [0.0; 3] };
-            light += across(corner, normal) * weight;
-            if number == 0 && near > 0.0 {
-                let still = Vec3A::from_vec4(self.still_at(disc_continued(direction)));
-                light += (still - across(corner, outward)) * near;
+        let Some(corner) = self.shells.get(at..at + nodes + 2) else { return [0.0; 3] };
+        let corners = [
+            (&corner[0], (1.0 - x) * (1.0 - y)),
+            (&corner[1], x * (1.0 - y)),
+            (&corner[nodes], (1.0 - x) * y),
+            (&corner[nodes + 1], x * y),
+        ];
+        for (shells, share) in corners {
+            for (shell, weight) in shells.iter().zip(weights) {
+                light += shell.light(normal) * (weight * share);
             }
+            light -= shells[0].light(outward) * (near * share);
+        }
+        if near > 0.0 {
+            light += Vec3A::from_vec4(self.still_at(disc)) * near;
         }
         light.max(Vec3A::ZERO).to_array()
     }
@@ -407,10 +417,10 @@ fn cubic(t: f32) -> [f32; 4] {
     ]
 }
 
-/// Index of the lower corner of the cell of a direction, and the place in it.
+/// Index of the lower corner of the cell of a place of the disc, and the place in it.
 #[inline]
-fn cell_of(grid: &DomeGrid, direction: DVec3) -> (usize, f32, f32) {
-    let at = grid.coordinates_of_disc(disc_continued(direction));
+fn cell_of(grid: &DomeGrid, disc: DVec2) -> (usize, f32, f32) {
+    let at = grid.coordinates_of_disc(disc);
     let last = (grid.nodes - 2) as f64;
     let (x, y) = (at.x.clamp(0.0, last), at.y.clamp(0.0, last));
     let (column, row) = (x as usize, y as usize);

@@ -1,6 +1,6 @@
 //! The seam between geometry and light: the brightness of points of the membrane.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3A, Vec4};
 
 use super::scene::Scene;
 use super::work::Work;
@@ -18,6 +18,18 @@ pub struct SurfaceSample {
     pub moved: Moved,
 }
 
+/// A point of the membrane that an object has moved not at all, or so smoothly that the points about it tell the change of its
+/// light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlainSample {
+    /// Its unit direction from the dome's centre.
+    pub direction: Vec3A,
+    /// Along the sensor's axis, how much of the unit direction towards the camera inside the elastomer.
+    pub cosine: f32,
+    /// The change of its light ([`Shading::change`]).
+    pub change: Vec3A,
+}
+
 /// What an object has done to a point of the membrane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Moved {
@@ -27,7 +39,7 @@ pub enum Moved {
     Far,
     /// The same, but so smoothly that the points about it tell the change of its light ([`Shading::change`]): its normal
     /// is not used.
-    Little([f32; 3]),
+    Little(Vec3A),
 }
 
 /// Bounds on what an object has done to a part of the membrane.
@@ -54,12 +66,15 @@ impl Turned {
 
 /// Brightness of the membrane without ink, as linear values of the picture (1 is full scale), red, green, blue.
 pub trait Shading: Send + Sync {
-    /// The brightness of each sample, written to the place of the same number; the slices have one length.
-    fn levels(&self, samples: &[SurfaceSample], levels: &mut [[f32; 3]], work: &mut Work);
+    /// The brightness of each sample, put after what is there; the fourth number means nothing.
+    fn levels(&self, samples: &[SurfaceSample], levels: &mut Vec<Vec4>, work: &mut Work);
+
+    /// The same where little or nothing has moved.
+    fn plain_levels(&self, samples: &[PlainSample], levels: &mut Vec<Vec4>, work: &mut Work);
 
     /// What is added to the brightness of an undeformed point in the same direction from the dome's centre where the
     /// membrane lies at `point_mm` with this unit normal; before losses on the way to the camera.
-    fn change(&self, point_mm: DVec3, normal: DVec3) -> [f32; 3];
+    fn change(&self, point_mm: DVec3, normal: DVec3) -> Vec3A;
 
     /// How far the light of the undeformed membrane may be, full scales, from the surface of the second order through
     /// nine nodes in rows of three over a part of the dome that holds these directions from its centre.

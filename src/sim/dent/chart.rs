@@ -190,9 +190,11 @@ impl Chart {
         if !(gx >= 1.0 && gy >= 1.0 && gx < last && gy < last) {
             return None;
         }
-        let (i, j) = (gx as usize, gy as usize);
-        let (wx, dx) = spline((gx - i as f64) as f32);
-        let (wy, dy) = spline((gy - j as f64) as f32);
+        // Numbers of one size with signs are what machines turn into each other at once.
+        let (i, j) = (gx as i32, gy as i32);
+        let (wx, dx) = spline((gx - f64::from(i)) as f32);
+        let (wy, dy) = spline((gy - f64::from(j)) as f32);
+        let (i, j) = (i as usize, j as usize);
         let start = (j - 1) * self.nodes + i - 1;
         let corner = self.moved.get(start..start + 3 * self.nodes + 4)?;
         let (mut u, mut by_x, mut by_y) = (Vec4::ZERO, Vec4::ZERO, Vec4::ZERO);

@@ -1,6 +1,6 @@
 //! Levels of the membrane and the white markers, from the light on them.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3A, Vec4};
 
 use super::field::{FieldParts, LightField};
 use super::setup::{self, Channels};
@@ -9,7 +9,7 @@ use crate::design::sections::LedColor;
 use crate::sim::SimError;
 use crate::sim::effect::EffectName;
 use crate::sim::scene::Scene;
-use crate::sim::shading::{Moved, Shading, SurfaceSample, Turned};
+use crate::sim::shading::{Moved, PlainSample, Shading, SurfaceSample, Turned};
 use crate::sim::work::Work;
 
 /// Work of one look-up in the table of the undeformed membrane.
@@ -34,7 +34,7 @@ pub const ROOM_UNITS: u64 = 40_000_000;
 const TABLE_TOLERANCE: f64 = 1e-2;
 
 /// Places of the table of what leaves towards the camera.
-const LEAVING: usize = 256;
+const LEAVING: usize = 512;
 
 /// Lights of a scene, each colour of a white one counted for itself.
 pub fn source_count(scene: &Scene) -> u64 {
@@ -52,11 +52,12 @@ pub struct LitDome {
     field: LightField,
     radius_mm: f64,
     /// Level for each mW/mm^2.
-    gain: [f32; 3],
+    gain: Vec4,
     stray: f32,
-    /// By channel and by the momentum squared over its largest value, what passes to the camera.
-    leaving: Option<[Vec<f32>; 3]>,
-    index_squared: [f32; 3],
+    /// By the squared sine of a way in the dome, what passes to the camera.
+    leaving: Option<Vec<Vec4>>,
+    /// Places of that table for a squared sine of 1.
+    leaving_scale: f32,
     markers: Vec<(DVec3, [f32; 3])>,
     steepest_per_mm: f64,
 }
@@ -120,22 +121,28 @@ impl LitDome {
                 (marker.position_mm, level)
             })
             .collect();
+        let wide = |[r, g, b]: Channels| Vec4::new(r as f32, g as f32, b as f32, 0.0);
+        // From there on nothing leaves, in any channel.
+        let most_sine_squared = 1.0 / in_dome.into_iter().fold(f64::INFINITY, f64::min);
         let leaving = used.fresnel.then(|| {
-            std::array::from_fn(|c| {
-                (0..=LEAVING)
-                    .map(|i| leaves(&optics[c], (i as f64 / LEAVING as f64).sqrt(), false) as f32)
-                    .collect()
-            })
+            let at = |i: usize| {
+                let sine_squared = i as f64 / LEAVING as f64 * most_sine_squared;
+                wide(std::array::from_fn(|c| {
+                    leaves(&optics[c], (sine_squared * in_dome[c]).sqrt().min(1.0), false)
+                }))
+            };
+            // What comes after the last counts nothing.
+            (0..=LEAVING + 1).map(at).collect()
         });
         let brightest_gain = gain.iter().copied().fold(0.0, f64::max);
         Ok(Some(Self {
             steepest_per_mm: 1.5 * field.steepest_per_mm() * brightest_gain,
             radius_mm: scene.optics().dome_radius_mm(),
             field,
-            gain: gain.map(|v| v as f32),
+            gain: wide(gain),
             stray: light.stray_level as f32,
             leaving,
-            index_squared: in_dome.map(|v| v as f32),
+            leaving_scale: (LEAVING as f64 / most_sine_squared) as f32,
             markers,
         }))
     }
@@ -147,15 +154,19 @@ impl LitDome {
 
     /// What passes to the camera along a direction in the dome, for each channel.
     #[inline]
-    fn passed(&self, to_camera: DVec3) -> [f32; 3] {
-        let Some(tables) = &self.leaving else { return [1.0; 3] };
-        let sine_squared = (1.0 - (to_camera.z * to_camera.z) as f32).max(0.0);
-        std::array::from_fn(|c| {
-            let at = (sine_squared * self.index_squared[c]).min(1.0) * LEAVING as f32;
-            let i = (at as usize).min(LEAVING - 1);
-            let (low, high) = (tables[c][i], tables[c][i + 1]);
-            low + (high - low) * (at - i as f32)
-        })
+    fn passed(&self, cosine: f32) -> Vec4 {
+        let Some(table) = &self.leaving else { return Vec4::ONE };
+        let at = (1.0 - cosine * cosine) * self.leaving_scale;
+        let at = if at > 0.0 { if at < LEAVING as f32 { at } else { LEAVING as f32 } } else { 0.0 };
+        let i = at as i32;
+        let Some([low, high]) = table.get(i as usize..i as usize + 2) else { return Vec4::ZERO };
+        *low + (*high - *low) * (at - i as f32)
+    }
+
+    /// What a surface of some light shows.
+    #[inline]
+    fn level(&self, light: Vec4, change: Vec4, cosine: f32) -> Vec4 {
+        (self.gain * light + change).max(Vec4::ZERO) * self.passed(cosine) + Vec4::splat(self.stray)
     }
 }
 
@@ -168,23 +179,23 @@ pub(super) fn leaves(optics: &crate::optics::SensorOptics, momentum: f64, beside
 }
 
 impl Shading for LitDome {
-    fn levels(&self, samples: &[SurfaceSample], levels: &mut [[f32; 3]], work: &mut Work) {
+    fn levels(&self, samples: &[SurfaceSample], levels: &mut Vec<Vec4>, work: &mut Work) {
         let per_mm = 1.0 / self.radius_mm;
         let mut moved = 0_u64;
-        for (sample, level) in samples.iter().zip(levels.iter_mut()) {
+        levels.extend(samples.iter().map(|sample| {
             let (light, change) = match sample.moved {
-                Moved::Not => (self.field.still(sample.point_mm * per_mm), [0.0; 3]),
-                Moved::Little(change) => (self.field.still(sample.point_mm.normalize_or(DVec3::Z)), change),
+                Moved::Not => (self.field.still((sample.point_mm * per_mm).as_vec3a()), Vec4::ZERO),
+                Moved::Little(change) => {
+                    let direction = sample.point_mm.normalize_or(DVec3::Z);
+                    (self.field.still(direction.as_vec3a()), change.extend(0.0))
+                }
                 Moved::Far => {
                     moved += 1;
-                    (self.field.moved(sample.point_mm, sample.normal), [0.0; 3])
+                    (self.field.moved(sample.point_mm, sample.normal), Vec4::ZERO)
                 }
             };
-            let passed = self.passed(sample.to_camera);
-            *level = std::array::from_fn(|c| {
-                (self.gain[c] * light[c] + change[c]).max(0.0) * passed[c] + self.stray
-            });
-        }
+            self.level(light, change, sample.to_camera.z as f32)
+        }));
         let still = samples.len() as u64 - moved;
         work.add(EffectName::DirectLight, STILL_UNITS * still + MOVED_UNITS * moved);
         if self.leaving.is_some() {
@@ -192,18 +203,28 @@ impl Shading for LitDome {
         }
     }
 
-    fn change(&self, point_mm: DVec3, normal: DVec3) -> [f32; 3] {
+    fn plain_levels(&self, samples: &[PlainSample], levels: &mut Vec<Vec4>, work: &mut Work) {
+        levels.extend(samples.iter().map(|sample| {
+            self.level(self.field.still(sample.direction), sample.change.extend(0.0), sample.cosine)
+        }));
+        work.add(EffectName::DirectLight, STILL_UNITS * samples.len() as u64);
+        if self.leaving.is_some() {
+            work.add(EffectName::Fresnel, LEAVING_UNITS * samples.len() as u64);
+        }
+    }
+
+    fn change(&self, point_mm: DVec3, normal: DVec3) -> Vec3A {
         let moved = self.field.moved(point_mm, normal);
-        let still = self.field.still(point_mm.normalize_or(DVec3::Z));
-        std::array::from_fn(|c| self.gain[c] * (moved[c] - still[c]))
+        let still = self.field.still(point_mm.normalize_or(DVec3::Z).as_vec3a());
+        (self.gain * (moved - still)).truncate().into()
     }
 
     fn bend(&self, directions: &[DVec3]) -> f32 {
-        self.gain.iter().copied().fold(0.0, f32::max) * self.field.bend(directions)
+        self.gain.max_element() * self.field.bend(directions)
     }
 
     fn moved_bend(&self, directions: &[DVec3], turned: Turned) -> f32 {
-        self.gain.iter().copied().fold(0.0, f32::max) * self.field.moved_bend(directions, turned)
+        self.gain.max_element() * self.field.moved_bend(directions, turned)
     }
 
     fn marker_level(&self, _scene: &Scene, position_mm: DVec3) -> [f32; 3] {

@@ -11,6 +11,7 @@
 //! divided whatever its nodes say.
 
 mod motion;
+mod paint;
 mod points;
 mod rays;
 mod settle;
@@ -26,7 +27,7 @@ use self::smooth::Verdict;
 use super::coverage::LEAST_SHARE;
 use super::dent::Dent;
 use super::field::LensRays;
-use super::shading::{Shading, SurfaceSample};
+use super::shading::{PlainSample, Shading, SurfaceSample};
 use super::work::Work;
 use crate::optics::SensorOptics;
 
@@ -87,7 +88,9 @@ pub struct Lit {
     samples: Vec<SurfaceSample>,
     /// Of each sample the pixel, and the share that it has in its brightness.
     places: Vec<(usize, f32)>,
-    answers: Vec<[f32; 3]>,
+    /// What the samples show.
+    shown: Vec<Vec4>,
+    plain: Vec<PlainSample>,
 }
 
 /// The membrane that is lit.
@@ -219,6 +222,7 @@ impl Lit {
                     // A square whose nine rays all miss may still hold a corner of the dome; large ones are divided
                     // once more.
                     Verdict::Misses if side <= MISSED => {}
+                    Verdict::Rough if side == SMALLEST && self.paint(surface, (x, y), work) => {}
                     _ => {
                         let parts = [(x, y), (x + half, y), (x, y + half), (x + half, y + half)];
                         next.extend(parts.into_iter().filter(|part| shows(spans, *part, half)));

@@ -82,6 +82,13 @@ const WEIGHTS: [[f32; 3]; LARGEST + 1] = {
     weights
 };
 
+/// Weights of a square's three columns or rows of nodes at a pixel's, from its first.
+#[inline]
+pub(super) fn shares(square: &Square, at: usize, from: usize) -> [f32; 3] {
+    let fine = LARGEST / square.side.clamp(1, LARGEST);
+    WEIGHTS[(at.saturating_sub(from) * fine).min(LARGEST)]
+}
+
 impl Lit {
     /// Room for the motions of a picture; of the last one, nothing is left that could tell on this one's bytes.
     pub(super) fn lay_out_motions(&mut self) {
@@ -151,9 +158,7 @@ impl Lit {
         (x, y): (usize, usize),
         parts: impl Fn(&Motion) -> [Vec3A; K],
     ) -> [Vec3A; K] {
-        let fine = LARGEST / square.side.clamp(1, LARGEST);
-        let weights = |at: usize, from: usize| WEIGHTS[((at - from.min(at)) * fine).min(LARGEST)];
-        let (wx, wy) = (weights(x, square.corner.0), weights(y, square.corner.1));
+        let (wx, wy) = (shares(square, x, square.corner.0), shares(square, y, square.corner.1));
         let mut sums = [Vec3A::ZERO; K];
         for (row, wy) in square.nodes.chunks_exact(3).zip(wy) {
             for (node, wx) in row.iter().zip(wx) {

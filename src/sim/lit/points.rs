@@ -1,6 +1,6 @@
 //! What single pixels of the lit membrane show: their rays, where these meet the membrane, and the light there.
 
-use glam::{DVec2, DVec3, Vec3A, Vec4};
+use glam::{DVec2, DVec3, Vec4};
 
 use super::motion::{Motion, Source, Square};
 use super::{Known, LARGEST, Lit, LitSlice, LitSurface, units};
@@ -82,12 +82,11 @@ impl Lit {
 
     /// Lights what was traced.
     pub(super) fn light(&mut self, surface: &LitSurface<'_>, work: &mut Work) {
-        self.answers.clear();
-        self.answers.resize(self.samples.len(), [0.0; 3]);
-        surface.shading.levels(&self.samples, &mut self.answers, work);
-        for ((at, weight), answer) in self.places.iter().zip(&self.answers) {
+        self.shown.clear();
+        surface.shading.levels(&self.samples, &mut self.shown, work);
+        for ((at, weight), shown) in self.places.iter().zip(&self.shown) {
             if let Some(level) = self.levels.get_mut(*at) {
-                *level += Vec4::new(answer[0], answer[1], answer[2], 0.0) * *weight;
+                *level += *shown * *weight;
             }
         }
         self.samples.clear();
@@ -118,7 +117,7 @@ impl Lit {
                         motion.moved_mm = self.moved_mm.as_vec3a();
                         motion.tilt = (found.normal - normal).as_vec3a();
                         let change = surface.shading.change(found.point_mm, found.normal);
-                        motion.change = Vec3A::from_array(change);
+                        motion.change = change;
                         sample.moved = Moved::Little(change);
                     }
                 }
@@ -132,7 +131,7 @@ impl Lit {
                 sample.point_mm += motion.shift_mm.as_dvec3();
                 sample.normal = (normal + motion.tilt.as_dvec3()).normalize_or(normal);
                 let is_little = square.source == Source::Little;
-                sample.moved = if is_little { Moved::Little(motion.change.to_array()) } else { Moved::Far };
+                sample.moved = if is_little { Moved::Little(motion.change) } else { Moved::Far };
             }
         }
         if asked.is_kept {

@@ -17,7 +17,7 @@ const MOST_MM: f32 = 1e-3;
 const SURE: f32 = 2.0;
 
 /// Weights of four nodes at the pixels from the second to the third.
-const WEIGHTS: [[f32; 4]; SMALLEST + 1] = {
+pub(super) const WEIGHTS: [[f32; 4]; SMALLEST + 1] = {
     let mut weights = [[0.0; 4]; SMALLEST + 1];
     let mut i = 0;
     while i <= SMALLEST {
@@ -37,7 +37,7 @@ const WEIGHTS: [[f32; 4]; SMALLEST + 1] = {
 pub(super) struct Rays {
     corner: (usize, usize),
     /// Where the rays of the sixteen nodes about it are kept.
-    nodes: [u32; 16],
+    pub nodes: [u32; 16],
     pub are_told: bool,
 }
 

@@ -7,12 +7,12 @@
 
 mod bend;
 
-use glam::{DVec2, DVec3, Vec3A, Vec4};
+use glam::{DVec2, DVec3, Vec2, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use self::bend::Bends;
 use super::direct::EmitterRule;
-use super::dome_map::{DomeGrid, bicubic, direction_from_disc, disc_continued};
+use super::dome_map::{DomeGrid, bicubic, direction_from_disc};
 use super::radiosity::Rings;
 use super::tables::{Prepared, SHELLS, Tables, Ways};
 
@@ -43,6 +43,8 @@ pub struct LightField {
     still: Vec<Vec4>,
     bends: Bends,
     shell_grid: DomeGrid,
+    scale: Scale,
+    shell_scale: Scale,
     shells: Vec<ShellNodes>,
     brightest: [f64; 3],
     steepest_per_mm: f64,
@@ -77,6 +79,8 @@ impl LightField {
             still: Vec::new(),
             bends: Bends::default(),
             shell_grid: DomeGrid::with_cells(8),
+            scale: Scale::of(&DomeGrid::with_cells(8)),
+            shell_scale: Scale::of(&DomeGrid::with_cells(8)),
             shells: Vec::new(),
             brightest: [0.0; 3],
             steepest_per_mm: 0.0,
@@ -134,7 +138,7 @@ impl LightField {
         };
         self.still = (0..grid.nodes * grid.nodes).into_par_iter().map(node).collect();
         bend::to_coefficients(&mut self.still, grid.nodes);
-        self.grid = *grid;
+        (self.grid, self.scale) = (*grid, Scale::of(grid));
         self.bends.find_third(&self.still, grid.nodes);
         self.look_over();
     }
@@ -145,7 +149,7 @@ impl LightField {
         let row = |row: usize| -> Vec<Option<Vec4>> {
             let light = |column: usize| {
                 let place = fine.place(column, row);
-                (place.length() <= 1.0).then(|| self.still_at(place))
+                (place.length() <= 1.0).then(|| self.still_at(place.as_vec2()))
             };
             (0..fine.nodes).map(light).collect()
         };
@@ -199,33 +203,30 @@ impl LightField {
         let of = |shell: usize, i: usize| shells.get(shell).and_then(|nodes| nodes.get(i)).copied();
         let nodes = |i: usize| std::array::from_fn(|shell| of(shell, i).unwrap_or_default());
         self.shells = (0..fine.nodes * fine.nodes).map(nodes).collect();
-        self.shell_grid = fine;
+        (self.shell_grid, self.shell_scale) = (fine, Scale::of(&fine));
         self.bends.find_kinks(&self.shells, fine.nodes);
     }
 
-    /// Irradiance of an undeformed point in this direction, for the channels red, green, blue.
+    /// Irradiance of an undeformed point in this unit direction, for the channels red, green, blue; the fourth number means
+    /// nothing.
     #[inline]
-    pub fn still(&self, direction: DVec3) -> [f32; 3] {
-        let value = self.still_at(disc_continued(direction));
-        [value.x, value.y, value.z]
+    pub fn still(&self, direction: Vec3A) -> Vec4 {
+        self.still_at(disc_of(direction)).max(Vec4::ZERO)
     }
 
     /// The undeformed membrane's light at a place of the disc.
     #[inline]
-    fn still_at(&self, disc: DVec2) -> Vec4 {
+    fn still_at(&self, disc: Vec2) -> Vec4 {
         self.cubic_at(&self.still, disc).max(Vec4::ZERO)
     }
 
     /// A table on the undeformed membrane's grid at a place of the disc.
     #[inline]
-    fn cubic_at(&self, table: &[Vec4], disc: DVec2) -> Vec4 {
+    fn cubic_at(&self, table: &[Vec4], disc: Vec2) -> Vec4 {
         let nodes = self.grid.nodes;
-        let at = self.grid.coordinates_of_disc(disc);
         // The cubics take a node more on each side.
-        let last = nodes as f64 - 2.001;
-        let (x, y) = (at.x.clamp(1.0, last), at.y.clamp(1.0, last));
-        let (column, row) = (x as usize, y as usize);
-        let (wx, wy) = (cubic((x - column as f64) as f32), cubic((y - row as f64) as f32));
+        let ((column, row), part) = split(self.scale.place(disc), 1.0, self.scale.last_cubic);
+        let (wx, wy) = cubics(part);
         let start = (row - 1) * nodes + column - 1;
         let Some(corner) = table.get(start..start + 3 * nodes + 4) else { return Vec4::ZERO };
         let across = |row: usize| {
@@ -237,39 +238,41 @@ impl LightField {
 
     /// Irradiance of a point that was moved to `point_mm` (sensor frame), with the unit normal out of the
     /// elastomer that it has there. Without shells it answers as for a point that was not moved.
-    pub fn moved(&self, point_mm: DVec3, normal: DVec3) -> [f32; 3] {
+    pub fn moved(&self, point_mm: DVec3, normal: DVec3) -> Vec4 {
         let distance = point_mm.length();
         if self.shells.is_empty() || distance.is_nan() || distance <= 0.0 {
-            return self.still(if distance > 0.0 { point_mm / distance } else { DVec3::Z });
+            return self.still(if distance > 0.0 { (point_mm / distance).as_vec3a() } else { Vec3A::Z });
         }
-        let direction = point_mm / distance;
-        let disc = disc_continued(direction);
-        let (at, x, y) = cell_of(&self.shell_grid, disc);
+        let part = distance / self.radius_mm;
+        let (direction, normal) = ((point_mm / distance).as_vec3a(), normal.as_vec3a());
+        let disc = disc_of(direction);
+        let (at, x, y) = cell_of(&self.shell_grid, &self.shell_scale, disc);
         let nodes = self.shell_grid.nodes;
-        let weights = shell_weights(distance / self.radius_mm);
-        // What the outer shell's coarser table lacks of the undeformed membrane's light belongs to that one's own place and
-        // normal, and is lost on the way from there.
-        let near = smooth_step(1.0 - (1.0 - distance / self.radius_mm).abs() / LACKING_PART)
-            * smooth_step(1.0 - (1.0 - normal.dot(direction)) / LACKING_TILT);
-        let (normal, outward) = (normal.as_vec3a(), direction.as_vec3a());
-        let mut light = Vec3A::ZERO;
-        let Some(corner) = self.shells.get(at..at + nodes + 2) else { return [0.0; 3] };
+        let Some(corner) = self.shells.get(at..at + nodes + 2) else { return Vec4::ZERO };
         let corners = [
             (&corner[0], (1.0 - x) * (1.0 - y)),
             (&corner[1], x * (1.0 - y)),
             (&corner[nodes], (1.0 - x) * y),
             (&corner[nodes + 1], x * y),
         ];
+        let weights = shell_weights(part);
+        let mut light = Vec3A::ZERO;
         for (shells, share) in corners {
-            for (shell, weight) in shells.iter().zip(weights) {
-                light += shell.light(normal) * (weight * share);
-            }
-            light -= shells[0].light(outward) * (near * share);
+            let along = |shell: usize| shells[shell].light(normal) * weights[shell];
+            light += (along(0) + along(1) + along(2)) * share;
         }
+        // What the outer shell's coarser table lacks of the undeformed membrane's light belongs to that one's own place and
+        // normal, and is lost on the way from there.
+        let near = smooth_step(1.0 - (1.0 - part as f32).abs() / LACKING_PART)
+            * smooth_step(1.0 - (1.0 - normal.dot(direction)) / LACKING_TILT);
         if near > 0.0 {
-            light += Vec3A::from_vec4(self.still_at(disc)) * near;
+            let mut outer = Vec3A::ZERO;
+            for (shells, share) in corners {
+                outer += shells[0].light(direction) * share;
+            }
+            light += (Vec3A::from_vec4(self.still_at(disc)) - outer) * near;
         }
-        light.max(Vec3A::ZERO).to_array()
+        light.max(Vec3A::ZERO).extend(0.0)
     }
 
     /// Irradiance of the sheet's top beside the dome, from below: a white marker's.
@@ -320,13 +323,57 @@ impl ShellNode {
 
 /// Depth, as a part of the radius, and turn of the normal, as one less its cosine, at which what the outer shell lacks
 /// does not count any more.
-const LACKING_PART: f64 = 0.05;
-const LACKING_TILT: f64 = 0.02;
+const LACKING_PART: f32 = 0.05;
+const LACKING_TILT: f32 = 0.02;
 
 /// 0 up to 0, 1 from 1 on, smooth between.
-fn smooth_step(t: f64) -> f32 {
+fn smooth_step(t: f32) -> f32 {
     let t = t.clamp(0.0, 1.0);
-    (t * t * (3.0 - 2.0 * t)) as f32
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// The disc's place of a unit direction, as [`super::dome_map::disc_continued`] tells it.
+#[inline]
+fn disc_of(direction: Vec3A) -> Vec2 {
+    Vec2::new(direction.x, direction.y) * (1.0 + direction.z.max(-0.25)).sqrt().recip()
+}
+
+/// What leads from the disc to a grid.
+#[derive(Debug, Clone, Copy)]
+struct Scale {
+    cells: f32,
+    middle: f32,
+    /// Beyond these a cubic, or a cell, lacks nodes.
+    last_cubic: f32,
+    last_cell: f32,
+}
+
+impl Scale {
+    fn of(grid: &DomeGrid) -> Self {
+        let nodes = grid.nodes as f32;
+        Self {
+            cells: 0.5 * grid.cells() as f32,
+            middle: 0.5 * (nodes - 1.0),
+            last_cubic: nodes - 2.001,
+            last_cell: nodes - 2.0,
+        }
+    }
+
+    /// Grid coordinates of a place in the disc's plane.
+    #[inline]
+    fn place(&self, disc: Vec2) -> Vec2 {
+        disc * self.cells + Vec2::splat(self.middle)
+    }
+}
+
+/// The cell of a place of a grid, as column and row, and where in it, kept within some coordinates that no cell's number
+/// passes. NaN, which no direction gives, is the first.
+#[inline]
+fn split(at: Vec2, first: f32, last: f32) -> ((usize, usize), Vec2) {
+    let within = |v: f32| if v > first { if v < last { v } else { last } } else { first };
+    let (x, y) = (within(at.x), within(at.y));
+    let (column, row) = (x as i32, y as i32);
+    ((column as usize, row as usize), Vec2::new(x - column as f32, y - row as f32))
 }
 
 /// A function of the disc at a place, beyond its rim as the parabola through the rim and two places inside goes on, as
@@ -404,25 +451,27 @@ fn shell_weights(part: f64) -> [f32; 3] {
     ]
 }
 
-/// Weights of the four nodes about a place between the middle two: the cubic spline's.
+/// Weights of the four nodes about a place between the middle two, along x and along y: the cubic spline's.
 #[inline]
-fn cubic(t: f32) -> [f32; 4] {
-    let s = 1.0 - t;
+fn cubics(part: Vec2) -> ([f32; 4], [f32; 4]) {
+    // Both at once.
+    let t = Vec4::new(part.x, part.y, 0.0, 0.0);
+    let s = Vec4::ONE - t;
     let sixth = 1.0 / 6.0;
-    [
-        s * s * s * sixth,
-        (t * t * (3.0 * t - 6.0) + 4.0) * sixth,
-        (s * s * (3.0 * s - 6.0) + 4.0) * sixth,
-        t * t * t * sixth,
-    ]
+    let (t2, s2) = (t * t, s * s);
+    let four = Vec4::splat(4.0);
+    let weights = [
+        s * s2 * sixth,
+        (t2 * (t * 3.0 - 6.0) + four) * sixth,
+        (s2 * (s * 3.0 - 6.0) + four) * sixth,
+        t * t2 * sixth,
+    ];
+    (weights.map(|w| w.x), weights.map(|w| w.y))
 }
 
 /// Index of the lower corner of the cell of a place of the disc, and the place in it.
 #[inline]
-fn cell_of(grid: &DomeGrid, disc: DVec2) -> (usize, f32, f32) {
-    let at = grid.coordinates_of_disc(disc);
-    let last = (grid.nodes - 2) as f64;
-    let (x, y) = (at.x.clamp(0.0, last), at.y.clamp(0.0, last));
-    let (column, row) = (x as usize, y as usize);
-    (row * grid.nodes + column, (x - column as f64) as f32, (y - row as f64) as f32)
+fn cell_of(grid: &DomeGrid, scale: &Scale, disc: Vec2) -> (usize, f32, f32) {
+    let ((column, row), part) = split(scale.place(disc), 0.0, scale.last_cell);
+    (row * grid.nodes + column, part.x, part.y)
 }

@@ -1,0 +1,83 @@
+//! Squares of which each pixel is lit for itself, where all that it takes is told: at less than dividing them costs, and with
+//! nothing left between nodes.
+
+use glam::Vec3A;
+
+use super::motion::{SMALLEST, Source, shares};
+use super::{Known, Lit, LitSurface, rays, units};
+use crate::sim::shading::PlainSample;
+use crate::sim::work::Work;
+
+impl Lit {
+    /// Lights each pixel of a smallest settled square, of which the rays are told and the membrane stands still or its light
+    /// changes smoothly; `false`, and nothing is done, where that is not so.
+    pub(super) fn paint(
+        &mut self,
+        surface: &LitSurface<'_>,
+        corner: (usize, usize),
+        work: &mut Work,
+    ) -> bool {
+        let (square, rays) = (self.square(corner), self.rays(corner));
+        let is_plain = matches!(square.source, Source::Still | Source::Little);
+        let Some(seen) = surface.at(corner.1).filter(|_| is_plain && rays.are_told) else { return false };
+        let radius_mm = seen.optics.dome_radius_mm() as f32;
+        let (is_little, per_radius) = (square.source == Source::Little, 1.0 / radius_mm);
+        let motion = |node: u32| self.motions.get(node as usize).copied().unwrap_or_default();
+        let (nodes, moves) = (rays.nodes.map(motion), square.nodes.map(motion));
+        self.plain.clear();
+        for y in corner.1..corner.1 + SMALLEST {
+            // Along y in the columns of nodes, then along x.
+            let wy = rays::WEIGHTS[y - corner.1];
+            let column = |i: usize| {
+                let sum = |part: fn(&super::Motion) -> Vec3A| {
+                    (part(&nodes[i]) * wy[0] + part(&nodes[4 + i]) * wy[1])
+                        + (part(&nodes[8 + i]) * wy[2] + part(&nodes[12 + i]) * wy[3])
+                };
+                [sum(|node| node.base_mm), sum(|node| node.inside)]
+            };
+            let columns = [column(0), column(1), column(2), column(3)];
+            let wy = shares(&square, y, square.corner.1);
+            let move_of = |i: usize| {
+                let sum = |part: fn(&super::Motion) -> Vec3A| {
+                    part(&moves[i]) * wy[0] + part(&moves[3 + i]) * wy[1] + part(&moves[6 + i]) * wy[2]
+                };
+                [sum(|node| node.shift_mm), sum(|node| node.change)]
+            };
+            let moves = if is_little { [move_of(0), move_of(1), move_of(2)] } else { [[Vec3A::ZERO; 2]; 3] };
+            for x in corner.0..corner.0 + SMALLEST {
+                let w = rays::WEIGHTS[x - corner.0];
+                let across = |part: usize| {
+                    (columns[0][part] * w[0] + columns[1][part] * w[1])
+                        + (columns[2][part] * w[2] + columns[3][part] * w[3])
+                };
+                let (base_mm, inside) = (across(0), across(1));
+                let inside = inside * inside.length_recip();
+                let along = base_mm.dot(inside);
+                let left = along * along + (radius_mm * radius_mm - base_mm.length_squared());
+                let place_mm = base_mm + inside * (left.max(0.0).sqrt() - along);
+                let mut sample =
+                    PlainSample { direction: place_mm * per_radius, cosine: -inside.z, change: Vec3A::ZERO };
+                if is_little {
+                    let w = shares(&square, x, square.corner.0);
+                    let across = |k: usize| moves[0][k] * w[0] + moves[1][k] * w[1] + moves[2][k] * w[2];
+                    sample.direction = (place_mm + across(0)).normalize_or(Vec3A::Z);
+                    sample.change = across(1);
+                }
+                self.plain.push(sample);
+            }
+        }
+        self.shown.clear();
+        surface.shading.plain_levels(&self.plain, &mut self.shown, work);
+        work.add_base((SMALLEST * SMALLEST) as u64 * units::TOLD_RAY);
+        for (row, levels) in self.shown.chunks_exact(SMALLEST).enumerate() {
+            let start = (corner.1 + row) * self.width + corner.0;
+            if let Some(places) = self.levels.get_mut(start..start + SMALLEST) {
+                places.copy_from_slice(levels);
+            }
+            if let Some(places) = self.known.get_mut(start..start + SMALLEST) {
+                places.fill(Known::Lit);
+            }
+        }
+        true
+    }
+}

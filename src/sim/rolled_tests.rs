@@ -94,12 +94,11 @@ fn a_dome_between_frames_is_the_mean_of_both() {
             assert!(a.distance(*b) < 1e-12, "{k}: {a} {b}");
             largest = largest.max(a.length());
             // A ray from the middle of the base through the point.
-            let out = places[k].normalize();
+            let (place, out) = (places[k].as_vec3a(), places[k].normalize().as_vec3a());
             let (with, without) = (shape.dent.as_ref().unwrap(), alone.dent.as_ref().unwrap());
-            if let (Some((at, one)), Some((_, other))) = (
-                with.meet(places[k], out, glam::DVec3::ZERO),
-                without.meet(places[k], out, glam::DVec3::ZERO),
-            ) {
+            if let (Some((at, one)), Some((_, other))) =
+                (with.meet(place, out, glam::Vec3A::ZERO), without.meet(place, out, glam::Vec3A::ZERO))
+            {
                 let off = one.displacement_mm.distance(other.displacement_mm);
                 assert!(off < 0.01 && one.normal.angle_between(other.normal) < 0.1, "{frames}: {at} {off}");
             }

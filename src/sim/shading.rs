@@ -9,11 +9,11 @@ use super::work::Work;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceSample {
     /// Where the point is.
-    pub point_mm: DVec3,
+    pub point_mm: Vec3A,
     /// Unit normal out of the elastomer there, of the deformed surface.
-    pub normal: DVec3,
+    pub normal: Vec3A,
     /// Unit direction inside the elastomer from the point towards the camera.
-    pub to_camera: DVec3,
+    pub to_camera: Vec3A,
     /// What an object has done to it.
     pub moved: Moved,
 }
@@ -74,14 +74,14 @@ pub trait Shading: Send + Sync {
 
     /// What is added to the brightness of an undeformed point in the same direction from the dome's centre where the
     /// membrane lies at `point_mm` with this unit normal; before losses on the way to the camera.
-    fn change(&self, point_mm: DVec3, normal: DVec3) -> Vec3A;
+    fn change(&self, point_mm: Vec3A, normal: Vec3A) -> Vec3A;
 
     /// How far the light of the undeformed membrane may be, full scales, from the surface of the second order through
     /// nine nodes in rows of three over a part of the dome that holds these directions from its centre.
-    fn bend(&self, directions: &[DVec3]) -> f32;
+    fn bend(&self, directions: &[Vec3A]) -> f32;
 
     /// How much further that of the displaced membrane may be, for what its sharp bends and the tables of its light do.
-    fn moved_bend(&self, directions: &[DVec3], turned: Turned) -> f32;
+    fn moved_bend(&self, directions: &[Vec3A], turned: Turned) -> f32;
 
     /// Brightness of a white marker at a place of the sheet's top.
     fn marker_level(&self, scene: &Scene, _position_mm: DVec3) -> [f32; 3] {

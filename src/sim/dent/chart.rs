@@ -1,6 +1,6 @@
 //! One table of the displaced membrane: a spline over a chart of a cap of the dome.
 
-use glam::{DVec3, Vec4};
+use glam::{DVec3, Vec2, Vec3A, Vec4};
 
 use super::bends::Bends;
 use crate::sim::shading::Turned;
@@ -19,16 +19,31 @@ const EDGE_STEPS: f64 = 2.5;
 
 /// How far the outline of a small part of the dome may bulge beyond the box around its corners in the chart, as a part of
 /// the box's width; parts are at most some tenths of the radius wide.
-const BULGE: f64 = 0.1;
+const BULGE: f32 = 0.1;
 
 /// The membrane at a place of a chart.
 pub(super) struct Moved {
-    pub displacement_mm: DVec3,
+    pub displacement_mm: Vec3A,
     /// Tangents of the moved membrane: its derivatives by the chart's coordinates.
-    pub along_x: DVec3,
-    pub along_y: DVec3,
+    pub along_x: Vec3A,
+    pub along_y: Vec3A,
     /// Bound on how much the normal turns with the way about there, rad/mm.
-    pub turn: f64,
+    pub turn: f32,
+}
+
+/// What a look-up asks of a chart, as short numbers: the directions of its middle, its x and its y, and lengths in mm.
+/// Rounding leaves some nanometres.
+#[derive(Debug, Clone, Copy)]
+struct Rough {
+    middle: Vec3A,
+    side: Vec3A,
+    up: Vec3A,
+    radius_mm: f32,
+    per_radius: f32,
+    half_mm: f32,
+    per_step: f32,
+    /// The first cell that lacks nodes.
+    last: f32,
 }
 
 /// One table.
@@ -42,6 +57,7 @@ pub(super) struct Chart {
     half_mm: f64,
     nodes: usize,
     per_step: f64,
+    rough: Rough,
     /// The spline's coefficients, mm; the fourth number is nothing.
     moved: Vec<Vec4>,
     bends: Bends,
@@ -58,7 +74,17 @@ impl Chart {
         let half_mm = reach_mm * (nodes as f64 + 4.0) / nodes as f64;
         let per_step = (nodes as f64 - 1.0) / (2.0 * half_mm);
         let (moved, bends) = (Vec::new(), Bends::default());
-        Self { middle, side, up, radius_mm, half_mm, nodes, per_step, moved, bends }
+        let rough = Rough {
+            middle: middle.as_vec3a(),
+            side: side.as_vec3a(),
+            up: up.as_vec3a(),
+            radius_mm: radius_mm as f32,
+            per_radius: (1.0 / radius_mm) as f32,
+            half_mm: half_mm as f32,
+            per_step: per_step as f32,
+            last: nodes as f32 - 2.0,
+        };
+        Self { middle, side, up, radius_mm, half_mm, nodes, per_step, rough, moved, bends }
     }
 
     /// The chart with its displacements. Below the rim, where there is no dome, they go on as they came: what the rim has
@@ -97,9 +123,9 @@ impl Chart {
                 let part = part.clamp(0.0, 1.0) as f32;
                 if part > 0.0
                     && at.z >= 0.0
-                    && let Some(theirs) = around.at(around.place(*at))
+                    && let Some(theirs) = around.at(around.place(at.as_vec3a()))
                 {
-                    let theirs = theirs.displacement_mm.as_vec3().extend(0.0);
+                    let theirs = theirs.displacement_mm.extend(0.0);
                     *moved = moved.lerp(theirs, part * part * (3.0 - 2.0 * part));
                 }
             }
@@ -125,75 +151,82 @@ impl Chart {
         self.moved.len() as u64
     }
 
-    /// Radius of the dome, mm.
-    pub fn radius_mm(&self) -> f64 {
-        self.radius_mm
-    }
-
     /// Bound on the steepest slope of the displacement.
     pub fn steepest(&self) -> f32 {
         self.bends.steepest
     }
 
     /// How the membrane may bend where the chart holds a part of the dome, and whether it holds all of it.
-    pub fn bend(&self, places_mm: &[DVec3], slant: f64) -> (Turned, bool) {
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    pub fn bend(&self, places_mm: &[Vec3A], slant: f32) -> (Turned, bool) {
+        let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
         for at in places_mm {
             let place = self.place(*at);
-            low = [0, 1].map(|k| low[k].min(place[k]));
-            high = [0, 1].map(|k| high[k].max(place[k]));
+            (low, high) = (low.min(place), high.max(place));
         }
-        let wide_mm = (high[0] - low[0]).max(high[1] - low[1]);
+        let wide_mm = (high - low).max_element();
         if wide_mm.is_nan() || wide_mm < 0.0 {
             return (Turned::default(), false);
         }
         // Cells, as far as the chart reaches.
-        let last = self.nodes as f64 - 2.0;
-        let cells = |margin_mm: f64| {
+        let Rough { half_mm, per_step, last, .. } = self.rough;
+        let cells = |margin_mm: f32| {
             let margin_mm = margin_mm + BULGE * wide_mm;
-            let [low, high] = [low.map(|v| v - margin_mm), high.map(|v| v + margin_mm)]
-                .map(|v| v.map(|v| (v + self.half_mm) * self.per_step));
-            let is_whole = low.iter().all(|v| *v >= 1.0) && high.iter().all(|v| *v < last);
-            let meets = low.iter().all(|v| *v < last) && high.iter().all(|v| *v >= 1.0);
-            let range = |k: usize| low[k].max(1.0) as usize..high[k].min(last - 1.0).max(1.0) as usize + 1;
-            (meets.then(|| [range(0), range(1)]), is_whole)
+            let low = (low + (half_mm - margin_mm)) * per_step;
+            let high = (high + (half_mm + margin_mm)) * per_step;
+            let is_whole = low.min_element() >= 1.0 && high.max_element() < last;
+            let meets = low.max_element() < last && high.min_element() >= 1.0;
+            let range = |low: f32, high: f32| {
+                low.max(1.0) as i32 as usize..high.min(last - 1.0).max(1.0) as i32 as usize + 1
+            };
+            (meets.then(|| [range(low.x, high.x), range(low.y, high.y)]), is_whole)
         };
         let (about, _) = cells(0.0);
         let Some(about) = about else { return (Turned::default(), false) };
         // A slanting ray meets the moved membrane beside the place where it met the undeformed one.
-        let beside_mm = f64::from(self.bends.farthest(self.nodes, &about)) * slant;
+        let beside_mm = self.bends.farthest(self.nodes, &about) * slant;
         let (about, is_whole) = cells(beside_mm);
         let Some(about) = about else { return (Turned::default(), false) };
-        (self.bends.over(self.nodes, &about, (0.5 * wide_mm * self.per_step) as f32), is_whole)
+        (self.bends.over(self.nodes, &about, 0.5 * wide_mm * per_step), is_whole)
     }
 
     /// The point of the undeformed dome at a place.
-    pub fn point(&self, x: f64, y: f64) -> DVec3 {
+    fn point(&self, x: f64, y: f64) -> DVec3 {
         let s = ((x * x + y * y) / (self.radius_mm * self.radius_mm)).min(4.0);
         let k = (1.0 - 0.25 * s).max(0.0).sqrt();
         self.middle * (self.radius_mm * (1.0 - 0.5 * s)) + (self.side * x + self.up * y) * k
     }
 
+    /// The same as short numbers.
+    #[inline]
+    pub fn point_near(&self, at: Vec2) -> Vec3A {
+        let Rough { middle, side, up, radius_mm, per_radius, .. } = self.rough;
+        let s = (at.length_squared() * (per_radius * per_radius)).min(4.0);
+        let k = (1.0 - 0.25 * s).max(0.0).sqrt();
+        middle * (radius_mm * (1.0 - 0.5 * s)) + (side * at.x + up * at.y) * k
+    }
+
     /// Coordinates of a point of the undeformed dome, mm.
     #[inline]
-    pub fn place(&self, rest_mm: DVec3) -> [f64; 2] {
-        let along = rest_mm.dot(self.middle) / self.radius_mm;
-        let stretch = (2.0 / (1.0 + along).max(1e-9)).sqrt();
-        [rest_mm.dot(self.side) * stretch, rest_mm.dot(self.up) * stretch]
+    pub fn place(&self, rest_mm: Vec3A) -> Vec2 {
+        let Rough { middle, side, up, per_radius, .. } = self.rough;
+        let along = rest_mm.dot(middle) * per_radius;
+        let stretch = (2.0 / (1.0 + along).max(1e-6)).sqrt();
+        Vec2::new(rest_mm.dot(side), rest_mm.dot(up)) * stretch
     }
 
     /// The membrane at a place; `None` outside the chart.
     #[inline]
-    pub fn at(&self, [x, y]: [f64; 2]) -> Option<Moved> {
-        let (gx, gy) = ((x + self.half_mm) * self.per_step, (y + self.half_mm) * self.per_step);
-        let last = self.nodes as f64 - 2.0;
+    pub fn at(&self, place: Vec2) -> Option<Moved> {
+        let Rough { middle, side, up, per_radius, half_mm, per_step, last, .. } = self.rough;
+        let (x, y) = (place.x, place.y);
+        let (gx, gy) = ((x + half_mm) * per_step, (y + half_mm) * per_step);
         if !(gx >= 1.0 && gy >= 1.0 && gx < last && gy < last) {
             return None;
         }
         // Numbers of one size with signs are what machines turn into each other at once.
         let (i, j) = (gx as i32, gy as i32);
-        let (wx, dx) = spline((gx - f64::from(i)) as f32);
-        let (wy, dy) = spline((gy - f64::from(j)) as f32);
+        let (wx, dx) = spline(gx - i as f32);
+        let (wy, dy) = spline(gy - j as f32);
         let (i, j) = (i as usize, j as usize);
         let start = (j - 1) * self.nodes + i - 1;
         let corner = self.moved.get(start..start + 3 * self.nodes + 4)?;
@@ -207,19 +240,16 @@ impl Chart {
             by_y += across * dy[row];
         }
         // Tangents of the chart, then of the moved surface.
-        let r2 = self.radius_mm * self.radius_mm;
-        let k = (1.0 - (x * x + y * y) / (4.0 * r2)).max(1e-12).sqrt();
-        let bend = 1.0 / (4.0 * r2 * k);
-        let (side, up) = (self.side, self.up);
-        let per_radius = 1.0 / self.radius_mm;
-        let tangent_x = side * (k - x * x * bend) - up * (x * y * bend) - self.middle * (x * per_radius);
-        let tangent_y = up * (k - y * y * bend) - side * (x * y * bend) - self.middle * (y * per_radius);
-        let wide = |v: Vec4| v.truncate().as_dvec3();
+        let quarter = 0.25 * per_radius * per_radius;
+        let k = (1.0 - place.length_squared() * quarter).max(1e-6).sqrt();
+        let bend = quarter / k;
+        let tangent_x = side * (k - x * x * bend) - up * (x * y * bend) - middle * (x * per_radius);
+        let tangent_y = up * (k - y * y * bend) - side * (x * y * bend) - middle * (y * per_radius);
         Some(Moved {
-            displacement_mm: wide(u),
-            along_x: tangent_x + wide(by_x) * self.per_step,
-            along_y: tangent_y + wide(by_y) * self.per_step,
-            turn: per_radius + f64::from(self.bends.second.get(j * self.nodes + i).copied().unwrap_or(0.0)),
+            displacement_mm: Vec3A::from_vec4(u),
+            along_x: tangent_x + Vec3A::from_vec4(by_x) * per_step,
+            along_y: tangent_y + Vec3A::from_vec4(by_y) * per_step,
+            turn: per_radius + self.bends.second.get(j * self.nodes + i).copied().unwrap_or(0.0),
         })
     }
 }

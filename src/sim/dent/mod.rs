@@ -11,7 +11,7 @@
 mod bends;
 mod chart;
 
-use glam::DVec3;
+use glam::{DVec3, Vec2, Vec3A};
 
 use self::chart::{Chart, Moved};
 use super::shading::Turned;
@@ -43,9 +43,9 @@ pub struct Dent {
 #[derive(Debug, Clone, Copy)]
 pub struct Dented {
     /// Its displacement, mm.
-    pub displacement_mm: DVec3,
+    pub displacement_mm: Vec3A,
     /// Outward unit normal of the deformed membrane there.
-    pub normal: DVec3,
+    pub normal: Vec3A,
 }
 
 /// Where the nodes of the tables lie: one for all the times that are to be mixed.
@@ -123,7 +123,7 @@ impl Dent {
     /// How the membrane may bend over a part of the dome that holds some points of the undeformed one, seen along rays
     /// whose angle with the normal has a tangent of at most `slant`. The bound on the tilt is for nine nodes in rows
     /// of three over the part, half as far apart as it is wide.
-    pub fn bend(&self, places_mm: &[DVec3], slant: f64) -> Turned {
+    pub fn bend(&self, places_mm: &[Vec3A], slant: f32) -> Turned {
         let mut all = Turned::default();
         for chart in [&self.close, &self.wide].into_iter().flatten() {
             let (bend, is_whole) = chart.bend(places_mm, slant);
@@ -142,7 +142,7 @@ impl Dent {
     }
 
     /// The place of a chart that serves a point of the undeformed dome best.
-    fn near(&self, rest_mm: DVec3) -> Option<(&Chart, [f64; 2], Moved)> {
+    fn near(&self, rest_mm: Vec3A) -> Option<(&Chart, Vec2, Moved)> {
         [&self.close, &self.wide].into_iter().flatten().find_map(|chart| {
             let place = chart.place(rest_mm);
             Some((chart, place, chart.at(place)?))
@@ -156,21 +156,21 @@ impl Dent {
     /// Newton's method on the chart: the ray meets the tangent plane of the moved membrane, and the way there along the
     /// plane is the next step. A step that does not shrink gives way to the plain one, the point of the sphere on the
     /// ray moved back by the displacement, which does as long as the membrane does not fold.
-    pub fn meet(&self, rest_mm: DVec3, inside: DVec3, near_mm: DVec3) -> Option<(DVec3, Dented)> {
+    pub fn meet(&self, rest_mm: Vec3A, inside: Vec3A, near_mm: Vec3A) -> Option<(Vec3A, Dented)> {
         let mut place =
-            if near_mm == DVec3::ZERO { rest_mm } else { back_on_sphere(rest_mm, inside, near_mm) };
-        let mut last = f64::INFINITY;
+            if near_mm == Vec3A::ZERO { rest_mm } else { back_on_sphere(rest_mm, inside, near_mm) };
+        let mut last = f32::INFINITY;
         // At a crease Newton's steps may jump from side to side: then the nearest of them, and from it plain ones.
-        let (mut nearest_mm, mut least) = (DVec3::ZERO, f64::INFINITY);
+        let (mut nearest_mm, mut least) = (Vec3A::ZERO, f32::INFINITY);
         for step in 1..=MOST_STEPS + PLAIN_STEPS {
-            let (chart, [x, y], moved) = self.near(place)?;
+            let (chart, at, moved) = self.near(place)?;
             let normal = moved.along_x.cross(moved.along_y);
             let surface = place + moved.displacement_mm;
             let along = (surface - rest_mm).dot(normal) / inside.dot(normal);
             let miss = rest_mm + inside * along - surface;
             let miss2 = miss.length_squared();
-            let found = |place: DVec3, displacement_mm| {
-                let normal = normal.try_normalize().unwrap_or(place / chart.radius_mm());
+            let found = |place: Vec3A, displacement_mm| {
+                let normal = normal.try_normalize().unwrap_or(place.normalize_or(Vec3A::Z));
                 Some((place, Dented { displacement_mm, normal }))
             };
             if miss2 < least {
@@ -181,12 +181,11 @@ impl Dent {
             }
             let on_plane = || {
                 let per = normal.length_squared().recip();
-                [miss.cross(moved.along_y).dot(normal) * per, moved.along_x.cross(miss).dot(normal) * per]
+                Vec2::new(miss.cross(moved.along_y).dot(normal), moved.along_x.cross(miss).dot(normal)) * per
             };
             if miss2 * moved.turn * moved.turn < NEAR_RAD * NEAR_RAD {
                 // So near that the tangent plane is the membrane: the point on it, and where that was.
-                let [a, b] = on_plane();
-                let place = chart.point(x + a, y + b);
+                let place = chart.point_near(at + on_plane());
                 return found(place, surface + miss - place);
             }
             // NaN, of a ray along the plane, is no smaller either.
@@ -195,8 +194,7 @@ impl Dent {
                     nearest_mm.lerp(moved.displacement_mm, if step == MOST_STEPS { 0.0 } else { 0.5 });
                 back_on_sphere(rest_mm, inside, nearest_mm)
             } else if miss2 < 0.25 * last && miss2 < FARTHEST_MM * FARTHEST_MM {
-                let [a, b] = on_plane();
-                chart.point(x + a, y + b)
+                chart.point_near(at + on_plane())
             } else {
                 back_on_sphere(rest_mm, inside, moved.displacement_mm)
             };
@@ -207,7 +205,7 @@ impl Dent {
 }
 
 /// Where a ray moved back by a displacement meets the sphere that it met at `rest_mm`.
-fn back_on_sphere(rest_mm: DVec3, inside: DVec3, displacement_mm: DVec3) -> DVec3 {
+fn back_on_sphere(rest_mm: Vec3A, inside: Vec3A, displacement_mm: Vec3A) -> Vec3A {
     let radius_mm = rest_mm.length();
     let base = rest_mm - displacement_mm;
     // |base + s inside| = R; the root near zero.
@@ -216,7 +214,7 @@ fn back_on_sphere(rest_mm: DVec3, inside: DVec3, displacement_mm: DVec3) -> DVec
     let root = (b * b + c).max(0.0).sqrt();
     let s = if b > 0.0 { c / (b + root) } else { root - b };
     let next = base + inside * s;
-    next * (radius_mm / next.length().max(1e-12))
+    next * (radius_mm / next.length().max(1e-6))
 }
 
 /// Repetitions of [`Dent::meet`]; a slope of 0.5 leaves a thousandth after ten.
@@ -225,6 +223,6 @@ const MOST_STEPS: u32 = 10;
 const PLAIN_STEPS: u32 = 16;
 /// A step over which the membrane turns by no more than this ends it, rad: tenths of a grey level, and what the tangent
 /// plane leaves of the place is far less.
-const NEAR_RAD: f64 = 4e-4;
+const NEAR_RAD: f32 = 4e-4;
 /// A step longer than this is none of Newton's, mm.
-const FARTHEST_MM: f64 = 1.0;
+const FARTHEST_MM: f32 = 1.0;

@@ -180,21 +180,20 @@ pub(super) fn leaves(optics: &crate::optics::SensorOptics, momentum: f64, beside
 
 impl Shading for LitDome {
     fn levels(&self, samples: &[SurfaceSample], levels: &mut Vec<Vec4>, work: &mut Work) {
-        let per_mm = 1.0 / self.radius_mm;
+        let per_mm = 1.0 / self.radius_mm as f32;
         let mut moved = 0_u64;
         levels.extend(samples.iter().map(|sample| {
             let (light, change) = match sample.moved {
-                Moved::Not => (self.field.still((sample.point_mm * per_mm).as_vec3a()), Vec4::ZERO),
+                Moved::Not => (self.field.still(sample.point_mm * per_mm), Vec4::ZERO),
                 Moved::Little(change) => {
-                    let direction = sample.point_mm.normalize_or(DVec3::Z);
-                    (self.field.still(direction.as_vec3a()), change.extend(0.0))
+                    (self.field.still(sample.point_mm.normalize_or(Vec3A::Z)), change.extend(0.0))
                 }
                 Moved::Far => {
                     moved += 1;
                     (self.field.moved(sample.point_mm, sample.normal), Vec4::ZERO)
                 }
             };
-            self.level(light, change, sample.to_camera.z as f32)
+            self.level(light, change, sample.to_camera.z)
         }));
         let still = samples.len() as u64 - moved;
         work.add(EffectName::DirectLight, STILL_UNITS * still + MOVED_UNITS * moved);
@@ -213,17 +212,17 @@ impl Shading for LitDome {
         }
     }
 
-    fn change(&self, point_mm: DVec3, normal: DVec3) -> Vec3A {
+    fn change(&self, point_mm: Vec3A, normal: Vec3A) -> Vec3A {
         let moved = self.field.moved(point_mm, normal);
-        let still = self.field.still(point_mm.normalize_or(DVec3::Z).as_vec3a());
+        let still = self.field.still(point_mm.normalize_or(Vec3A::Z));
         (self.gain * (moved - still)).truncate().into()
     }
 
-    fn bend(&self, directions: &[DVec3]) -> f32 {
+    fn bend(&self, directions: &[Vec3A]) -> f32 {
         self.gain.max_element() * self.field.bend(directions)
     }
 
-    fn moved_bend(&self, directions: &[DVec3], turned: Turned) -> f32 {
+    fn moved_bend(&self, directions: &[Vec3A], turned: Turned) -> f32 {
         self.gain.max_element() * self.field.moved_bend(directions, turned)
     }
 

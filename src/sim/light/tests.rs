@@ -1,6 +1,6 @@
 use std::f64::consts::{PI, TAU};
 
-use glam::{DAffine3, DMat3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3A};
 
 use super::LightUse;
 use super::bounds;
@@ -381,7 +381,7 @@ fn the_table_of_direct_light_matches_closed_forms_to_a_thousandth() {
         let moved = direction * 9.2;
         let normal = (direction + DVec3::new(0.1, -0.2, 0.1)).normalize();
         let exact = lambert_polygon(&corners, 1.0 / PI, moved, -normal);
-        let found = f64::from(field.moved(moved, normal)[0]);
+        let found = f64::from(field.moved(moved.as_vec3a(), normal.as_vec3a())[0]);
         assert!((found - exact).abs() < 2e-2 * brightest, "moved {direction}: {found} {exact}");
     }
 }
@@ -442,9 +442,9 @@ fn the_sensor_is_lit_from_three_sides() {
     }
     // A point that was not moved has the same light by either table.
     let sample = |direction: DVec3, deformed| SurfaceSample {
-        point_mm: direction * 10.0,
-        normal: direction,
-        to_camera: DVec3::NEG_Z,
+        point_mm: (direction * 10.0).as_vec3a(),
+        normal: direction.as_vec3a(),
+        to_camera: Vec3A::NEG_Z,
         moved: if deformed { Moved::Far } else { Moved::Not },
     };
     let moved_scene = self::scene(
@@ -481,9 +481,9 @@ fn largest_change(a: &LitDome, b: &LitDome, deformed: bool) -> f64 {
     for direction in directions(3_000) {
         let part = if deformed { (1.0 - direction.z).max(0.93) } else { 1.0 };
         let sample = SurfaceSample {
-            point_mm: direction * (10.0 * part),
-            normal: direction,
-            to_camera: DVec3::NEG_Z,
+            point_mm: (direction * (10.0 * part)).as_vec3a(),
+            normal: direction.as_vec3a(),
+            to_camera: Vec3A::NEG_Z,
             moved: if deformed { Moved::Far } else { Moved::Not },
         };
         let mut levels = [Vec::new(), Vec::new()];

@@ -19,7 +19,7 @@ mod smooth;
 
 use std::ops::Range;
 
-use glam::{DVec2, DVec3, Vec4};
+use glam::{DVec2, Vec3A, Vec4};
 
 use self::motion::{Motion, SMALLEST, Square};
 use self::rays::Rays;
@@ -84,7 +84,7 @@ pub struct Lit {
     squares: Vec<Square>,
     rays: Vec<Rays>,
     /// The motion of the pixel that was asked last, mm.
-    moved_mm: DVec3,
+    moved_mm: Vec3A,
     samples: Vec<SurfaceSample>,
     /// Of each sample the pixel, and the share that it has in its brightness.
     places: Vec<(usize, f32)>,

@@ -1,6 +1,6 @@
 //! Rays and the membrane's motion at few nodes of the picture, and between them.
 
-use glam::{DVec3, Vec3A};
+use glam::Vec3A;
 
 use super::rays::Rays;
 use super::{LARGEST, Lit};
@@ -92,7 +92,7 @@ pub(super) fn shares(square: &Square, at: usize, from: usize) -> [f32; 3] {
 impl Lit {
     /// Room for the motions of a picture; of the last one, nothing is left that could tell on this one's bytes.
     pub(super) fn lay_out_motions(&mut self) {
-        self.moved_mm = DVec3::ZERO;
+        self.moved_mm = Vec3A::ZERO;
         self.motions.clear();
         self.motions.push(Motion::default());
         let lay = |part: usize| (self.width.div_ceil(part), self.height.div_ceil(part));
@@ -172,7 +172,7 @@ impl Lit {
     }
 
     /// How the membrane moves about a pixel of a whole square, mm: there a search begins.
-    pub(super) fn foretold_mm(&self, square: &Square, pixel: (usize, usize)) -> DVec3 {
-        self.told(square, pixel, |motion| [motion.moved_mm])[0].as_dvec3()
+    pub(super) fn foretold_mm(&self, square: &Square, pixel: (usize, usize)) -> Vec3A {
+        self.told(square, pixel, |motion| [motion.moved_mm])[0]
     }
 }

@@ -1,6 +1,6 @@
 //! What single pixels of the lit membrane show: their rays, where these meet the membrane, and the light there.
 
-use glam::{DVec2, DVec3, Vec4};
+use glam::{DVec2, Vec3A, Vec4};
 
 use super::motion::{Motion, Source, Square};
 use super::{Known, LARGEST, Lit, LitSlice, LitSurface, units};
@@ -15,7 +15,7 @@ const BATCH: usize = 512;
 /// Squares that reach further than this beyond the lens's field are all outside it, px.
 const BEYOND_PX: f64 = 4.0 * LARGEST as f64;
 /// What moves by less is not dented, mm.
-const STILL_MM: f64 = 1e-6;
+const STILL_MM: f32 = 1e-6;
 
 impl Lit {
     /// Traces and lights those of some pixels of a square that are not known yet; the square lies in the largest one
@@ -37,16 +37,17 @@ impl Lit {
             let pixel = DVec2::new(x as f64, y as f64);
             let told = if rays.are_told {
                 work.add_base(units::TOLD_RAY);
-                self.told_ray(&rays, (x, y), seen.optics.dome_radius_mm())
+                self.told_ray(&rays, (x, y), seen.optics.dome_radius_mm() as f32)
             } else {
                 None
             };
             let trace = || {
                 work.add_base(units::RAY);
-                match surface.rays.and_then(|rays| rays.at(x, y)) {
+                let hit = match surface.rays.and_then(|rays| rays.at(x, y)) {
                     Some(ray) => seen.optics.follow_continued(ray),
                     None => seen.optics.trace_continued(pixel),
-                }
+                };
+                hit.map(|(place_mm, inside)| (place_mm.as_vec3a(), inside.as_vec3a()))
             };
             let hit = told.map_or_else(trace, Ok);
             let mut known = Known::Lit;
@@ -97,12 +98,12 @@ impl Lit {
     fn sample(
         &mut self,
         (surface, seen): (&LitSurface<'_>, &LitSlice<'_>),
-        (surface_mm, inside): (DVec3, DVec3),
+        (surface_mm, inside): (Vec3A, Vec3A),
         square: &Square,
         asked: Asked,
         work: &mut Work,
     ) -> SurfaceSample {
-        let normal = surface_mm / seen.optics.dome_radius_mm();
+        let normal = surface_mm * (1.0 / seen.optics.dome_radius_mm() as f32);
         let mut sample =
             SurfaceSample { point_mm: surface_mm, normal, to_camera: -inside, moved: Moved::Not };
         let mut motion = Motion::default();
@@ -113,9 +114,9 @@ impl Lit {
                     (sample.point_mm, sample.normal) = (found.point_mm, found.normal);
                     sample.moved = Moved::Far;
                     if asked.is_kept {
-                        motion.shift_mm = (found.point_mm - surface_mm).as_vec3a();
-                        motion.moved_mm = self.moved_mm.as_vec3a();
-                        motion.tilt = (found.normal - normal).as_vec3a();
+                        motion.shift_mm = found.point_mm - surface_mm;
+                        motion.moved_mm = self.moved_mm;
+                        motion.tilt = found.normal - normal;
                         let change = surface.shading.change(found.point_mm, found.normal);
                         motion.change = change;
                         sample.moved = Moved::Little(change);
@@ -126,20 +127,20 @@ impl Lit {
                 let parts = |node: &Motion| [node.shift_mm, node.tilt, node.change];
                 [motion.shift_mm, motion.tilt, motion.change] = self.told(square, asked.pixel, parts);
                 if asked.is_kept {
-                    motion.moved_mm = self.foretold_mm(square, asked.pixel).as_vec3a();
+                    motion.moved_mm = self.foretold_mm(square, asked.pixel);
                 }
-                sample.point_mm += motion.shift_mm.as_dvec3();
-                sample.normal = (normal + motion.tilt.as_dvec3()).normalize_or(normal);
+                sample.point_mm += motion.shift_mm;
+                sample.normal = (normal + motion.tilt).normalize_or(normal);
                 let is_little = square.source == Source::Little;
                 sample.moved = if is_little { Moved::Little(motion.change) } else { Moved::Far };
             }
         }
         if asked.is_kept {
             let cosine = inside.dot(normal).abs();
-            motion.slant = ((1.0 - cosine * cosine).max(0.0).sqrt() / cosine.max(1e-3)) as f32;
+            motion.slant = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine.max(1e-3);
             let base_mm = surface_mm - inside * (surface_mm.z / inside.z);
-            motion.base_mm = base_mm.as_vec3a();
-            (motion.place_mm, motion.inside) = (surface_mm.as_vec3a(), inside.as_vec3a());
+            motion.base_mm = base_mm;
+            (motion.place_mm, motion.inside) = (surface_mm, inside);
             self.keep(asked.pixel, motion);
         }
         sample
@@ -155,7 +156,7 @@ impl Lit {
     ) -> Option<Found> {
         // Where a ray may meet the membrane more than once, what it shows may not depend on what was asked before.
         let near_mm = if dent.may_fold() {
-            DVec3::ZERO
+            Vec3A::ZERO
         } else if square.is_whole {
             self.foretold_mm(square, pixel)
         } else {
@@ -163,7 +164,7 @@ impl Lit {
         };
         let met = dent.meet(still.point_mm, -still.to_camera, near_mm);
         // Neighbours move alike: the last one's motion is where the next node's search begins.
-        self.moved_mm = met.map_or(DVec3::ZERO, |(_, dented)| dented.displacement_mm);
+        self.moved_mm = met.map_or(Vec3A::ZERO, |(_, dented)| dented.displacement_mm);
         let (rest_mm, dented) = met?;
         let has_moved = self.moved_mm.length_squared() > STILL_MM * STILL_MM;
         has_moved.then_some(Found { point_mm: rest_mm + dented.displacement_mm, normal: dented.normal })
@@ -180,14 +181,14 @@ struct Asked {
 
 /// A point of the moved membrane.
 struct Found {
-    point_mm: DVec3,
-    normal: DVec3,
+    point_mm: Vec3A,
+    normal: Vec3A,
 }
 
 /// Stands in for a pixel without a ray, a little beyond the end of the lens's field: twice the brightness at the end less
 /// that as far inside, so that it goes on smoothly. Rays, and the shares of their brightness.
 #[cold]
-fn continued(optics: &SensorOptics, pixel: DVec2) -> [Option<((DVec3, DVec3), f32)>; 2] {
+fn continued(optics: &SensorOptics, pixel: DVec2) -> [Option<((Vec3A, Vec3A), f32)>; 2] {
     let [[_, _, cx], [_, _, cy], _] = optics.lens().spec().matrix;
     let center = DVec2::new(cx, cy);
     let away = pixel - center;
@@ -195,7 +196,10 @@ fn continued(optics: &SensorOptics, pixel: DVec2) -> [Option<((DVec3, DVec3), f3
     if radius_px > end_px + BEYOND_PX {
         return [None; 2];
     }
-    let at = |radius: f64| optics.trace_continued(center + away * (radius / radius_px)).ok();
+    let at = |radius: f64| {
+        let (place_mm, inside) = optics.trace_continued(center + away * (radius / radius_px)).ok()?;
+        Some((place_mm.as_vec3a(), inside.as_vec3a()))
+    };
     // The end is known as a circle that holds the field.
     for _ in 0..8 {
         end_px -= 0.25;

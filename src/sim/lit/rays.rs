@@ -3,7 +3,7 @@
 //! Where a ray passes the plane of the dome's base, and its direction there, are smooth over the picture, beyond the dome's
 //! rim as well: cubics through a lattice of them tell the rays between, and only the sphere is met for each.
 
-use glam::{DVec3, Vec3A};
+use glam::Vec3A;
 
 use super::motion::SMALLEST;
 use super::{Lit, LitSurface};
@@ -95,10 +95,9 @@ impl Lit {
         &self,
         rays: &Rays,
         pixel: (usize, usize),
-        radius_mm: f64,
-    ) -> Option<(DVec3, DVec3)> {
+        radius_mm: f32,
+    ) -> Option<(Vec3A, Vec3A)> {
         let [base_mm, inside] = self.told_base(rays, pixel);
-        let (base_mm, inside) = (base_mm.as_dvec3(), inside.as_dvec3());
         let inside = inside * inside.length_recip();
         let along = base_mm.dot(inside);
         let left = along * along + (radius_mm * radius_mm - base_mm.length_squared());

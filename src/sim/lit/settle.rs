@@ -1,6 +1,6 @@
 //! What tells rays and motion of a whole square from its nodes, and how much of what it shows none of them tells.
 
-use glam::{DVec3, Vec3A};
+use glam::Vec3A;
 
 use super::motion::{Motion, Source, Square};
 use super::smooth::Verdict;
@@ -19,7 +19,7 @@ const LITTLE: f32 = 0.3;
 /// this from what those on both sides say, rad.
 const AT_EDGE_RAD: f32 = 2e-3;
 /// Nearer to the base than this part of the radius, rays graze the dome: what they show bends more than the light does.
-const GRAZING: f64 = 0.2;
+const GRAZING: f32 = 0.2;
 /// Where the light's change is not smooth in itself, its own bend is counted as so many of the resting light's.
 const ALSO: f32 = 1.5;
 /// A ray slants by no more than this; those that do more graze the dome.
@@ -39,14 +39,14 @@ impl Lit {
     pub(super) fn settle(&mut self, surface: &LitSurface<'_>, corner: (usize, usize), side: usize) {
         let before = self.square(corner);
         let mut square = Square { corner, side, ..before };
-        let mut places = [DVec3::ZERO; 9];
+        let mut places = [Vec3A::ZERO; 9];
         let mut count = 0;
         square.slant = 0.0;
         for (node, at) in nine(corner, side).into_iter().zip(&mut square.nodes) {
             *at = self.kept_at(node);
             let Some(kept) = self.kept(node) else { continue };
             if let Some(place) = places.get_mut(count) {
-                *place = kept.place_mm.as_dvec3();
+                *place = kept.place_mm;
                 square.slant = square.slant.max(kept.slant.min(MOST_SLANT));
                 count += 1;
             }
@@ -59,16 +59,16 @@ impl Lit {
 
     /// Decides how the motion of a square comes about, of which some nodes have rays that meet the undeformed dome at
     /// `places`.
-    fn find_source(&self, surface: &LitSurface<'_>, square: &mut Square, places: &[DVec3]) {
+    fn find_source(&self, surface: &LitSurface<'_>, square: &mut Square, places: &[Vec3A]) {
         let (top, bottom) = (square.corner.1, square.corner.1 + square.side);
         let Some(seen) = surface.at(top) else { return };
         square.turned = surface
             .dents(top, bottom)
-            .map(|dent| dent.bend(places, f64::from(square.slant)))
+            .map(|dent| dent.bend(places, square.slant))
             .fold(Turned::default(), Turned::or);
         let turned = square.turned;
-        let per_radius = 1.0 / seen.optics.dome_radius_mm();
-        let mut directions = [DVec3::Z; 9];
+        let per_radius = 1.0 / seen.optics.dome_radius_mm() as f32;
+        let mut directions = [Vec3A::Z; 9];
         directions.iter_mut().zip(places).for_each(|(to, from)| *to = *from * per_radius);
         let directions = directions.get(..places.len()).unwrap_or_default();
         let room = SMOOTH * surface.tolerance;
@@ -117,15 +117,15 @@ impl Lit {
         }
         let seen = surface.at(y)?;
         let corners = [(x, y), (x + side, y), (x, y + side), (x + side, y + side)];
-        let mut places = [DVec3::ZERO; 4];
+        let mut places = [Vec3A::ZERO; 4];
         for (place, (x, y)) in places.iter_mut().zip(corners) {
             *place = if is_whole {
-                self.told(&square, (x, y), |motion| [motion.place_mm])[0].as_dvec3()
+                self.told(&square, (x, y), |motion| [motion.place_mm])[0]
             } else {
-                seen.optics.follow_continued(surface.rays?.at(x, y)?).ok()?.0
+                seen.optics.follow_continued(surface.rays?.at(x, y)?).ok()?.0.as_vec3a()
             };
         }
-        let per_radius = 1.0 / seen.optics.dome_radius_mm();
+        let per_radius = 1.0 / seen.optics.dome_radius_mm() as f32;
         let directions = places.map(|place| place * per_radius);
         let still = surface.shading.bend(&directions);
         let further = |turned: Turned| (ALSO - 1.0) * still + surface.shading.moved_bend(&directions, turned);
@@ -133,7 +133,7 @@ impl Lit {
             Source::Still | Source::Little => 0.0,
             Source::Smooth => further(Turned { tilt_rad: 0.0, ..turned }),
             Source::Exact => {
-                let slant = f64::from(if is_whole { square.slant } else { MOST_SLANT });
+                let slant = if is_whole { square.slant } else { MOST_SLANT };
                 let bends = surface.dents(y, y + side).map(|dent| dent.bend(&places, slant));
                 let turned = bends.fold(Turned::default(), Turned::or);
                 if turned.moved_mm > STILL_MM { further(turned) } else { 0.0 }

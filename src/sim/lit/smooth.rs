@@ -118,13 +118,6 @@ impl Lit {
             4 => self.lay::<9>(x, y, &nine),
             _ => self.lay::<17>(x, y, &nine),
         }
-        let side = 2 * half;
-        for j in 0..=side {
-            let start = (y + j) * self.width + x;
-            if let Some(row) = self.known.get_mut(start..=start + side) {
-                row.fill(Known::Lit);
-            }
-        }
     }
 
     /// The surface over a square of so many pixels a side.
@@ -142,6 +135,8 @@ impl Lit {
             for (i, level) in row.iter_mut().enumerate() {
                 *level = across.at(i as f32 * per_half);
             }
+            let known = self.known.get_mut(start..).and_then(|rest| rest.first_chunk_mut::<SIDE>());
+            known.into_iter().for_each(|row| *row = [Known::Lit; SIDE]);
         }
     }
 }

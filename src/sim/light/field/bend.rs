@@ -1,10 +1,9 @@
 //! How sharply the tables of the light bend, cell by cell: what tells a picture where it may fill in between rays.
 
-use glam::{DVec2, DVec3, Vec3A, Vec4};
+use glam::{Vec2, Vec3A, Vec4};
 
-use super::super::dome_map::{DomeGrid, disc_continued};
 use super::super::tables::SHELLS;
-use super::{LightField, ShellNode, ShellNodes};
+use super::{LightField, Scale, ShellNode, ShellNodes, disc_of};
 use crate::sim::rests::{BOTH, largest, rest};
 use crate::sim::shading::Turned;
 
@@ -90,20 +89,20 @@ impl LightField {
     /// How far the undeformed membrane's light may be from the surface of the second order through nine nodes, in rows
     /// of three, over a part of the dome that holds these directions from its centre: two parabolas' rests, from the
     /// largest third differences of the table's cells about.
-    pub fn bend(&self, directions: &[DVec3]) -> f32 {
-        let (low, high) = self.cells(&self.grid, directions);
-        let apart = 0.5 * (high - low).max_element() as f32;
+    pub fn bend(&self, directions: &[Vec3A]) -> f32 {
+        let (low, high) = self.cells(&self.scale, directions);
+        let apart = 0.5 * (high - low).max_element();
         rest(most(&self.bends.third, self.grid.nodes, low, high), apart)
     }
 
     /// The same for what the shells add where the membrane has moved: their kinks, and what they give a normal that is not
     /// quite known.
-    pub fn moved_bend(&self, directions: &[DVec3], turned: Turned) -> f32 {
+    pub fn moved_bend(&self, directions: &[Vec3A], turned: Turned) -> f32 {
         if self.bends.kink.is_empty() {
             return 0.0;
         }
-        let (low, high) = self.cells(&self.shell_grid, directions);
-        let apart = 0.5 * (high - low).max_element() as f32;
+        let (low, high) = self.cells(&self.shell_scale, directions);
+        let apart = 0.5 * (high - low).max_element();
         let kink = most(&self.bends.kink, self.shell_grid.nodes, low, high + 1.0);
         let turn = most(&self.bends.turn, self.shell_grid.nodes, low, high + 1.0);
         // Near the undeformed membrane its own smooth table stands in for the outer shell.
@@ -113,12 +112,11 @@ impl LightField {
     }
 
     /// The box of cells around some directions.
-    fn cells(&self, grid: &DomeGrid, directions: &[DVec3]) -> (DVec2, DVec2) {
-        let last = DVec2::splat(grid.nodes as f64 - 3.0);
-        let place = |at: &DVec3| grid.coordinates_of_disc(disc_continued(*at)).clamp(DVec2::ONE, last);
-        let (mut low, mut high) = (last, DVec2::ONE);
+    fn cells(&self, scale: &Scale, directions: &[Vec3A]) -> (Vec2, Vec2) {
+        let last = Vec2::splat(scale.last_cell - 1.0);
+        let (mut low, mut high) = (last, Vec2::ONE);
         for at in directions {
-            let place = place(at);
+            let place = scale.place(disc_of(*at)).max(Vec2::ONE).min(last);
             (low, high) = (low.min(place), high.max(place));
         }
         (low.min(high), high)
@@ -126,9 +124,9 @@ impl LightField {
 }
 
 /// The largest value in a box of cells.
-fn most(table: &[f32], nodes: usize, low: DVec2, high: DVec2) -> f32 {
-    let [columns, rows] =
-        [(low.x, high.x), (low.y, high.y)].map(|(low, high)| low as usize..high as usize + 1);
+fn most(table: &[f32], nodes: usize, low: Vec2, high: Vec2) -> f32 {
+    let [columns, rows] = [(low.x, high.x), (low.y, high.y)]
+        .map(|(low, high): (f32, f32)| low as i32 as usize..high as i32 as usize + 1);
     largest(table, nodes, &columns, &rows)
 }
 

@@ -238,13 +238,12 @@ impl LightField {
 
     /// Irradiance of a point that was moved to `point_mm` (sensor frame), with the unit normal out of the
     /// elastomer that it has there. Without shells it answers as for a point that was not moved.
-    pub fn moved(&self, point_mm: DVec3, normal: DVec3) -> Vec4 {
+    pub fn moved(&self, point_mm: Vec3A, normal: Vec3A) -> Vec4 {
         let distance = point_mm.length();
         if self.shells.is_empty() || distance.is_nan() || distance <= 0.0 {
-            return self.still(if distance > 0.0 { (point_mm / distance).as_vec3a() } else { Vec3A::Z });
+            return self.still(if distance > 0.0 { point_mm / distance } else { Vec3A::Z });
         }
-        let part = distance / self.radius_mm;
-        let (direction, normal) = ((point_mm / distance).as_vec3a(), normal.as_vec3a());
+        let (part, direction) = (distance / self.radius_mm as f32, point_mm / distance);
         let disc = disc_of(direction);
         let (at, x, y) = cell_of(&self.shell_grid, &self.shell_scale, disc);
         let nodes = self.shell_grid.nodes;
@@ -263,7 +262,7 @@ impl LightField {
         }
         // What the outer shell's coarser table lacks of the undeformed membrane's light belongs to that one's own place and
         // normal, and is lost on the way from there.
-        let near = smooth_step(1.0 - (1.0 - part as f32).abs() / LACKING_PART)
+        let near = smooth_step(1.0 - (1.0 - part).abs() / LACKING_PART)
             * smooth_step(1.0 - (1.0 - normal.dot(direction)) / LACKING_TILT);
         if near > 0.0 {
             let mut outer = Vec3A::ZERO;
@@ -441,13 +440,14 @@ impl OwnLight {
 
 /// Lagrange's weights of the three shells for a radius, part of the dome's.
 #[inline]
-fn shell_weights(part: f64) -> [f32; 3] {
-    let [a, b, c] = SHELLS;
+fn shell_weights(part: f32) -> [f32; 3] {
+    const PARTS: [f32; 3] = [SHELLS[0] as f32, SHELLS[1] as f32, SHELLS[2] as f32];
+    let [a, b, c] = PARTS;
     let p = part.clamp(0.5, 1.1);
     [
-        ((p - b) * (p - c) / ((a - b) * (a - c))) as f32,
-        ((p - a) * (p - c) / ((b - a) * (b - c))) as f32,
-        ((p - a) * (p - b) / ((c - a) * (c - b))) as f32,
+        (p - b) * (p - c) * (1.0 / ((a - b) * (a - c))),
+        (p - a) * (p - c) * (1.0 / ((b - a) * (b - c))),
+        (p - a) * (p - b) * (1.0 / ((c - a) * (c - b))),
     ]
 }
 

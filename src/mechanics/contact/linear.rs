@@ -13,11 +13,9 @@ use super::finer::{Faces, fine};
 use super::geometric::{Placed, deepest, deepest_from};
 use super::local::DEEPEST;
 use super::state::{ContactState, Status};
-use super::touch::{Candidate, PENETRATION, Rounds, Touch, Way};
+use super::touch::{Candidate, PENETRATION, Rounds, Touch, Way, check_seen};
 use crate::numeric::Rigid;
 
-/// Part of the nodes' distance by which an object that touches nothing may reach into the dome.
-const LEAST_SEEN: f64 = 0.5;
 /// Looks for nodes that no plane held back.
 const MOST_LOOKS: u32 = 8;
 
@@ -100,14 +98,7 @@ impl<'a> Solver<'a> {
     /// Where nothing bears a force, the object must not reach far into the dome.
     fn check_seen(&self) -> Result<(), ContactError> {
         let Some((_, deepest_mm, spacing_mm)) = self.looked else { return Ok(()) };
-        let radius = self.elastomer.dome_radius_mm;
-        let reach = self.touch.placed.walk_out(deepest_mm, -deepest_mm / radius, radius);
-        match reach {
-            Some((depth_mm, _)) if depth_mm > LEAST_SEEN * spacing_mm => {
-                Err(ContactError::Unseen { depth_mm, spacing_mm })
-            }
-            _ => Ok(()),
-        }
+        check_seen(&self.touch.placed, deepest_mm, spacing_mm)
     }
 
     fn state(&self, mut state: ContactState, ended: Rounds, field: SurfaceField) -> ContactState {

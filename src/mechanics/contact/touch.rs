@@ -34,6 +34,20 @@ const LEAST_PART: f64 = 1e-6;
 /// Sweeps of one round.
 const MOST_SWEEPS: u32 = 400;
 
+/// Part of the nodes' distance by which an object that touches nothing may reach into the dome.
+const LEAST_SEEN: f64 = 0.5;
+
+/// Where no node bears a force, the object must not reach far into the dome between the nodes.
+pub(super) fn check_seen(placed: &Placed, deepest_mm: DVec3, spacing_mm: f64) -> Result<(), ContactError> {
+    let radius = deepest_mm.length();
+    match placed.walk_out(deepest_mm, -deepest_mm / radius, radius) {
+        Some((depth_mm, _)) if depth_mm > LEAST_SEEN * spacing_mm => {
+            Err(ContactError::Unseen { depth_mm, spacing_mm })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// A node that may touch.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {

@@ -20,7 +20,7 @@ use super::field::Field;
 use super::geometric::{Placed, deepest};
 use super::local::DEEPEST;
 use super::state::{ContactState, Extent, Status};
-use super::touch::{Candidate, Rounds, Touch, Way};
+use super::touch::{Candidate, Rounds, Touch, Way, check_seen};
 use crate::numeric::Rigid;
 pub(super) use body::Body;
 
@@ -97,8 +97,12 @@ pub(super) fn neo_hookean(
     let steps = state.iterations;
     touch.finish(&mut state, ended);
     state.iterations = steps.max(1);
-    if !good && state.status == Status::Solved {
+    // Also where nothing bears a force: bricks out of balance have no shape to be trusted.
+    if !good {
         state.status = Status::BoundReached;
+    }
+    if state.status == Status::Free {
+        check_seen(&placed, deepest_mm, largest_edge(body))?;
     }
     let surface = body.mesh.surface.iter().map(|(_, node, _)| u_mm[*node as usize]).collect();
     state.field = Field::Bricks(BrickField { body: Arc::clone(body), u_mm: surface });
@@ -189,6 +193,7 @@ fn newton(
     for (candidate, force) in touch.candidates.iter_mut().zip(&forces) {
         candidate.force_n = *force;
     }
+    state.imbalance_n = Some(miss).filter(|miss| miss.is_finite());
     let good = miss <= limit;
     (u, ended, good)
 }

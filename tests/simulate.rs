@@ -42,6 +42,7 @@ fn a_scene_becomes_frames_video_and_truth() {
     let output = domecast(&["simulate", "scene.json", "--out", "out", "--json"], folder.path());
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!((output.status.code(), &told["frames"]), (Some(0), &json!(2)), "{told}");
+    assert_eq!(told["contact"], json!([]), "nothing to say of its contact");
     let out = folder.path().join("out");
     let mut names: Vec<String> = domecast::build::list_files(&out).expect("listed");
     names.sort();
@@ -63,6 +64,7 @@ fn a_scene_becomes_frames_video_and_truth() {
     assert_eq!(lines.len(), 2);
     for (number, line) in lines.iter().enumerate() {
         assert_eq!(line["frame"], json!(number));
+        assert_eq!(line["contact"]["status"], json!(["free", "converged"][number]));
         assert_eq!(line["black_dots"].as_array().map(Vec::len), Some(172));
         assert_eq!(line["white_markers"].as_array().map(Vec::len), Some(4));
         for name in ["id", "image_px", "centroid_px", "surface_mm", "visible"] {
@@ -86,6 +88,28 @@ fn a_scene_becomes_frames_video_and_truth() {
     assert_eq!((&video[..4], &video[8..12]), (&b"RIFF"[..], &b"AVI "[..]));
     let length = u32::from_le_bytes([video[4], video[5], video[6], video[7]]) as usize;
     assert!(length + 8 <= video.len());
+}
+
+#[test]
+fn a_contact_that_does_not_converge_is_named() {
+    // Bricks of 5 mm and more cannot follow a ball that lies 6 mm deep at once.
+    let deep = scene(|scene| {
+        scene["contact"] = json!({ "level": "neo_hookean", "element_mm": 5 });
+        scene["objects"][0]["path"][1]["position_mm"] = json!([0, 0, 8]);
+        scene["frames"]["images"] = json!(false);
+    });
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), &deep);
+    let more = ["simulate", "scene.json", "--everything", "--out", "out"];
+    let output = domecast(&more, folder.path());
+    let message = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    assert!(message.contains("contact not_converged in 1 of 2 frames, first in frame 1: "), "{message}");
+    let output = domecast(&[&more[..], &["--json"]].concat(), folder.path());
+    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let fault = &told["contact"][0];
+    assert_eq!((&fault["status"], &fault["first"]), (&json!("not_converged"), &json!(1)), "{told}");
+    assert_eq!(fault["frames"], json!(1), "{told}");
 }
 
 /// The one line that refuses a scene; nothing is written.

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::output::{Failure, Output};
 use crate::build::WriteError;
 use crate::design::DesignError;
-use crate::sim::run::{self, RunError};
+use crate::sim::run::{self, ContactFault, RunError};
 use crate::sim::{Plan, Scene, SimError};
 
 /// What the command line says besides the scene.
@@ -78,6 +78,11 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
     for (frame, note) in &summary.notes {
         output.warn(&format!("frame {frame}: {note}"));
     }
+    for fault in &summary.contact {
+        let ContactFault { status, frames, first, note } = fault;
+        output
+            .warn(&format!("contact {status} in {frames} of {count} frames, first in frame {first}: {note}"));
+    }
     explain(output, &scene, &plan)?;
     let seconds = began.elapsed().as_secs_f64();
     output.say(&format!("{}: {} frames in {seconds:.2} s", out.display(), summary.frames))?;
@@ -86,6 +91,7 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
         "out": out.display().to_string(),
         "frames": summary.frames,
         "notes": summary.notes,
+        "contact": summary.contact,
         "work": summary.work.total(),
         "plan": plan,
     }))

@@ -45,7 +45,7 @@ pub use render::{Around, Drawn, Renderer, Scratch};
 pub use scene::Scene;
 pub use shading::{Shading, SurfaceSample};
 pub use touch::{Stepper, Touch};
-pub use truth::{DotTruth, EffectTruth, FrameTruth, MarkerTruth};
+pub use truth::{ContactTruth, DotTruth, EffectTruth, FrameTruth, MarkerTruth};
 pub use work::Work;
 
 #[cfg(test)]

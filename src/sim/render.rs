@@ -210,7 +210,7 @@ impl<'a> Renderer<'a> {
             }
             None => (None, Vec::new()),
         };
-        let truth = self.truth(number, &now, &spots, &parts);
+        let truth = self.truth(number, &now, &spots, &parts, around);
         let contact = around.and_then(|around| around.now.contact.clone());
         Ok(Drawn { image, truth, contact, work })
     }
@@ -354,7 +354,14 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    fn truth(&self, number: u32, now: &Instant, spots: &Spots, parts: &[Spots]) -> FrameTruth {
+    fn truth(
+        &self,
+        number: u32,
+        now: &Instant,
+        spots: &Spots,
+        parts: &[Spots],
+        around: Option<&Around>,
+    ) -> FrameTruth {
         let scene = self.scene;
         let seen = Seen { now: spots, parts, reference: self.eye.reference() };
         let held = now.state.held.as_ref();
@@ -362,15 +369,10 @@ impl<'a> Renderer<'a> {
             frame: number,
             time_s: now.time_s,
             status: held.map_or_else(|| "ok".into(), |held| held.limit.into()),
-            note: held.map(|held| {
-                if held.carried < 1.0 {
-                    format!("{} stops the platform at {:.2} % of the load", held.part, 100.0 * held.carried)
-                } else {
-                    format!("{} does not bear the load as the springs' law says", held.part)
-                }
-            }),
+            note: held.map(|held| held.note()),
             pose: now.state.pose.to_rows_4x4(),
             wrench: now.state.wrench.to_array(),
+            contact: around.map(|around| around.now.solved.clone()),
             black_dots: (0..scene.dots().len()).map(|index| dot_truth(scene, index, &seen)).collect(),
             white_markers: (0..scene.markers().len())
                 .map(|index| marker_truth(scene, index, &seen))

@@ -6,6 +6,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::SimError;
 use super::frame::Image8;
@@ -13,6 +14,7 @@ use super::plan::Plan;
 use super::render::{Around, Drawn, Renderer, Scratch};
 use super::scene::Scene;
 use super::touch::Touch;
+use super::truth::{ContactTruth, FrameTruth};
 use super::video::VideoWriter;
 use super::work::Work;
 
@@ -79,8 +81,37 @@ pub struct Summary {
     pub frames: u32,
     /// What could not be as asked, by frame: the platform is held.
     pub notes: Vec<(u32, String)>,
+    /// Frames whose contact is not what the level asks for, by its status in the truth.
+    pub contact: Vec<ContactFault>,
     /// What it took in all.
     pub work: Work,
+}
+
+/// Frames whose contact ended in the same way, short of what the level asks for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ContactFault {
+    /// The contact's status in the truth.
+    pub status: &'static str,
+    /// How many frames.
+    pub frames: u32,
+    /// Number of the first one.
+    pub first: u32,
+    /// What the status means in that one.
+    pub note: String,
+}
+
+impl Summary {
+    /// Takes what a frame's truth says that is not as asked.
+    fn note(&mut self, truth: FrameTruth) {
+        if let Some(note) = truth.note {
+            self.notes.push((truth.frame, format!("{}: {note}", truth.status)));
+        }
+        let Some(ContactTruth { status, note: Some(note), .. }) = truth.contact else { return };
+        match self.contact.iter_mut().find(|fault| fault.status == status) {
+            Some(fault) => fault.frames += 1,
+            None => self.contact.push(ContactFault { status, frames: 1, first: truth.frame, note }),
+        }
+    }
 }
 
 /// Draws all frames of a scene with a plan into a folder; `progress` is told after each batch how many are done.
@@ -164,9 +195,7 @@ pub fn run(
             }
             write_extras(scene, &drawn, &fresh)?;
             writeln!(truth, "{}", drawn.truth.to_line()).map_err(fault("write the truth", &truth_path))?;
-            if let Some(note) = drawn.truth.note {
-                summary.notes.push((number, format!("{}: {note}", drawn.truth.status)));
-            }
+            summary.note(drawn.truth);
             summary.work.merge(&drawn.work);
             summary.frames += 1;
         }

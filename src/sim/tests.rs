@@ -236,6 +236,56 @@ fn bound_coils_are_said_and_the_rest_runs() {
     assert!((truth[2].pose[2][3] - truth[3].pose[2][3]).abs() < 1e-9 && truth[2].pose[2][3] < -1.0);
 }
 
+/// The truth of a ball's frames on the pole at some heights, as it is written, and what the run says of its contact.
+fn contact_told(level: &str, heights_mm: &[f64]) -> (Vec<serde_json::Value>, Vec<run::ContactFault>) {
+    let path: Vec<String> = (0..)
+        .zip(heights_mm)
+        .map(|(time_s, z)| format!(r#"{{ "time_s": {time_s}, "position_mm": [0, 0, {z}] }}"#))
+        .collect();
+    let scene = scene_of(&format!(
+        r#""frames": {{ "count": {}, "rate_hz": 1, "images": false }}, "tolerance": {{ "px": 0.1, "grey": 1 }},
+           "contact": {{ "level": "{level}", "element_mm": 5 }},
+           "objects": [{{ "name": "o", "shape": {{ "kind": "sphere", "radius_mm": 4 }}, "path": [{}] }}]"#,
+        heights_mm.len(),
+        path.join(", "),
+    ))
+    .unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let summary = run::run(&scene, &Plan::everything(&scene).unwrap(), &out, &mut |_| {}).unwrap();
+    let truth = std::fs::read_to_string(out.join(run::TRUTH_NAME)).unwrap();
+    (truth.lines().map(|line| serde_json::from_str(line).unwrap()).collect(), summary.contact)
+}
+
+#[test]
+fn truth_tells_how_the_contact_was_solved() {
+    for level in ["geometric", "closed_form", "linear"] {
+        let (truth, faults) = contact_told(level, &[16.0, 13.6, 13.2]);
+        let status: Vec<_> = truth.iter().map(|line| line["contact"]["status"].as_str().unwrap()).collect();
+        assert_eq!(status, ["free", "converged", "converged"], "{level}");
+        assert!(faults.is_empty(), "{level}: {faults:?}");
+        assert!(truth[0]["contact"]["residual_mm"].is_null(), "{level}: no object was near");
+        for line in &truth[1..] {
+            assert!(line["contact"]["residual_mm"].as_f64().unwrap() < 1e-6, "{level}: {}", line["contact"]);
+            assert!(line["contact"]["iterations"].as_u64().unwrap() > 0, "{level}: {}", line["contact"]);
+            assert!(line["contact"].get("note").is_none(), "{level}: {}", line["contact"]);
+        }
+    }
+    // Bricks of this size cannot follow a ball that lies 6 mm deep at once: no step of Newton's method gains.
+    let (truth, faults) = contact_told("neo_hookean", &[13.2, 16.0, 8.0, 16.0, 8.0]);
+    let status: Vec<_> = truth.iter().map(|line| line["contact"]["status"].as_str().unwrap()).collect();
+    assert_eq!(status, ["converged", "free", "not_converged", "free", "not_converged"]);
+    let off_n = |line: usize| truth[line]["contact"]["imbalance_n"].as_f64().unwrap();
+    assert!(off_n(0) < 1e-8 && off_n(2) > 1e-3 && off_n(4) > 1e-3, "{} {} {}", off_n(0), off_n(2), off_n(4));
+    let told: Vec<_> = faults.iter().map(|fault| (fault.status, fault.frames, fault.first)).collect();
+    assert_eq!(told, [("not_converged", 2, 2)]);
+    assert_eq!(truth[2]["contact"]["note"].as_str(), Some(faults[0].note.as_str()));
+    // Without an object there is no contact to tell of.
+    let still = scene("still.json");
+    let renderer = Renderer::new(&still, &Plan::of(&still).unwrap()).unwrap();
+    assert_eq!(renderer.frame(0).unwrap().truth.contact, None);
+}
+
 #[test]
 fn frames_do_not_depend_on_threads() {
     for (name, count) in [("push.json", 5), ("ball.json", 12)] {

@@ -8,6 +8,7 @@ use super::EffectName;
 use super::SimError;
 use super::scene::object::Hold;
 use super::scene::{Held, Scene, State};
+use super::truth::ContactTruth;
 use super::work::Work;
 use crate::design::DesignError;
 use crate::mechanics::Displacement;
@@ -23,6 +24,8 @@ pub struct Touch {
     pub state: State,
     /// The contact; `None` where nothing touches.
     pub contact: Option<Arc<ContactState>>,
+    /// How it was solved.
+    pub solved: ContactTruth,
 }
 
 /// Solves the contact of a scene from frame to frame.
@@ -51,7 +54,7 @@ impl<'a> Stepper<'a> {
     pub fn next(&mut self, frame: u32, time_s: f64, work: &mut Work) -> Result<Touch, SimError> {
         let free = |rest: &Scene| -> Result<Touch, SimError> {
             let state = rest.state_at(frame, time_s)?;
-            Ok(Touch { state, contact: None })
+            Ok(Touch { state, contact: None, solved: ContactTruth::away() })
         };
         let Some(object) = self.scene.objects().first() else { return free(self.scene) };
         let suspension = self.scene.suspension();
@@ -97,8 +100,9 @@ impl<'a> Stepper<'a> {
         };
         let state = State { pose: pressed.rest_from_platform, wrench: pressed.wrench, held };
         let contact = (!pressed.state.nodes.is_empty()).then(|| Arc::new(pressed.state.clone()));
+        let solved = ContactTruth::of(&pressed);
         self.last = Some(pressed);
-        Ok(Touch { state, contact })
+        Ok(Touch { state, contact, solved })
     }
 }
 

@@ -81,7 +81,7 @@ pub(super) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, 
     let mut faces: BTreeMap<usize, (DVec3, Over)> = BTreeMap::new();
     for (number, at_mm) in near {
         let (mut told_mm, mut shares) = (0.0, 0.0);
-        for (node, share) in places.parts(grid, number) {
+        for &(node, share) in places.parts(grid, number).as_slice() {
             let seen = nodes.entry(node).or_insert_with(|| {
                 queries += 8.0;
                 over(grid.place(grid.node(node)))

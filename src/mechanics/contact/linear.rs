@@ -7,17 +7,15 @@ use glam::{DMat3, DVec3};
 
 use super::elastomer::{Elastomer, Indenter};
 use super::error::ContactError;
-use super::fem::{Compliance, SurfaceField};
+use super::fem::{Compliance, GridNode, Parts, SurfaceField};
 use super::field::Field;
 use super::finer::{Faces, fine};
 use super::geometric::{Placed, deepest, deepest_from};
 use super::local::DEEPEST;
 use super::state::{ContactState, Status};
-use super::touch::{Candidate, PENETRATION, Rounds, Touch, Way};
+use super::touch::{Candidate, PENETRATION, Rounds, Spot, Touch, Way, check_seen};
 use crate::numeric::Rigid;
 
-/// Part of the nodes' distance by which an object that touches nothing may reach into the dome.
-const LEAST_SEEN: f64 = 0.5;
 /// Looks for nodes that no plane held back.
 const MOST_LOOKS: u32 = 8;
 
@@ -78,8 +76,16 @@ impl<'a> Solver<'a> {
             self.looked = None;
             return self.solve(sensor_from_object, settled_mm, whole);
         }
+        if !whole {
+            // A trial's forces are all that its balance looks at: no field.
+            self.touch.finish(&mut state, ended);
+            if state.status == Status::Free {
+                self.check_seen()?;
+            }
+            return Ok(state);
+        }
         let mut field = self.field();
-        for look in 0..if whole && self.fine.is_none() { MOST_LOOKS } else { 0 } {
+        for look in 0..if self.fine.is_none() { MOST_LOOKS } else { 0 } {
             let missed = self.missed(&field);
             if missed.is_empty() {
                 break;
@@ -100,14 +106,7 @@ impl<'a> Solver<'a> {
     /// Where nothing bears a force, the object must not reach far into the dome.
     fn check_seen(&self) -> Result<(), ContactError> {
         let Some((_, deepest_mm, spacing_mm)) = self.looked else { return Ok(()) };
-        let radius = self.elastomer.dome_radius_mm;
-        let reach = self.touch.placed.walk_out(deepest_mm, -deepest_mm / radius, radius);
-        match reach {
-            Some((depth_mm, _)) if depth_mm > LEAST_SEEN * spacing_mm => {
-                Err(ContactError::Unseen { depth_mm, spacing_mm })
-            }
-            _ => Ok(()),
-        }
+        check_seen(&self.touch.placed, deepest_mm, spacing_mm)
     }
 
     fn state(&self, mut state: ContactState, ended: Rounds, field: SurfaceField) -> ContactState {
@@ -228,12 +227,13 @@ impl<'a> Solver<'a> {
         let known: Vec<usize> = touch.candidates.iter().map(|c| c.node).collect();
         for &number in numbers.iter().filter(|number| known.binary_search(number).is_err()) {
             let parts = self.compliance.places.parts(grid, number);
-            let area_mm2 =
-                parts.iter().map(|(node, part)| part * grid.areas_mm2[grid.node(*node).ring]).sum();
+            let area = |&(node, part): &(usize, f64)| part * grid.areas_mm2[grid.node(node).ring];
+            let area_mm2 = parts.as_slice().iter().map(area).sum();
             let spread_mm =
                 if number < grid.len() { grid.spread(grid.node(number)) } else { [DVec3::ZERO; 2] };
-            let place = (number, self.compliance.places.place(grid, number), area_mm2, spread_mm);
-            let mut candidate = Candidate::new(place, &touch.placed, way, touch.sharing)?;
+            let at_mm = self.compliance.places.place(grid, number);
+            let spot = Spot { node: number, parts, at_mm, area_mm2, spread_mm };
+            let mut candidate = Candidate::new(spot, &touch.placed, way, touch.sharing)?;
             candidate.face = self.fine.as_ref().and_then(|fine| fine.get(&number)).copied();
             candidate.follow_face(&touch.placed.sensor_from_object());
             touch.candidates.push(candidate);
@@ -248,48 +248,67 @@ impl<'a> Solver<'a> {
         let n = touch.candidates.len();
         let width = 3 * n;
         let grid = &self.compliance.grid;
-        let parts: Vec<Vec<(usize, f64)>> =
-            touch.candidates.iter().map(|c| self.compliance.places.parts(grid, c.node)).collect();
         // The nodes that take part, in order, and the compliance between them.
-        let mut numbers: Vec<usize> = parts.iter().flatten().map(|(number, _)| *number).collect();
+        let mut numbers: Vec<usize> = Vec::with_capacity(n);
+        numbers.extend(touch.candidates.iter().flat_map(|c| c.parts.as_slice()).map(|(number, _)| *number));
         numbers.sort_unstable();
         numbers.dedup();
-        let nodes: Vec<_> = numbers.iter().map(|number| grid.node(*number)).collect();
-        let frames: Vec<DMat3> = nodes.iter().map(|node| grid.frame(*node)).collect();
-        let mut between = vec![DMat3::ZERO; nodes.len() * nodes.len()];
-        for i in 0..nodes.len() {
-            for j in 0..=i {
-                let local = self.compliance.between(nodes[i], nodes[j]);
-                let block = frames[i] * local * frames[j].transpose() * touch.sharing;
-                between[i * nodes.len() + j] = block;
-                between[j * nodes.len() + i] = block.transpose();
-            }
-        }
-        // Each candidate's shares by the nodes' places in that list.
-        let shares: Vec<Vec<(usize, f64)>> = parts
+        let framed: Vec<(GridNode, DMat3)> = numbers
             .iter()
-            .map(|parts| {
-                let place = |number: usize| numbers.binary_search(&number).unwrap_or(0);
-                parts.iter().map(|(number, share)| (place(*number), *share)).collect()
+            .map(|number| {
+                let node = grid.node(*number);
+                (node, grid.frame(node))
             })
             .collect();
+        let sharing = touch.sharing;
+        let compliance = self.compliance;
+        let between = |i: usize, j: usize| {
+            let ((at, frame), (by, other)) = (&framed[i], &framed[j]);
+            *frame * compliance.between(*at, *by) * other.transpose() * sharing
+        };
         touch.blocks.clear();
         touch.blocks.resize(width * width, 0.0);
-        for i in 0..n {
-            for j in 0..=i {
-                let mut block = DMat3::ZERO;
-                for (a, share_a) in &shares[i] {
-                    for (b, share_b) in &shares[j] {
-                        block += between[a * nodes.len() + b] * (share_a * share_b);
-                    }
+        let blocks = &mut touch.blocks;
+        let mut lay = |i: usize, j: usize, block: DMat3| {
+            let block = block.to_cols_array();
+            for row in 0..3 {
+                for column in 0..3 {
+                    let value = block[3 * column + row];
+                    blocks[(3 * i + row) * width + 3 * j + column] = value;
+                    blocks[(3 * j + column) * width + 3 * i + row] = value;
                 }
-                let block = block.to_cols_array();
-                for row in 0..3 {
-                    for column in 0..3 {
-                        let value = block[3 * column + row];
-                        touch.blocks[(3 * i + row) * width + 3 * j + column] = value;
-                        touch.blocks[(3 * j + column) * width + 3 * i + row] = value;
+            }
+        };
+        if touch.candidates.iter().all(|c| c.parts == Parts::whole(c.node)) {
+            // Nodes alone: each is its own list's.
+            for i in 0..n {
+                for j in 0..i {
+                    lay(i, j, between(i, j));
+                }
+                lay(i, i, between(i, i).transpose());
+            }
+        } else {
+            let nodes = numbers.len();
+            let mut table = vec![DMat3::ZERO; nodes * nodes];
+            for i in 0..nodes {
+                for j in 0..=i {
+                    let block = between(i, j);
+                    table[i * nodes + j] = block;
+                    table[j * nodes + i] = block.transpose();
+                }
+            }
+            // Each candidate's shares by the nodes' places in that list.
+            let place = |(number, share): (usize, f64)| (numbers.binary_search(&number).unwrap_or(0), share);
+            let shares: Vec<Parts> = touch.candidates.iter().map(|c| c.parts.map(place)).collect();
+            for i in 0..n {
+                for j in 0..=i {
+                    let mut block = DMat3::ZERO;
+                    for (a, share_a) in shares[i].as_slice() {
+                        for (b, share_b) in shares[j].as_slice() {
+                            block += table[a * nodes + b] * (share_a * share_b);
+                        }
                     }
+                    lay(i, j, block);
                 }
             }
         }
@@ -300,7 +319,7 @@ impl<'a> Solver<'a> {
         let grid = &self.compliance.grid;
         let mut forces: BTreeMap<usize, DVec3> = BTreeMap::new();
         for candidate in self.touch.candidates.iter().filter(|c| c.force_n != DVec3::ZERO) {
-            for (node, share) in self.compliance.places.parts(grid, candidate.node) {
+            for &(node, share) in candidate.parts.as_slice() {
                 let local = grid.frame(grid.node(node)).transpose() * (candidate.force_n * share);
                 *forces.entry(node).or_insert(DVec3::ZERO) += local;
             }

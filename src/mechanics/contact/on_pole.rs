@@ -7,12 +7,12 @@ use glam::{DMat3, DVec3};
 
 use super::elastomer::{Elastomer, Indenter};
 use super::error::{ContactError, positive};
-use super::fem::Revolved;
+use super::fem::{Parts, Revolved};
 use super::geometric::Placed;
 use super::local::DEEPEST;
 use super::solid::Solid;
 use super::state::{ContactState, Status};
-use super::touch::{Candidate, Touch, Way};
+use super::touch::{Candidate, Spot, Touch, Way};
 use crate::numeric::Rigid;
 
 /// Elements along the meridian: 4 times a power of two, from 8 to this.
@@ -67,8 +67,10 @@ impl OnPole {
         let mut touch = Touch::new(elastomer, placed, 1.0 + rigid.yield_ratio(elastomer));
         let way = Way::new(&touch.placed, None, DVec3::Z * dome_mm, -depth_mm);
         for (number, ring) in revolved.rings().into_iter().enumerate() {
-            let place = (number, ring.at_mm, ring.area_mm2, ring.spread_mm);
-            touch.candidates.push(Candidate::new(place, &touch.placed, &way, touch.sharing)?);
+            let parts = Parts::whole(number);
+            let (at_mm, area_mm2, spread_mm) = (ring.at_mm, ring.area_mm2, ring.spread_mm);
+            let spot = Spot { node: number, parts, at_mm, area_mm2, spread_mm };
+            touch.candidates.push(Candidate::new(spot, &touch.placed, &way, touch.sharing)?);
         }
         touch.blocks = blocks(&revolved, touch.candidates.len());
         let ended = touch.run(0.0);

@@ -4,12 +4,11 @@
 //! follow from sweeps over the nodes on these planes ([`super::sweeps`]), and the planes are laid anew until nothing
 //! moves. What is left at the end is the true distance of the moved nodes from the object.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 
 use super::elastomer::Elastomer;
 use super::error::ContactError;
+use super::fem::Parts;
 use super::geometric::{Placed, frame_of};
 use super::local::{DEEPEST, sum};
 use super::state::{ContactState, History, NodeMemory, Status, TouchedNode};
@@ -34,14 +33,31 @@ const LEAST_PART: f64 = 1e-6;
 /// Sweeps of one round.
 const MOST_SWEEPS: u32 = 400;
 
+/// Part of the nodes' distance by which an object that touches nothing may reach into the dome.
+const LEAST_SEEN: f64 = 0.5;
+
+/// Where no node bears a force, the object must not reach far into the dome between the nodes.
+pub(super) fn check_seen(placed: &Placed, deepest_mm: DVec3, spacing_mm: f64) -> Result<(), ContactError> {
+    let radius = deepest_mm.length();
+    match placed.walk_out(deepest_mm, -deepest_mm / radius, radius) {
+        Some((depth_mm, _)) if depth_mm > LEAST_SEEN * spacing_mm => {
+            Err(ContactError::Unseen { depth_mm, spacing_mm })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// A node that may touch.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
     pub node: usize,
+    /// The level's nodes that it moves with and hands its force to.
+    pub parts: Parts,
     pub at_mm: DVec3,
     pub area_mm2: f64,
-    /// Standard deviations of its hat along the meridian and along the ring, mm.
-    pub spread_mm: [DVec3; 2],
+    /// Standard deviations of its hat along the meridian and along the ring, mm; four places that have its moments.
+    spread_mm: [DVec3; 2],
+    hat_mm: [DVec3; 4],
     /// Its displacement (with the object's, see `sharing`), its force, sensor frame.
     pub u_mm: DVec3,
     /// Its displacement without forces on any candidate.
@@ -61,12 +77,21 @@ pub(super) struct Candidate {
     touched: bool,
 }
 
+/// Where a candidate lies.
+pub(super) struct Spot {
+    pub node: usize,
+    pub parts: Parts,
+    pub at_mm: DVec3,
+    pub area_mm2: f64,
+    /// Standard deviations of its hat along the meridian and along the ring, mm.
+    pub spread_mm: [DVec3; 2],
+}
+
 /// How the object came: from the pose of the frame before, or along the normal from the first touch.
 pub(super) struct Way<'a> {
     then: Placed,
     pub moved: Rigid,
     before: Option<&'a ContactState>,
-    pub memory: BTreeMap<u32, NodeMemory>,
 }
 
 impl<'a> Way<'a> {
@@ -84,10 +109,13 @@ impl<'a> Way<'a> {
             then: Placed::new(placed.solid.clone(), then),
             moved: placed.sensor_from_object().compose(&then.inverse()),
             before,
-            memory: history
-                .map(|history| history.nodes.iter().map(|memory| (memory.node, *memory)).collect())
-                .unwrap_or_default(),
         }
+    }
+
+    /// What a node remembers of the frame before; the nodes of a history are in order.
+    fn memory(&self, node: u32) -> Option<&'a NodeMemory> {
+        let nodes = &self.before?.history.nodes;
+        nodes.binary_search_by_key(&node, |memory| memory.node).ok().and_then(|at| nodes.get(at))
     }
 
     /// What a sticking node is carried to: its displacement then, and the object's motion since they met. A node
@@ -99,8 +127,13 @@ impl<'a> Way<'a> {
         if candidate.touched {
             return was + motion;
         }
-        let (gap_then, gap_now) = (self.then.distance(p).0.max(0.0), placed.distance(p).0);
-        let part = if gap_now < 0.0 { -gap_now / (gap_then - gap_now) } else { 0.0 };
+        let gap_now = placed.distance(p).0;
+        let part = if gap_now < 0.0 {
+            let gap_then = self.then.distance(p).0.max(0.0);
+            -gap_now / (gap_then - gap_now)
+        } else {
+            0.0
+        };
         was + motion * part
     }
 }
@@ -133,19 +166,17 @@ impl Candidate {
     }
 
     /// A node at rest, on its first plane: where a walk along the dome's inward normal leaves the object.
-    pub fn new(
-        (node, at_mm, area_mm2, spread_mm): (usize, DVec3, f64, [DVec3; 2]),
-        placed: &Placed,
-        way: &Way<'_>,
-        sharing: f64,
-    ) -> Result<Self, ContactError> {
+    pub fn new(spot: Spot, placed: &Placed, way: &Way<'_>, sharing: f64) -> Result<Self, ContactError> {
+        let Spot { node, parts, at_mm, area_mm2, spread_mm } = spot;
         let radius = at_mm.length();
-        let memory = way.memory.get(&(node as u32));
+        let memory = way.memory(node as u32);
         let mut candidate = Self {
             node,
+            parts,
             at_mm,
             area_mm2,
             spread_mm,
+            hat_mm: hat_places(at_mm, spread_mm),
             u_mm: DVec3::ZERO,
             offset_mm: DVec3::ZERO,
             // The old force turns with the object.
@@ -184,7 +215,7 @@ impl Candidate {
     /// two round bodies would be short by a twelfth of their relative curvature times the patch's area.
     pub fn gap(&self, placed: &Placed) -> (f64, DVec3) {
         let (mut distance, mut outward) = (0.0, DVec3::ZERO);
-        for place in hat_places(self.at_mm, self.spread_mm) {
+        for place in self.hat_mm {
             let (d, n) = placed.distance(place + self.u_mm);
             distance += 0.25 * d;
             outward += n;

@@ -30,6 +30,19 @@ pub struct Held {
     pub carried: f64,
 }
 
+impl Held {
+    /// What it means, for people.
+    pub fn note(&self) -> String {
+        match self.limit {
+            "not_balanced" => format!("{} is left between springs and contact", self.part),
+            _ if self.carried < 1.0 => {
+                format!("{} stops the platform at {:.2} % of the load", self.part, 100.0 * self.carried)
+            }
+            _ => format!("{} does not bear the load as the springs' law says", self.part),
+        }
+    }
+}
+
 /// What moves the platform.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {

@@ -21,6 +21,45 @@ pub(crate) struct Places {
     first: Vec<usize>,
 }
 
+/// Nodes with their shares of a node or place: at most four.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Parts {
+    list: [(usize, f64); 4],
+    len: usize,
+}
+
+impl Parts {
+    /// A node itself.
+    pub fn whole(number: usize) -> Self {
+        Self { list: [(number, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)], len: 1 }
+    }
+
+    fn none() -> Self {
+        Self { list: [(0, 0.0); 4], len: 0 }
+    }
+
+    fn add(&mut self, number: usize, share: f64) {
+        if let Some((_, sum)) = self.list[..self.len].iter_mut().find(|(known, _)| *known == number) {
+            *sum += share;
+        } else if share > 0.0
+            && let Some(free) = self.list.get_mut(self.len)
+        {
+            *free = (number, share);
+            self.len += 1;
+        }
+    }
+
+    /// With other numbers.
+    pub fn map(self, other: impl Fn((usize, f64)) -> (usize, f64)) -> Self {
+        Self { list: self.list.map(other), len: self.len }
+    }
+
+    /// Numbers of nodes with their shares.
+    pub fn as_slice(&self) -> &[(usize, f64)] {
+        &self.list[..self.len]
+    }
+}
+
 /// One row of places.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row {
@@ -83,24 +122,19 @@ impl Places {
 
     /// The nodes that tell what a place moves by, with their shares: bilinear, towards zero at the bonded rim. A force
     /// on the place is shared out alike.
-    pub fn parts(&self, grid: &Grid, number: usize) -> Vec<(usize, f64)> {
+    pub fn parts(&self, grid: &Grid, number: usize) -> Parts {
         if number < grid.len() {
-            return vec![(number, 1.0)];
+            return Parts::whole(number);
         }
         let (row, _, azimuth) = self.angles(grid, number);
         let (ring, over) = (row / FINER, (row % FINER) as f64 / FINER as f64);
-        let mut parts: Vec<(usize, f64)> = Vec::with_capacity(4);
+        let mut parts = Parts::none();
         for (ring, weight) in [(ring, 1.0 - over), (ring + 1, over)] {
             let Some(&count) = grid.counts.get(ring).filter(|_| weight > 0.0) else { continue };
             let along = azimuth / TAU * count as f64;
             let (at, part) = (along.floor(), along - along.floor());
             for (step, share) in [(at as usize, 1.0 - part), (at as usize + 1, part)] {
-                let number = grid.first[ring] + step % count;
-                match parts.iter_mut().find(|(known, _)| *known == number) {
-                    Some((_, sum)) => *sum += weight * share,
-                    None if share > 0.0 => parts.push((number, weight * share)),
-                    None => {}
-                }
+                parts.add(grid.first[ring] + step % count, weight * share);
             }
         }
         parts

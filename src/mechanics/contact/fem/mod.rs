@@ -14,10 +14,10 @@ mod grid;
 mod mesh;
 mod revolved;
 
+pub(super) use between::Parts;
 pub(super) use compliance::Compliance;
 pub(super) use field::SurfaceField;
-#[cfg(test)]
-use grid::GridNode;
+pub(super) use grid::GridNode;
 pub(super) use revolved::Revolved;
 
 #[cfg(test)]

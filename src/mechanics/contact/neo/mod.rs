@@ -16,11 +16,12 @@ use glam::DVec3;
 
 use super::elastomer::{Elastomer, Indenter};
 use super::error::ContactError;
+use super::fem::Parts;
 use super::field::Field;
 use super::geometric::{Placed, deepest};
 use super::local::DEEPEST;
 use super::state::{ContactState, Extent, Status};
-use super::touch::{Candidate, Rounds, Touch, Way};
+use super::touch::{Candidate, Rounds, Spot, Touch, Way, check_seen};
 use crate::numeric::Rigid;
 pub(super) use body::Body;
 
@@ -90,15 +91,20 @@ pub(super) fn neo_hookean(
             continue;
         }
         // A brick's corner has a displacement of its own: the gap is measured there.
-        let place = (number, at_mm, *area_mm2, [DVec3::ZERO; 2]);
-        touch.candidates.push(Candidate::new(place, &placed, &way, sharing)?);
+        let parts = Parts::whole(number);
+        let spot = Spot { node: number, parts, at_mm, area_mm2: *area_mm2, spread_mm: [DVec3::ZERO; 2] };
+        touch.candidates.push(Candidate::new(spot, &placed, &way, sharing)?);
     }
     let (u_mm, ended, good) = newton(elastomer, body, &mut touch, &mut state, linearised);
     let steps = state.iterations;
     touch.finish(&mut state, ended);
     state.iterations = steps.max(1);
-    if !good && state.status == Status::Solved {
+    // Also where nothing bears a force: bricks out of balance have no shape to be trusted.
+    if !good {
         state.status = Status::BoundReached;
+    }
+    if state.status == Status::Free {
+        check_seen(&placed, deepest_mm, largest_edge(body))?;
     }
     let surface = body.mesh.surface.iter().map(|(_, node, _)| u_mm[*node as usize]).collect();
     state.field = Field::Bricks(BrickField { body: Arc::clone(body), u_mm: surface });
@@ -189,6 +195,7 @@ fn newton(
     for (candidate, force) in touch.candidates.iter_mut().zip(&forces) {
         candidate.force_n = *force;
     }
+    state.imbalance_n = Some(miss).filter(|miss| miss.is_finite());
     let good = miss <= limit;
     (u, ended, good)
 }

@@ -35,7 +35,9 @@ impl Lit {
             }
             let Some(seen) = surface.at(y) else { continue };
             let pixel = DVec2::new(x as f64, y as f64);
-            let told = if rays.are_told {
+            // Where a ray may meet the membrane more than once, the least difference may show another part of it.
+            let may_fold = square.source == Source::Exact && seen.dent.is_some_and(Dent::may_fold);
+            let told = if rays.are_told && !may_fold {
                 work.add_base(units::TOLD_RAY);
                 self.told_ray(&rays, (x, y), seen.optics.dome_radius_mm() as f32)
             } else {

@@ -146,14 +146,13 @@ fn add_edge(values: &mut [f32], stride: usize, from: DVec2, to: DVec2, share: f6
     }
     let (sign, a, b) = if from.y < to.y { (share, from, to) } else { (-share, to, from) };
     let per_row = (b.x - a.x) / (b.y - a.y);
-    // Places are not negative: the cast is the floor.
-    let first = a.y as usize;
+    let mut row_number = floor(a.y);
     let mut x = a.x;
     let mut y = a.y;
-    for (index, row) in values.chunks_exact_mut(stride).enumerate().skip(first) {
-        if y >= b.y {
-            break;
-        }
+    while y < b.y {
+        let index = row_number;
+        let Some(row) = values.get_mut(index * stride..(index + 1) * stride) else { break };
+        row_number += 1;
         let end = b.y.min((index + 1) as f64);
         let next_x = if end == b.y { b.x } else { a.x + per_row * (end - a.y) };
         add_piece(row, sign * (end - y), x, next_x);
@@ -161,10 +160,17 @@ fn add_edge(values: &mut [f32], stride: usize, from: DVec2, to: DVec2, share: f6
     }
 }
 
+/// The floor of a place in the box. Places are not negative, and fewer than short whole numbers are, which machines make at
+/// once.
+#[inline]
+fn floor(place: f64) -> usize {
+    place as i32 as usize
+}
+
 /// Adds the part of an edge inside one row: signed height `dy`, between two columns.
 fn add_piece(row: &mut [f32], dy: f64, x0: f64, x1: f64) {
     let (low, high) = if x0 < x1 { (x0, x1) } else { (x1, x0) };
-    let start = low as usize;
+    let start = floor(low);
     let first = start as f64;
     if high <= first + 1.0 {
         // Inside one pixel: the part right of the edge's middle is covered.

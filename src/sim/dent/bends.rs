@@ -26,61 +26,38 @@ pub(super) struct Bends {
 impl Bends {
     /// Of a square table of coefficients.
     pub fn new(moved: &[Vec4], nodes: usize, per_step: f32) -> Self {
-        let count = nodes * nodes;
-        let at = |i: usize| moved.get(i).copied().unwrap_or(Vec4::ZERO);
-        let table = |value: &dyn Fn(usize) -> f32| -> Vec<f32> { (0..count).map(value).collect() };
-        // Squares of the differences' lengths. Beyond the table's end they mean nothing, and no cell in use asks.
         let (x, y) = (1, nodes);
-        let second = |i: usize, way: usize| at(i.wrapping_sub(way)) - at(i) * 2.0 + at(i + way);
-        let third = |way: usize| {
-            table(&|i| {
-                (at(i + 2 * way) - at(i.wrapping_sub(way)) + (at(i) - at(i + way)) * 3.0).length_squared()
-            })
+        let (along_x, along_y) = (differences(moved, x), differences(moved, y));
+        // Second differences at a node stand at the node before it.
+        let (xx, yy, xy) = (differences(&along_x, x), differences(&along_y, y), differences(&along_y, x));
+        let most = |table: &[Vec4], columns: Range<isize>, rows: Range<isize>| {
+            let squares: Vec<f32> = table.iter().map(|v| v.length_squared()).collect();
+            spread(&spread(&squares, x, columns), y, rows)
         };
-        let pure = |way: usize| table(&|i| second(i, way).length_squared());
-        let [xx, yy] = [x, y].map(pure);
-        let xy = table(&|i| (at(i + x + y) - at(i + x) - at(i + y) + at(i)).length_squared());
-        let mixed = |twice: usize, once: usize| {
-            table(&|i| (second(i + once, twice) - second(i, twice)).length_squared())
+        let xxx = most(&differences(&xx, x), -1..0, -1..3);
+        let yyy = most(&differences(&yy, y), -1..3, -1..0);
+        let xxy = most(&differences(&xx, y), -1..1, -1..2);
+        let xyy = most(&differences(&yy, x), -1..2, -1..1);
+        let (xx, yy, xy) = (most(&xx, -1..1, -1..3), most(&yy, -1..3, -1..1), most(&xy, -1..2, -1..2));
+        let (along_x, along_y) = (most(&along_x, -1..2, -1..3), most(&along_y, -1..3, -1..2));
+        let lengths = most(moved, -1..3, -1..3);
+        // Cells at the table's edge lack nodes, and none in use asks.
+        let is_inside = |i: usize| {
+            let inner = 1..nodes.saturating_sub(2);
+            inner.contains(&(i % nodes)) && inner.contains(&(i / nodes))
         };
-        let [xxx, yyy, xxy, xyy] = [third(x), third(y), mixed(x, y), mixed(y, x)];
-        let [along_x, along_y] = [x, y].map(|way| table(&|i| (at(i + way) - at(i)).length_squared()));
-        let lengths = table(&|i| at(i).length_squared());
-        let mut bends = Self {
-            third: vec![0.0; count],
-            second: vec![0.0; count],
-            slope: vec![0.0; count],
-            moved: vec![0.0; count],
-            steepest: 0.0,
+        let table = |value: &dyn Fn(usize) -> f32| -> Vec<f32> {
+            (0..moved.len()).map(|i| if is_inside(i) { value(i) } else { 0.0 }).collect()
         };
-        let most = |table: &[f32], columns: Range<usize>, rows: Range<usize>| {
-            let mut most = 0.0_f32;
-            for row in rows {
-                let row = table.get(row * nodes + columns.start..row * nodes + columns.end);
-                most = row.unwrap_or_default().iter().copied().fold(most, f32::max);
-            }
-            most
-        };
-        for j in 1..nodes.saturating_sub(2) {
-            for i in 1..nodes.saturating_sub(2) {
-                let cell = j * nodes + i;
-                // The largest value of a cubic form of unit directions is at most its Frobenius norm.
-                let third = most(&xxx, i..i + 1, j - 1..j + 3)
-                    + most(&yyy, i - 1..i + 3, j..j + 1)
-                    + 3.0 * (most(&xxy, i..i + 2, j - 1..j + 2) + most(&xyy, i - 1..i + 2, j..j + 2));
-                let twice = most(&xx, i..i + 2, j - 1..j + 3)
-                    + most(&yy, i - 1..i + 3, j..j + 2)
-                    + 2.0 * most(&xy, i - 1..i + 2, j - 1..j + 2);
-                let slope =
-                    most(&along_x, i - 1..i + 2, j - 1..j + 3) + most(&along_y, i - 1..i + 3, j - 1..j + 2);
-                bends.third[cell] = third.sqrt() * per_step;
-                bends.second[cell] = twice.sqrt() * per_step * per_step;
-                bends.slope[cell] = slope.sqrt() * per_step;
-                bends.moved[cell] = most(&lengths, i - 1..i + 3, j - 1..j + 3).sqrt();
-                bends.steepest = bends.steepest.max(bends.slope[cell]);
-            }
+        // The largest value of a form of unit directions is at most its Frobenius norm.
+        let slope = table(&|i| (along_x[i] + along_y[i]).sqrt() * per_step);
+        Self {
+            third: table(&|i| (xxx[i] + yyy[i] + 3.0 * (xxy[i] + xyy[i])).sqrt() * per_step),
+            second: table(&|i| (xx[i] + yy[i] + 2.0 * xy[i]).sqrt() * per_step * per_step),
+            moved: table(&|i| lengths[i].sqrt()),
+            steepest: slope.iter().copied().fold(0.0, f32::max),
+            slope,
         }
-        bends
     }
 
     /// Those of a spline a part of the way to another.
@@ -110,4 +87,28 @@ impl Bends {
             moved_mm: most(&self.moved),
         }
     }
+}
+
+/// Of each value of a table, what the one a way further has more; nothing where there is none.
+fn differences(table: &[Vec4], way: usize) -> Vec<Vec4> {
+    let further = table.get(way..).unwrap_or_default();
+    let mut out: Vec<Vec4> = table.iter().zip(further).map(|(here, further)| *further - *here).collect();
+    out.resize(table.len(), Vec4::ZERO);
+    out
+}
+
+/// Of each value of a table, none of them negative or NaN, the largest of those so many ways further.
+fn spread(table: &[f32], way: usize, steps: Range<isize>) -> Vec<f32> {
+    let mut out = vec![0.0_f32; table.len()];
+    for step in steps {
+        let shift = step.unsigned_abs() * way;
+        let (to, from) = if step < 0 { (shift, 0) } else { (0, shift) };
+        let from = table.get(from..).unwrap_or_default();
+        // Plain choices, of which machines make several at once.
+        out.iter_mut()
+            .skip(to)
+            .zip(from)
+            .for_each(|(out, value)| *out = if *value > *out { *value } else { *out });
+    }
+    out
 }

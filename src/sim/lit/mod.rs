@@ -9,6 +9,10 @@
 //! of the membrane and of its light tell it: each bounds what a surface of the second order can leave of it over a part of
 //! the dome ([`super::dent::Dent::bend`], [`Shading::bend`]), and where the bounds are above the tolerance the square is
 //! divided whatever its nodes say.
+//!
+//! What the lens and the layers do is smooth whatever the membrane does: cubics through a lattice of rays tell the others
+//! ([`rays`]). Squares of 8 px that are to be divided, where nothing moves or the change of the light is smooth, are lit pixel
+//! by pixel from what is told ([`paint`]): that takes less than dividing them.
 
 mod motion;
 mod paint;
@@ -46,7 +50,7 @@ const MISSED: usize = 8;
 pub(super) mod units {
     /// A ray through lens, layers and dome.
     pub const RAY: u64 = 60;
-    /// The same told from nine nodes.
+    /// The same told from the rays about it.
     pub const TOLD_RAY: u64 = 12;
     /// Its way to the deformed membrane.
     pub const DENT: u64 = 250;

@@ -50,11 +50,9 @@ impl Lit {
                     (columns[0][part] * w[0] + columns[1][part] * w[1])
                         + (columns[2][part] * w[2] + columns[3][part] * w[3])
                 };
-                let (base_mm, inside) = (across(0), across(1));
-                let inside = inside * inside.length_recip();
-                let along = base_mm.dot(inside);
-                let left = along * along + (radius_mm * radius_mm - base_mm.length_squared());
-                let place_mm = base_mm + inside * (left.max(0.0).sqrt() - along);
+                let Some((place_mm, inside)) = rays::on_dome(across(0), across(1), radius_mm) else {
+                    return false;
+                };
                 let mut sample =
                     PlainSample { direction: place_mm * per_radius, cosine: -inside.z, change: Vec3A::ZERO };
                 if is_little {

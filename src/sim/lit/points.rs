@@ -126,15 +126,23 @@ impl Lit {
                 }
             } else {
                 work.add(EffectName::Contact, units::SMOOTH);
-                let parts = |node: &Motion| [node.shift_mm, node.tilt, node.change];
-                [motion.shift_mm, motion.tilt, motion.change] = self.told(square, asked.pixel, parts);
+                let is_little = square.source == Source::Little;
                 if asked.is_kept {
-                    motion.moved_mm = self.foretold_mm(square, asked.pixel);
+                    let parts = |node: &Motion| [node.shift_mm, node.tilt, node.change, node.moved_mm];
+                    [motion.shift_mm, motion.tilt, motion.change, motion.moved_mm] =
+                        self.told(square, asked.pixel, parts);
+                } else if is_little {
+                    let parts = |node: &Motion| [node.shift_mm, node.change];
+                    [motion.shift_mm, motion.change] = self.told(square, asked.pixel, parts);
+                } else {
+                    let parts = |node: &Motion| [node.shift_mm, node.tilt];
+                    [motion.shift_mm, motion.tilt] = self.told(square, asked.pixel, parts);
                 }
                 sample.point_mm += motion.shift_mm;
-                sample.normal = (normal + motion.tilt).normalize_or(normal);
-                let is_little = square.source == Source::Little;
                 sample.moved = if is_little { Moved::Little(motion.change) } else { Moved::Far };
+                if !is_little {
+                    sample.normal = (normal + motion.tilt).normalize_or(normal);
+                }
             }
         }
         if asked.is_kept {

@@ -98,9 +98,15 @@ impl Lit {
         radius_mm: f32,
     ) -> Option<(Vec3A, Vec3A)> {
         let [base_mm, inside] = self.told_base(rays, pixel);
-        let inside = inside * inside.length_recip();
-        let along = base_mm.dot(inside);
-        let left = along * along + (radius_mm * radius_mm - base_mm.length_squared());
-        (left > 0.0).then(|| (base_mm + inside * (left.sqrt() - along), inside))
+        on_dome(base_mm, inside, radius_mm)
     }
+}
+
+/// Where a ray from a point of the base meets the undeformed dome, and its direction as a unit; `None` where it does not.
+#[inline]
+pub(super) fn on_dome(base_mm: Vec3A, inside: Vec3A, radius_mm: f32) -> Option<(Vec3A, Vec3A)> {
+    let inside = inside * inside.length_recip();
+    let along = base_mm.dot(inside);
+    let left = along * along + (radius_mm * radius_mm - base_mm.length_squared());
+    (left > 0.0).then(|| (base_mm + inside * (left.sqrt() - along), inside))
 }

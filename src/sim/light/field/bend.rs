@@ -3,7 +3,8 @@
 use glam::{Vec2, Vec3A, Vec4};
 
 use super::super::tables::SHELLS;
-use super::{LightField, Scale, ShellNode, ShellNodes, disc_of};
+use super::places::{Scale, disc_of};
+use super::{LightField, ShellNode, ShellNodes};
 use crate::sim::rests::{BOTH, largest, rest};
 use crate::sim::shading::Turned;
 

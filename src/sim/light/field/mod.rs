@@ -6,14 +6,17 @@
 //! with the normal is the irradiance.
 
 mod bend;
+mod own;
+mod places;
 
 use glam::{DVec2, DVec3, Vec2, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use self::bend::Bends;
+use self::own::OwnLight;
+use self::places::{Scale, cell_of, cubics, disc_of, smooth_step, split};
 use super::direct::EmitterRule;
 use super::dome_map::{DomeGrid, bicubic, direction_from_disc};
-use super::radiosity::Rings;
 use super::tables::{Prepared, SHELLS, Tables, Ways};
 
 /// Fine cells in a coarse one: the shells' look-up is linear in the fine table, which is cubic in the coarse one.
@@ -62,13 +65,6 @@ struct ShellNode {
 
 /// A node on each of the shells, side by side: a look-up asks all of them.
 type ShellNodes = [ShellNode; SHELLS.len()];
-
-/// The membrane's own light at the patches of a room.
-#[derive(Debug, Clone)]
-struct OwnLight {
-    indirect: Vec<[f64; 3]>,
-    exitance: [Vec<f64>; 3],
-}
 
 impl LightField {
     /// Puts the tables of all lights together.
@@ -325,56 +321,6 @@ impl ShellNode {
 const LACKING_PART: f32 = 0.05;
 const LACKING_TILT: f32 = 0.02;
 
-/// 0 up to 0, 1 from 1 on, smooth between.
-fn smooth_step(t: f32) -> f32 {
-    let t = t.clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
-/// The disc's place of a unit direction, as [`super::dome_map::disc_continued`] tells it.
-#[inline]
-fn disc_of(direction: Vec3A) -> Vec2 {
-    Vec2::new(direction.x, direction.y) * (1.0 + direction.z.max(-0.25)).sqrt().recip()
-}
-
-/// What leads from the disc to a grid.
-#[derive(Debug, Clone, Copy)]
-struct Scale {
-    cells: f32,
-    middle: f32,
-    /// Beyond these a cubic, or a cell, lacks nodes.
-    last_cubic: f32,
-    last_cell: f32,
-}
-
-impl Scale {
-    fn of(grid: &DomeGrid) -> Self {
-        let nodes = grid.nodes as f32;
-        Self {
-            cells: 0.5 * grid.cells() as f32,
-            middle: 0.5 * (nodes - 1.0),
-            last_cubic: nodes - 2.001,
-            last_cell: nodes - 2.0,
-        }
-    }
-
-    /// Grid coordinates of a place in the disc's plane.
-    #[inline]
-    fn place(&self, disc: Vec2) -> Vec2 {
-        disc * self.cells + Vec2::splat(self.middle)
-    }
-}
-
-/// The cell of a place of a grid, as column and row, and where in it, kept within some coordinates that no cell's number
-/// passes. NaN, which no direction gives, is the first.
-#[inline]
-fn split(at: Vec2, first: f32, last: f32) -> ((usize, usize), Vec2) {
-    let within = |v: f32| if v > first { if v < last { v } else { last } } else { first };
-    let (x, y) = (within(at.x), within(at.y));
-    let (column, row) = (x as i32, y as i32);
-    ((column as usize, row as usize), Vec2::new(x - column as f32, y - row as f32))
-}
-
 /// A function of the disc at a place, beyond its rim as the parabola through the rim and two places inside goes on, as
 /// far apart as the place lies outside.
 fn continued<const K: usize>(place: DVec2, inside: impl Fn(DVec2) -> [f64; K]) -> [f64; K] {
@@ -401,43 +347,6 @@ fn channels(ways: &Ways, tables: &Tables<1>) -> Vec<[f64; 3]> {
     sum
 }
 
-impl OwnLight {
-    fn new(ways: &Ways, prepared: &Prepared, albedo: [f64; 3], grid: &DomeGrid, table: &[[f64; 3]]) -> Self {
-        let rings = Rings::USUAL;
-        let patch = |i: usize| rings.direction(i / rings.patches, i % rings.patches);
-        let lit = |i: usize| bicubic(grid, table, grid.coordinates(patch(i)));
-        let light: Vec<[f64; 3]> = (0..rings.count()).map(lit).collect();
-        let mut indirect = vec![[0.0; 3]; rings.count()];
-        let mut exitance = [const { Vec::new() }; 3];
-        for (c, room) in prepared.rooms(ways).iter().enumerate().take(3) {
-            let own: Vec<f64> = light.iter().map(|e| e[c].max(0.0)).collect();
-            let balance = room.solve(&own, albedo[c]);
-            for (sum, value) in indirect.iter_mut().zip(&balance.indirect) {
-                sum[c] = *value;
-            }
-            exitance[c] = balance.exitance;
-        }
-        Self { indirect, exitance }
-    }
-
-    /// Linear between rings and patches; level beyond the first and last ring.
-    fn at(&self, direction: DVec3) -> [f64; 3] {
-        let Rings { rings, patches } = Rings::USUAL;
-        let ring = (direction.z * rings as f64 - 0.5).clamp(0.0, rings as f64 - 1.0);
-        let turn = direction.y.atan2(direction.x) / std::f64::consts::TAU;
-        let patch = (turn * patches as f64 - 0.5).rem_euclid(patches as f64);
-        let low = (ring as usize).min(rings - 2);
-        let (up, along) = (ring - low as f64, patch - patch.floor());
-        let first = (patch as usize) % patches;
-        let at = |ring: usize, patch: usize| self.indirect[ring * patches + patch % patches];
-        let corners = [at(low, first), at(low, first + 1), at(low + 1, first), at(low + 1, first + 1)];
-        std::array::from_fn(|c| {
-            let mix = |a: f64, b: f64, part: f64| a + (b - a) * part;
-            mix(mix(corners[0][c], corners[1][c], along), mix(corners[2][c], corners[3][c], along), up)
-        })
-    }
-}
-
 /// Lagrange's weights of the three shells for a radius, part of the dome's.
 #[inline]
 fn shell_weights(part: f32) -> [f32; 3] {
@@ -449,29 +358,4 @@ fn shell_weights(part: f32) -> [f32; 3] {
         (p - a) * (p - c) * (1.0 / ((b - a) * (b - c))),
         (p - a) * (p - b) * (1.0 / ((c - a) * (c - b))),
     ]
-}
-
-/// Weights of the four nodes about a place between the middle two, along x and along y: the cubic spline's.
-#[inline]
-fn cubics(part: Vec2) -> ([f32; 4], [f32; 4]) {
-    // Both at once.
-    let t = Vec4::new(part.x, part.y, 0.0, 0.0);
-    let s = Vec4::ONE - t;
-    let sixth = 1.0 / 6.0;
-    let (t2, s2) = (t * t, s * s);
-    let four = Vec4::splat(4.0);
-    let weights = [
-        s * s2 * sixth,
-        (t2 * (t * 3.0 - 6.0) + four) * sixth,
-        (s2 * (s * 3.0 - 6.0) + four) * sixth,
-        t * t2 * sixth,
-    ];
-    (weights.map(|w| w.x), weights.map(|w| w.y))
-}
-
-/// Index of the lower corner of the cell of a place of the disc, and the place in it.
-#[inline]
-fn cell_of(grid: &DomeGrid, scale: &Scale, disc: Vec2) -> (usize, f32, f32) {
-    let ((column, row), part) = split(scale.place(disc), 0.0, scale.last_cell);
-    (row * grid.nodes + column, part.x, part.y)
 }

@@ -318,7 +318,13 @@ fn blend(
             edge(values, 0..whole.start);
             edge(values, whole.end..part.len());
             if let (Some(values), Some(levels)) = (values.get_mut(whole.clone()), levels.get(whole.clone())) {
-                values.iter_mut().zip(levels).for_each(|(value, level)| *value = level[lane]);
+                let pairs = values.iter_mut().zip(levels);
+                // By name, so that no lane's number is checked pixel by pixel.
+                match lane {
+                    0 => pairs.for_each(|(value, level)| *value = level.x),
+                    1 => pairs.for_each(|(value, level)| *value = level.y),
+                    _ => pairs.for_each(|(value, level)| *value = level.z),
+                }
             }
         }
     }

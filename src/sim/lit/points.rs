@@ -18,8 +18,8 @@ const BEYOND_PX: f64 = 4.0 * LARGEST as f64;
 const STILL_MM: f32 = 1e-6;
 
 impl Lit {
-    /// Traces and lights those of some pixels of a square that are not known yet; the square lies in the largest one
-    /// at `corner`.
+    /// Lights those of some pixels of the square at `corner` that are not known yet, once [`Self::light`] is called; their rays
+    /// are told where that may be, else followed.
     pub(super) fn ask(
         &mut self,
         surface: &LitSurface<'_>,
@@ -83,7 +83,7 @@ impl Lit {
         }
     }
 
-    /// Lights what was traced.
+    /// Lights what was asked for.
     pub(super) fn light(&mut self, surface: &LitSurface<'_>, work: &mut Work) {
         self.shown.clear();
         surface.shading.levels(&self.samples, &mut self.shown, work);

@@ -119,7 +119,10 @@ impl Lit {
         let corners = [(x, y), (x + side, y), (x, y + side), (x + side, y + side)];
         let mut places = [Vec3A::ZERO; 4];
         for (place, (x, y)) in places.iter_mut().zip(corners) {
-            *place = if is_whole {
+            // Most corners are nodes.
+            *place = if let Some(kept) = self.kept((x, y)).filter(|_| self.is_kept((x, y))) {
+                kept.place_mm
+            } else if is_whole {
                 self.told(&square, (x, y), |motion| [motion.place_mm])[0]
             } else {
                 seen.optics.follow_continued(surface.rays?.at(x, y)?).ok()?.0.as_vec3a()

@@ -29,6 +29,7 @@ pub mod run;
 pub mod scene;
 mod shading;
 mod shapes;
+mod splines;
 mod spots;
 mod touch;
 mod truth;

@@ -53,6 +53,16 @@ pub struct Turned {
     pub moved_mm: f32,
 }
 
+/// How much further the light of a displaced part of the membrane may be from a surface through nodes than that of the
+/// undeformed one, full scales.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct MovedBend {
+    /// For what the tables of its light do.
+    pub table: f32,
+    /// For its sharp bends.
+    pub tilt: f32,
+}
+
 impl Turned {
     /// What holds for either.
     pub fn or(self, other: Self) -> Self {
@@ -80,8 +90,8 @@ pub trait Shading: Send + Sync {
     /// nine nodes in rows of three over a part of the dome that holds these directions from its centre.
     fn bend(&self, directions: &[Vec3A]) -> f32;
 
-    /// How much further that of the displaced membrane may be, for what its sharp bends and the tables of its light do.
-    fn moved_bend(&self, directions: &[Vec3A], turned: Turned) -> f32;
+    /// How much further that of the displaced membrane may be.
+    fn moved_bend(&self, directions: &[Vec3A], turned: Turned) -> MovedBend;
 
     /// Brightness of a white marker at a place of the sheet's top.
     fn marker_level(&self, scene: &Scene, _position_mm: DVec3) -> [f32; 3] {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::Vec4;
 
-use crate::sim::rests::{largest, rest};
+use crate::sim::rests::{Seconds, differences, inside, largest, rest, spread};
 use crate::sim::shading::Turned;
 
 /// Bounds of a spline by cell, at the place of the cell's lower node.
@@ -26,35 +26,25 @@ pub(super) struct Bends {
 impl Bends {
     /// Of a square table of coefficients.
     pub fn new(moved: &[Vec4], nodes: usize, per_step: f32) -> Self {
-        let (x, y) = (1, nodes);
-        let (along_x, along_y) = (differences(moved, x), differences(moved, y));
-        // Second differences at a node stand at the node before it.
-        let (xx, yy, xy) = (differences(&along_x, x), differences(&along_y, y), differences(&along_y, x));
+        let (along_x, along_y) = (differences(moved, 1), differences(moved, nodes));
+        let seconds = Seconds::new(&along_x, &along_y, nodes);
+        // Plain choices, of which machines make several at once.
+        let larger = |a: f32, b: f32| if b > a { b } else { a };
         let most = |table: &[Vec4], columns: Range<isize>, rows: Range<isize>| {
             let squares: Vec<f32> = table.iter().map(|v| v.length_squared()).collect();
-            spread(&spread(&squares, x, columns), y, rows)
+            spread(&spread(&squares, 1, columns, larger), nodes, rows, larger)
         };
-        let xxx = most(&differences(&xx, x), -1..0, -1..3);
-        let yyy = most(&differences(&yy, y), -1..3, -1..0);
-        let xxy = most(&differences(&xx, y), -1..1, -1..2);
-        let xyy = most(&differences(&yy, x), -1..2, -1..1);
+        let thirds = seconds.thirds(nodes, most);
+        let Seconds { xx, yy, xy } = seconds;
         let (xx, yy, xy) = (most(&xx, -1..1, -1..3), most(&yy, -1..3, -1..1), most(&xy, -1..2, -1..2));
         let (along_x, along_y) = (most(&along_x, -1..2, -1..3), most(&along_y, -1..3, -1..2));
         let lengths = most(moved, -1..3, -1..3);
-        // Cells at the table's edge lack nodes, and none in use asks.
-        let is_inside = |i: usize| {
-            let inner = 1..nodes.saturating_sub(2);
-            inner.contains(&(i % nodes)) && inner.contains(&(i / nodes))
-        };
-        let table = |value: &dyn Fn(usize) -> f32| -> Vec<f32> {
-            (0..moved.len()).map(|i| if is_inside(i) { value(i) } else { 0.0 }).collect()
-        };
         // The largest value of a form of unit directions is at most its Frobenius norm.
-        let slope = table(&|i| (along_x[i] + along_y[i]).sqrt() * per_step);
+        let slope = inside(nodes, |i| (along_x[i] + along_y[i]).sqrt() * per_step);
         Self {
-            third: table(&|i| (xxx[i] + yyy[i] + 3.0 * (xxy[i] + xyy[i])).sqrt() * per_step),
-            second: table(&|i| (xx[i] + yy[i] + 2.0 * xy[i]).sqrt() * per_step * per_step),
-            moved: table(&|i| lengths[i].sqrt()),
+            third: thirds.into_iter().map(|third| third.sqrt() * per_step).collect(),
+            second: inside(nodes, |i| (xx[i] + yy[i] + 2.0 * xy[i]).sqrt() * per_step * per_step),
+            moved: inside(nodes, |i| lengths[i].sqrt()),
             steepest: slope.iter().copied().fold(0.0, f32::max),
             slope,
         }
@@ -87,28 +77,4 @@ impl Bends {
             moved_mm: most(&self.moved),
         }
     }
-}
-
-/// Of each value of a table, what the one a way further has more; nothing where there is none.
-fn differences(table: &[Vec4], way: usize) -> Vec<Vec4> {
-    let further = table.get(way..).unwrap_or_default();
-    let mut out: Vec<Vec4> = table.iter().zip(further).map(|(here, further)| *further - *here).collect();
-    out.resize(table.len(), Vec4::ZERO);
-    out
-}
-
-/// Of each value of a table, none of them negative or NaN, the largest of those so many ways further.
-fn spread(table: &[f32], way: usize, steps: Range<isize>) -> Vec<f32> {
-    let mut out = vec![0.0_f32; table.len()];
-    for step in steps {
-        let shift = step.unsigned_abs() * way;
-        let (to, from) = if step < 0 { (shift, 0) } else { (0, shift) };
-        let from = table.get(from..).unwrap_or_default();
-        // Plain choices, of which machines make several at once.
-        out.iter_mut()
-            .skip(to)
-            .zip(from)
-            .for_each(|(out, value)| *out = if *value > *out { *value } else { *out });
-    }
-    out
 }

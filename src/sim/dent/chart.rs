@@ -4,6 +4,7 @@ use glam::{DVec3, Vec2, Vec3A, Vec4};
 
 use super::bends::Bends;
 use crate::sim::shading::Turned;
+use crate::sim::splines::{cubic_slopes, cubics};
 use crate::sim::touch::Between;
 
 /// Fewest and most nodes along a side.
@@ -225,8 +226,9 @@ impl Chart {
         }
         // Numbers of one size with signs are what machines turn into each other at once.
         let (i, j) = (gx as i32, gy as i32);
-        let (wx, dx) = spline(gx - i as f32);
-        let (wy, dy) = spline(gy - j as f32);
+        let part = Vec2::new(gx - i as f32, gy - j as f32);
+        let (wx, wy) = cubics(part);
+        let (dx, dy) = (cubic_slopes(part.x), cubic_slopes(part.y));
         let (i, j) = (i as usize, j as usize);
         let start = (j - 1) * self.nodes + i - 1;
         let corner = self.moved.get(start..start + 3 * self.nodes + 4)?;
@@ -276,19 +278,4 @@ fn to_coefficients(values: &mut [Vec4], count: usize, (start, stride): (usize, u
         (before, here) = (here, after);
     }
     set(values, count - 1, here - bend);
-}
-
-/// Weights of the four nodes around a place between the middle two, and their derivatives: the cubic spline's.
-fn spline(t: f32) -> ([f32; 4], [f32; 4]) {
-    let s = 1.0 - t;
-    let (t2, s2) = (t * t, s * s);
-    let sixth = 1.0 / 6.0;
-    let weights = [
-        s * s2 * sixth,
-        (t2 * (3.0 * t - 6.0) + 4.0) * sixth,
-        (s2 * (3.0 * s - 6.0) + 4.0) * sixth,
-        t * t2 * sixth,
-    ];
-    let slopes = [-0.5 * s2, t * (1.5 * t - 2.0), s * (2.0 - 1.5 * s), 0.5 * t2];
-    (weights, slopes)
 }

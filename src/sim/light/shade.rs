@@ -9,7 +9,7 @@ use crate::design::sections::LedColor;
 use crate::sim::SimError;
 use crate::sim::effect::EffectName;
 use crate::sim::scene::Scene;
-use crate::sim::shading::{Moved, PlainSample, Shading, SurfaceSample, Turned};
+use crate::sim::shading::{Moved, MovedBend, PlainSample, Shading, SurfaceSample, Turned};
 use crate::sim::work::Work;
 
 /// Work of one look-up in the table of the undeformed membrane.
@@ -213,17 +213,17 @@ impl Shading for LitDome {
     }
 
     fn change(&self, point_mm: Vec3A, normal: Vec3A) -> Vec3A {
-        let moved = self.field.moved(point_mm, normal);
-        let still = self.field.still(point_mm.normalize_or(Vec3A::Z));
-        (self.gain * (moved - still)).truncate().into()
+        Vec3A::from_vec4(self.gain) * self.field.change(point_mm, normal)
     }
 
     fn bend(&self, directions: &[Vec3A]) -> f32 {
         self.gain.max_element() * self.field.bend(directions)
     }
 
-    fn moved_bend(&self, directions: &[Vec3A], turned: Turned) -> f32 {
-        self.gain.max_element() * self.field.moved_bend(directions, turned)
+    fn moved_bend(&self, directions: &[Vec3A], turned: Turned) -> MovedBend {
+        let gain = self.gain.max_element();
+        let bend = self.field.moved_bend(directions, turned);
+        MovedBend { table: gain * bend.table, tilt: gain * bend.tilt }
     }
 
     fn marker_level(&self, _scene: &Scene, position_mm: DVec3) -> [f32; 3] {

@@ -95,6 +95,8 @@ pub struct Lit {
     /// What the samples show.
     shown: Vec<Vec4>,
     plain: Vec<PlainSample>,
+    /// Of each plain sample the pixel.
+    painted: Vec<usize>,
 }
 
 /// The membrane that is lit.
@@ -226,8 +228,12 @@ impl Lit {
                     // A square whose nine rays all miss may still hold a corner of the dome; large ones are divided
                     // once more.
                     Verdict::Misses if side <= MISSED => {}
-                    Verdict::Rough if side == SMALLEST && self.paint(surface, (x, y), work) => {}
+                    // Pixel by pixel, if the smaller nodes were told as well.
+                    Verdict::Rough if side < SMALLEST && self.paint(surface, (x, y), (side, 1), work) => {}
                     _ => {
+                        if side == SMALLEST {
+                            self.paint(surface, (x, y), (side, 2), work);
+                        }
                         let parts = [(x, y), (x + half, y), (x, y + half), (x + half, y + half)];
                         next.extend(parts.into_iter().filter(|part| shows(spans, *part, half)));
                     }

@@ -63,7 +63,8 @@ pub(super) struct Square {
 impl Square {
     /// Whether a smaller square may know more.
     pub fn is_open(self) -> bool {
-        self.side == 0 || (self.side > SMALLEST && self.source == Source::Exact)
+        let is_sure = matches!(self.source, Source::Still | Source::Little);
+        self.side == 0 || (self.side > SMALLEST && !is_sure)
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) const WEIGHTS: [[f32; 4]; SMALLEST + 1] = {
 /// What tells the rays of a square of the lattice.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Rays {
-    corner: (usize, usize),
+    pub corner: (usize, usize),
     /// Where the rays of the sixteen nodes about it are kept.
     pub nodes: [u32; 16],
     pub are_told: bool,

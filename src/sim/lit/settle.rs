@@ -15,6 +15,7 @@ const STILL_MM: f32 = 1e-6;
 /// neighbours say.
 const SMOOTH: f32 = 1.8;
 const LITTLE: f32 = 0.3;
+const FORESEEN: f32 = 0.8;
 /// Where the edge of the dome cuts a square, the tables know less of it: there no normal in the middle may be further than
 /// this from what those on both sides say, rad.
 const AT_EDGE_RAD: f32 = 2e-3;
@@ -53,13 +54,13 @@ impl Lit {
         }
         square.is_whole = count == 9;
         let places = places.get(..count).unwrap_or_default();
-        self.find_source(surface, &mut square, places);
+        self.find_source(surface, &mut square, &before, places);
         self.set_square(square);
     }
 
     /// Decides how the motion of a square comes about, of which some nodes have rays that meet the undeformed dome at
     /// `places`.
-    fn find_source(&self, surface: &LitSurface<'_>, square: &mut Square, places: &[Vec3A]) {
+    fn find_source(&self, surface: &LitSurface<'_>, square: &mut Square, before: &Square, places: &[Vec3A]) {
         let (top, bottom) = (square.corner.1, square.corner.1 + square.side);
         let Some(seen) = surface.at(top) else { return };
         square.turned = surface
@@ -72,20 +73,41 @@ impl Lit {
         directions.iter_mut().zip(places).for_each(|(to, from)| *to = *from * per_radius);
         let directions = directions.get(..places.len()).unwrap_or_default();
         let room = SMOOTH * surface.tolerance;
-        let tilted = Turned { tilt_rad: turned.tilt_rad, ..Turned::default() };
-        square.source = if places.is_empty() {
-            Source::Exact
-        } else if turned.moved_mm <= STILL_MM {
-            Source::Still
-        } else if surface.shading.moved_bend(directions, tilted) <= room
+        if places.is_empty() || turned.moved_mm <= STILL_MM {
+            square.source = if places.is_empty() { Source::Exact } else { Source::Still };
+            return;
+        }
+        let further = surface.shading.moved_bend(directions, turned);
+        square.source = if further.tilt <= room
             && (square.is_whole || self.bends_mildly(square, |motion| motion.tilt, AT_EDGE_RAD))
         {
-            let is_little = surface.shading.moved_bend(directions, turned) <= room
-                && self.bends_mildly(square, |motion| motion.change, LITTLE * surface.tolerance);
+            let is_little = (further.table + further.tilt <= room
+                && self.bends_mildly(square, |motion| motion.change, LITTLE * surface.tolerance))
+                || self.was_foreseen(square, before, |motion| motion.change, FORESEEN * surface.tolerance);
             if is_little { Source::Little } else { Source::Smooth }
         } else {
             Source::Exact
         };
+    }
+
+    /// Whether a part of the motion is at all nodes what the nine of the square that this one is a quarter of say there, within
+    /// some room. Tables have few knots in such a square: what is left between nodes half as far apart is a fraction of the
+    /// room.
+    fn was_foreseen(
+        &self,
+        square: &Square,
+        before: &Square,
+        part: impl Fn(&Motion) -> Vec3A,
+        room: f32,
+    ) -> bool {
+        square.is_whole
+            && before.is_whole
+            && before.side == 2 * square.side
+            && nine(square.corner, square.side).into_iter().zip(square.nodes).all(|(node, at)| {
+                let [told] = self.told(before, node, |motion| [part(motion)]);
+                let found = self.motions.get(at as usize).map_or(Vec3A::ZERO, &part);
+                (told - found).abs().max_element() <= room
+            })
     }
 
     /// Whether a part of the motion in the middles is what the straight lines through their neighbours say, within some
@@ -131,9 +153,13 @@ impl Lit {
         let per_radius = 1.0 / seen.optics.dome_radius_mm() as f32;
         let directions = places.map(|place| place * per_radius);
         let still = surface.shading.bend(&directions);
-        let further = |turned: Turned| (ALSO - 1.0) * still + surface.shading.moved_bend(&directions, turned);
+        let further = |turned: Turned| {
+            let bend = surface.shading.moved_bend(&directions, turned);
+            (ALSO - 1.0) * still + bend.table + bend.tilt
+        };
         let more = match source {
             Source::Still | Source::Little => 0.0,
+            // What the tilt leaves has been found small.
             Source::Smooth => further(Turned { tilt_rad: 0.0, ..turned }),
             Source::Exact => {
                 let slant = if is_whole { square.slant } else { MOST_SLANT };

@@ -1,0 +1,188 @@
+//! What an object changes of the light on a point that it moves.
+//!
+//! On three shells inside the dome there are tables of the *vector* irradiance, whose product with the normal is the
+//! irradiance; between them, Lagrange's parabola over the radius. What the undeformed membrane's own table shows beyond the
+//! outer shell's coarser one, the edges of shadows and the nearest lights, stays with the direction from the dome's centre:
+//! so only the difference that depth and tilt make is looked up here, as quadratic splines, which have no creases.
+
+use glam::{DVec2, Vec2, Vec3A, Vec4};
+
+use super::continued;
+use super::places::{Scale, cells, disc_of, split};
+use crate::sim::light::dome_map::{DomeGrid, bicubic};
+use crate::sim::light::tables::{SHELLS, Tables, Ways};
+use crate::sim::rests::{Seconds, differences, largest, rest_of_jumps, spread};
+use crate::sim::shading::{MovedBend, Turned};
+use crate::sim::splines::{Degree, quadratics, to_coefficients};
+
+/// Fluxes of the three channels along x, y and z.
+type Flux = [Vec3A; 3];
+
+/// The outer shell's flux, and how much more the others have, side by side: a look-up asks all of them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Node {
+    outer: Flux,
+    second: Flux,
+    third: Flux,
+}
+
+/// Bounds by cell of one of the tables.
+#[derive(Debug, Clone, Default)]
+struct Bends {
+    /// Jump of its second derivative, by the width of a cell.
+    jump: Vec<f32>,
+    /// Its largest value.
+    most: Vec<f32>,
+}
+
+/// The tables.
+#[derive(Debug, Clone)]
+pub(super) struct Shells {
+    radius_mm: f32,
+    scale: Scale,
+    /// Coefficients.
+    nodes: Vec<Node>,
+    /// Of the outer shell's table, and of the others' differences from it.
+    bends: [Bends; SHELLS.len()],
+}
+
+impl Shells {
+    /// Sums up the lights' tables; `None` where there are none.
+    pub fn new(ways: &Ways, tables: &[Tables<3>]) -> Option<Self> {
+        let grid = tables.first()?.grid;
+        let flux = |tables: &Tables<3>| flux(ways, tables, &grid);
+        let [outer, second, third] = match tables {
+            [outer, second, third] => [outer, second, third].map(flux),
+            _ => return None,
+        };
+        let more = |shell: &[Vec<Vec4>; 3]| -> [Vec<Vec4>; 3] {
+            std::array::from_fn(|k| shell[k].iter().zip(&outer[k]).map(|(a, b)| *a - *b).collect())
+        };
+        let mut parts = [more(&second), more(&third)];
+        let [second, third] = &mut parts;
+        let mut outer = outer;
+        for table in outer.iter_mut().chain(second.iter_mut()).chain(third.iter_mut()) {
+            to_coefficients(table, grid.nodes, Degree::Quadratic);
+        }
+        let at = |table: &[Vec<Vec4>; 3], i: usize| -> Flux {
+            std::array::from_fn(|k| table[k].get(i).map_or(Vec3A::ZERO, |v| Vec3A::from_vec4(*v)))
+        };
+        let node = |i: usize| Node { outer: at(&outer, i), second: at(second, i), third: at(third, i) };
+        Some(Self {
+            radius_mm: ways.radius_mm() as f32,
+            scale: Scale::of(&grid),
+            nodes: (0..grid.nodes * grid.nodes).map(node).collect(),
+            bends: [&outer, second, third].map(|tables| Bends::new(tables, grid.nodes)),
+        })
+    }
+
+    /// What is added to the light on an undeformed point in the same direction where the membrane lies `distance_mm` from the
+    /// dome's centre in a unit direction, with a unit normal of its own.
+    #[inline]
+    pub fn change(&self, distance_mm: f32, direction: Vec3A, normal: Vec3A) -> Vec3A {
+        let nodes = self.scale.nodes;
+        let place = self.scale.place(disc_of(direction)) + Vec2::splat(0.5);
+        let ((column, row), part) = split(place, 1.0, self.scale.last_cell);
+        let (wx, wy) = quadratics(part);
+        let start = (row - 1) * nodes + column - 1;
+        let Some(corner) = self.nodes.get(start..start + 2 * nodes + 3) else { return Vec3A::ZERO };
+        let [second, third] = shell_weights(distance_mm / self.radius_mm).map(|weight| normal * weight);
+        let off = normal - direction;
+        let mut light = Vec3A::ZERO;
+        for (row, wy) in wy.into_iter().enumerate() {
+            let row = &corner[row * nodes..row * nodes + 3];
+            let of = |node: &Node| {
+                let one =
+                    |flux: &Flux, along: Vec3A| (flux[0] * along.x + flux[1] * along.y) + flux[2] * along.z;
+                (one(&node.outer, off) + one(&node.second, second)) + one(&node.third, third)
+            };
+            light += ((of(&row[0]) * wx[0] + of(&row[1]) * wx[1]) + of(&row[2]) * wx[2]) * wy;
+        }
+        light
+    }
+
+    /// How far that may be from the surface of the second order through nine nodes, in rows of three, over a part of the dome
+    /// that holds these directions, for what the tables do and for normals that are not quite known.
+    pub fn bend(&self, directions: &[Vec3A], turned: Turned) -> MovedBend {
+        let (low, high) = cells(&self.scale, directions);
+        let apart = 0.5 * (high - low).max_element();
+        // Its depth and its tilt bound what each table weighs.
+        let deep = turned.moved_mm / self.radius_mm;
+        let weights = [(2.0 * turned.slope + deep).min(2.0), weight_at(deep, 0), weight_at(deep, 1)];
+        let (mut jump, mut most) = (0.0, 0.0);
+        for (k, (bends, weight)) in self.bends.iter().zip(weights).enumerate() {
+            let over = |table: &[f32]| over(table, self.scale.nodes, low, high);
+            jump += weight * over(&bends.jump);
+            most += if k == 0 { 1.0 } else { weight } * over(&bends.most);
+        }
+        MovedBend { table: rest_of_jumps(jump, apart), tilt: most * turned.tilt_rad }
+    }
+}
+
+impl Bends {
+    /// Of a flux.
+    fn new(tables: &[Vec<Vec4>; 3], nodes: usize) -> Self {
+        let most = |table: &[Vec4], columns: std::ops::Range<isize>, rows: std::ops::Range<isize>| {
+            let squares: Vec<Vec4> = table.iter().map(|v| *v * *v).collect();
+            spread(&spread(&squares, 1, columns, Vec4::max), nodes, rows, Vec4::max)
+        };
+        // By channel, the squares of the parts along x, y and z sum.
+        let mut sums = [const { Vec::new() }; 2];
+        for table in tables {
+            let (along_x, along_y) = (differences(table, 1), differences(table, nodes));
+            let thirds = Seconds::new(&along_x, &along_y, nodes).thirds(nodes, most);
+            for (sum, part) in sums.iter_mut().zip([thirds, most(table, -1..3, -1..3)]) {
+                sum.resize(part.len(), Vec4::ZERO);
+                sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+            }
+        }
+        let [jump, most] = sums.map(|sum| sum.into_iter().map(|v: Vec4| v.max_element().sqrt()).collect());
+        Self { jump, most }
+    }
+}
+
+/// The largest value in a box of cells.
+pub(super) fn over(table: &[f32], nodes: usize, low: Vec2, high: Vec2) -> f32 {
+    let [columns, rows] = [(low.x, high.x), (low.y, high.y)]
+        .map(|(low, high): (f32, f32)| low as i32 as usize..high as i32 as usize + 1);
+    largest(table, nodes, &columns, &rows)
+}
+
+/// The flux of all lights on a shell as the channels see it: tables of x, y and z, continued beyond the rim.
+fn flux(ways: &Ways, tables: &Tables<3>, grid: &DomeGrid) -> [Vec<Vec4>; 3] {
+    let mut flux = vec![[0.0; 9]; grid.nodes * grid.nodes];
+    for (source, table) in ways.sources.iter().zip(&tables.sources) {
+        for (sum, vector) in flux.iter_mut().zip(table) {
+            for (k, total) in sum.iter_mut().enumerate() {
+                *total += vector[k % 3] * source.seen_mw[k / 3];
+            }
+        }
+    }
+    let inside = |place: DVec2| bicubic(grid, &flux, grid.coordinates_of_disc(place));
+    let node = |i: usize| continued(grid.place(i % grid.nodes, i / grid.nodes), inside);
+    let nodes: Vec<[f64; 9]> = (0..grid.nodes * grid.nodes).map(node).collect();
+    let wide =
+        |v: &[f64; 9], axis: usize| Vec4::new(v[axis] as f32, v[3 + axis] as f32, v[6 + axis] as f32, 0.0);
+    std::array::from_fn(|axis| nodes.iter().map(|v| wide(v, axis)).collect())
+}
+
+/// Lagrange's weights of the second and third shell for a radius, part of the dome's; all three sum to one.
+#[inline]
+fn shell_weights(part: f32) -> [f32; 2] {
+    let [a, b, c] = PARTS;
+    let p = part.clamp(0.5, 1.1);
+    [(p - a) * (p - c) * (1.0 / ((b - a) * (b - c))), (p - a) * (p - b) * (1.0 / ((c - a) * (c - b)))]
+}
+
+const PARTS: [f32; 3] = [SHELLS[0] as f32, SHELLS[1] as f32, SHELLS[2] as f32];
+
+/// The most that a shell weighs down to some depth, or as far above the dome, part of the radius.
+fn weight_at(deep: f32, shell: usize) -> f32 {
+    let [a, b, c] = PARTS;
+    let deep = deep.min(0.5);
+    // Above the dome both factors grow; below it, no more than these.
+    match shell {
+        0 => deep * (deep + (a - c)) * (1.0 / ((a - b) * (b - c))),
+        _ => deep * (deep + (a - b)) * (1.0 / ((a - c) * (b - c))),
+    }
+}

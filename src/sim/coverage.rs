@@ -97,16 +97,20 @@ impl Coverage {
 
     /// Rows of the box inside a picture: the picture's row and first column, and the coverage from there.
     pub fn rows(&self, width: usize, height: usize) -> impl Iterator<Item = (usize, usize, &[f32])> {
+        let [_, top, _, bottom] = self.bounds(width, height);
+        (top..bottom).filter_map(move |y| self.row(y, width).map(|(x, part)| (y, x, part)))
+    }
+
+    /// The same of one row of a picture; `None` where the box has none.
+    pub fn row(&self, y: usize, width: usize) -> Option<(usize, &[f32])> {
         let stride = self.width + 1;
-        let rows = self.values.chunks_exact(stride).enumerate();
-        rows.filter_map(move |(index, row)| {
-            let y = usize::try_from(self.top + index as i64).ok().filter(|y| *y < height)?;
-            let skip = usize::try_from(-self.left).unwrap_or(0).min(self.width);
-            let x = usize::try_from(self.left).unwrap_or(0);
-            let count = (self.width - skip).min(width.saturating_sub(x));
-            let part = row.get(skip..skip + count).filter(|part| !part.is_empty())?;
-            Some((y, x, part))
-        })
+        let index = usize::try_from(y as i64 - self.top).ok().filter(|index| *index < self.height)?;
+        let row = self.values.get(index * stride..(index + 1) * stride)?;
+        let skip = usize::try_from(-self.left).unwrap_or(0).min(self.width);
+        let x = usize::try_from(self.left).unwrap_or(0);
+        let count = (self.width - skip).min(width.saturating_sub(x));
+        let part = row.get(skip..skip + count).filter(|part| !part.is_empty())?;
+        Some((x, part))
     }
 
     /// The box's columns and rows inside a picture, ends excluded.

@@ -70,7 +70,7 @@ fn levels(scene: &Scene, frame: u32, tolerances: &[f32]) -> (Vec<Levels>, Vec<(u
         let surface =
             LitSurface { slices: &slices, rays: Some(field.rays()), shading, channels: 0..3, tolerance };
         let mut spent = Work::default();
-        lit.fill(&surface, (width, height), &spans, &mut spent);
+        lit.fill(&surface, (width, height), &spans, &mut spent, |_, _| ());
         let rays = spent.of(EffectName::Fresnel) / light::shade::LEAVING_UNITS;
         let mut out = Vec::new();
         places.clear();

@@ -172,11 +172,18 @@ impl Painter {
         };
         let at = |k: usize| 0.5 * (low[k].min(high[k]) + high[k]) as f64;
         let center = DVec2::new(at(0), at(1));
-        self.lit.fill(&surface, (width, height), &self.spans, work);
         let surround = (channels.len() == 3).then(|| Surround::of(parts));
-        for (dome, slice) in self.domes.iter().zip(slices) {
-            let over = (dome, &slice.rows());
-            blend(&mut self.lit, over, (parts.field, surround), center, frame, channels.clone());
+        let domes = &self.domes;
+        let over = Over { field: parts.field, surround, center, channels: channels.clone() };
+        self.lit.fill(&surface, (width, height), &self.spans, work, |lit, rows| {
+            for (dome, slice) in domes.iter().zip(slices) {
+                let of_slice = slice.rows();
+                for y in rows.start.max(of_slice.start)..rows.end.min(of_slice.end) {
+                    over.blend(lit, dome, y, frame);
+                }
+            }
+        });
+        for dome in &self.domes {
             work.add_base(dome.area() as u64 * units::PIXEL * channels.len() as u64);
         }
     }
@@ -281,51 +288,57 @@ impl<'a> Surround<'a> {
     }
 }
 
-/// Lays the lit membrane over the ground.
-fn blend(
-    lit: &mut Lit,
-    (coverage, rows): (&Coverage, &Range<usize>),
-    (field, surround): (&LensField, Option<Surround<'_>>),
+/// How the lit membrane is laid over the ground.
+struct Over<'a> {
+    field: &'a LensField,
+    /// What is laid beside the membrane in the same rows, where that is still to be done.
+    surround: Option<Surround<'a>>,
+    /// Of the dome in the picture, px.
     center: DVec2,
-    frame: &mut Frame,
     channels: Range<usize>,
-) {
-    let (width, height) = (frame.width(), frame.height());
-    for (y, x, part) in coverage.rows(width, height).filter(|(y, ..)| rows.contains(y)) {
-        let (seen, part) = inside(field.row(y), x, part);
-        lit.complete(y, seen.clone(), part, center);
+}
+
+impl Over<'_> {
+    /// Lays a row.
+    fn blend(&self, lit: &mut Lit, coverage: &Coverage, y: usize, frame: &mut Frame) {
+        let width = frame.width();
+        let Some((x, part)) = coverage.row(y, width) else { return };
+        let (seen, part) = inside(self.field.row(y), x, part);
+        lit.complete(y, seen.clone(), part, self.center);
         let whole = whole_of(part);
         let (left, right) = (seen.start + whole.start, seen.start + whole.end);
         let levels = lit.row(y, seen.clone());
         // A picture has one plane or three.
-        for (lane, plane) in frame.planes.iter_mut().enumerate().take(channels.end).skip(channels.start) {
+        for (lane, plane) in
+            frame.planes.iter_mut().enumerate().take(self.channels.end).skip(self.channels.start)
+        {
             let Some(row) = plane.get_mut(y * width..(y + 1) * width) else { continue };
-            if let Some(surround) = surround {
+            if let Some(surround) = self.surround {
                 surround.lay(y, row, 0..left);
                 surround.lay(y, row, right..width);
             }
             let Some(values) = row.get_mut(seen.clone()) else { continue };
-            let edge = |values: &mut [f32], columns: Range<usize>| {
-                let (Some(values), Some(part), Some(levels)) =
-                    (values.get_mut(columns.clone()), part.get(columns.clone()), levels.get(columns))
-                else {
-                    return;
-                };
-                for ((value, share), level) in values.iter_mut().zip(part).zip(levels) {
+            for columns in [0..whole.start, whole.end..part.len()] {
+                let each = values.iter_mut().zip(part).zip(levels).take(columns.end).skip(columns.start);
+                for ((value, share), level) in each {
                     *value += share * (level[lane] - *value);
                 }
-            };
-            edge(values, 0..whole.start);
-            edge(values, whole.end..part.len());
-            if let (Some(values), Some(levels)) = (values.get_mut(whole.clone()), levels.get(whole.clone())) {
-                let pairs = values.iter_mut().zip(levels);
-                // By name, so that no lane's number is checked pixel by pixel.
-                match lane {
-                    0 => pairs.for_each(|(value, level)| *value = level.x),
-                    1 => pairs.for_each(|(value, level)| *value = level.y),
-                    _ => pairs.for_each(|(value, level)| *value = level.z),
+            }
+        }
+        let Some(levels) = levels.get(whole) else { return };
+        let channels = self.channels.clone();
+        let rows = frame.planes.get_mut(channels.clone()).unwrap_or_default().iter_mut();
+        let mut rows = rows.filter_map(|plane| plane.get_mut(y * width + left..y * width + right));
+        match (rows.next(), rows.next(), rows.next()) {
+            (Some(red), Some(green), Some(blue)) => {
+                for (((red, green), blue), level) in red.iter_mut().zip(green).zip(blue).zip(levels) {
+                    (*red, *green, *blue) = (level.x, level.y, level.z);
                 }
             }
+            (Some(one), ..) => {
+                one.iter_mut().zip(levels).for_each(|(value, level)| *value = level[channels.start]);
+            }
+            _ => {}
         }
     }
 }

@@ -36,13 +36,15 @@ use super::work::Work;
 use crate::optics::SensorOptics;
 
 /// Side of the largest squares, px; a power of two.
-pub(super) const LARGEST: usize = 16;
+pub(super) const LARGEST: usize = 32;
 /// Parts of the tolerance: a bound on what the surface through the nodes leaves that is above the first divides a
 /// square whatever its nodes say; one below the second does not, for then the nodes only differ as a surface of the
 /// second order does. The bounds take the worst of all directions, cells and phases at once, some ten times what is
 /// found; with these parts no pixel of many objects' pictures was found further off than the tolerance.
 const HIDDEN: f32 = 2.3;
 const TOLD: f32 = 0.3;
+/// Pixels without a ray take the brightness of others up to so many pixels away.
+const NEAR_PX: usize = 4;
 /// Squares up to this size, px, whose nine rays miss the dome show none of it.
 const MISSED: usize = 8;
 
@@ -156,13 +158,15 @@ impl<'a> LitSurface<'a> {
 }
 
 impl Lit {
-    /// Works out the brightness of the pixels of `spans`, by row, those of the picture that show the dome.
+    /// Works out the brightness of the pixels of `spans`, by row, those of the picture that show the dome. Whenever more rows
+    /// are known, with what [`Self::complete`] takes from others, `take` is given them, from the first row to the last.
     pub fn fill(
         &mut self,
         surface: &LitSurface<'_>,
         size: (usize, usize),
         spans: &[Range<usize>],
         work: &mut Work,
+        mut take: impl FnMut(&mut Self, Range<usize>),
     ) {
         // Nodes lie on the corners of squares, so the grid reaches one pixel past the last square.
         let grid = |n: usize| n.div_ceil(LARGEST) * LARGEST + 1;
@@ -177,7 +181,7 @@ impl Lit {
         // Rows of squares one after the other, so that what a row is made of stays near at hand; each once the nodes of the
         // next are known as well.
         let rows = size.1.div_ceil(LARGEST);
-        let (mut squares, mut next) = (Vec::new(), Vec::new());
+        let (mut squares, mut next, mut taken) = (Vec::new(), Vec::new(), 0);
         for row in 0..=rows {
             std::mem::swap(&mut squares, &mut next);
             next.clear();
@@ -188,6 +192,9 @@ impl Lit {
             }
             self.light(surface, work);
             self.divide(surface, spans, &mut squares, work);
+            let known = if row < rows { (row * LARGEST).saturating_sub(NEAR_PX + 1) } else { size.1 };
+            take(self, taken..known);
+            taken = known;
         }
     }
 
@@ -294,7 +301,7 @@ impl Lit {
             let (known, level) = self.node(place.x as usize, place.y as usize);
             (known == Known::Lit).then_some(level)
         };
-        (0..=4).find_map(beside).unwrap_or(Vec4::ZERO)
+        (0..=NEAR_PX as u32).find_map(beside).unwrap_or(Vec4::ZERO)
     }
 
     fn node(&self, x: usize, y: usize) -> (Known, Vec4) {

@@ -7,9 +7,9 @@ use super::{LARGEST, Lit};
 use crate::sim::shading::Turned;
 
 /// Distance of the pixels of which ray and motion are kept, px: the nodes of the squares half as large as the largest.
-const KEPT_STEP: usize = LARGEST / 4;
+const KEPT_STEP: usize = SMALLEST / 2;
 /// Side of the smallest squares of which something is known as a whole, px.
-pub(super) const SMALLEST: usize = LARGEST / 2;
+pub(super) const SMALLEST: usize = 8;
 /// A ray, and how the membrane moved where it met it undeformed.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Motion {

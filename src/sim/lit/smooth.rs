@@ -116,7 +116,8 @@ impl Lit {
             1 => self.lay::<3>(x, y, &nine),
             2 => self.lay::<5>(x, y, &nine),
             4 => self.lay::<9>(x, y, &nine),
-            _ => self.lay::<17>(x, y, &nine),
+            8 => self.lay::<17>(x, y, &nine),
+            _ => self.lay::<33>(x, y, &nine),
         }
     }
 

@@ -39,8 +39,19 @@ impl Frame {
                 // In runs that stay in the nearest cache: codes first, channel by channel, then woven, four pixels into
                 // three words.
                 let mut codes = [[0_u32; RUN]; 3];
+                let (mut colour, mut even) = ([0; 3], [0_u8; 3 * RUN]);
                 let runs = red.chunks(RUN).zip(green.chunks(RUN)).zip(blue.chunks(RUN));
                 for (pixels, ((red, green), blue)) in bytes.chunks_mut(3 * RUN).zip(runs) {
+                    // Beside the sensor there is one colour.
+                    if let (Some(red), Some(green), Some(blue)) = (only(red), only(green), only(blue)) {
+                        let found = [red, green, blue].map(|value| coder.code(value));
+                        if found != colour {
+                            colour = found;
+                            even.chunks_exact_mut(3).for_each(|pixel| pixel.copy_from_slice(&colour));
+                        }
+                        pixels.iter_mut().zip(&even).for_each(|(byte, code)| *byte = *code);
+                        continue;
+                    }
                     for (codes, values) in codes.iter_mut().zip([red, green, blue]) {
                         coder.fill(values, codes);
                     }
@@ -88,7 +99,15 @@ impl Frame {
 }
 
 /// Pixels that are coded at a time.
-const RUN: usize = 512;
+const RUN: usize = 128;
+
+/// The value of a run that has but one.
+fn only(values: &[f32]) -> Option<f32> {
+    let (first, last) = (values.first()?, values.last()?);
+    // Most others are told by their ends.
+    let differs = |value: &f32| u32::from(value.to_bits() != first.to_bits());
+    (differs(last) == 0 && values.iter().map(differs).sum::<u32>() == 0).then_some(*first)
+}
 
 /// 2^23: a number from 0 to it, added to it, leaves its nearest whole number, and that in the lowest bits.
 const WHOLE: f32 = 8_388_608.0;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::DVec2;
+use glam::{DVec2, Mat4};
 
 use super::coverage::{Coverage, LEAST_SHARE, clip, clip_to_image};
 use super::effect::EffectName;
@@ -319,8 +319,12 @@ impl Over<'_> {
             }
             let Some(values) = row.get_mut(seen.clone()) else { continue };
             for columns in [0..whole.start, whole.end..part.len()] {
-                let each = values.iter_mut().zip(part).zip(levels).take(columns.end).skip(columns.start);
-                for ((value, share), level) in each {
+                let (Some(values), Some(part), Some(levels)) =
+                    (values.get_mut(columns.clone()), part.get(columns.clone()), levels.get(columns))
+                else {
+                    continue;
+                };
+                for ((value, share), level) in values.iter_mut().zip(part).zip(levels) {
                     *value += share * (level[lane] - *value);
                 }
             }
@@ -331,7 +335,19 @@ impl Over<'_> {
         let mut rows = rows.filter_map(|plane| plane.get_mut(y * width + left..y * width + right));
         match (rows.next(), rows.next(), rows.next()) {
             (Some(red), Some(green), Some(blue)) => {
-                for (((red, green), blue), level) in red.iter_mut().zip(green).zip(blue).zip(levels) {
+                let (fours, last) = levels.as_chunks::<4>();
+                let (red, last_red) = red.as_chunks_mut::<4>();
+                let (green, last_green) = green.as_chunks_mut::<4>();
+                let (blue, last_blue) = blue.as_chunks_mut::<4>();
+                for (((red, green), blue), four) in red.iter_mut().zip(green).zip(blue).zip(fours) {
+                    let [a, b, c, d] = *four;
+                    let planes = Mat4::from_cols(a, b, c, d).transpose();
+                    *red = planes.x_axis.to_array();
+                    *green = planes.y_axis.to_array();
+                    *blue = planes.z_axis.to_array();
+                }
+                let last = last_red.iter_mut().zip(last_green).zip(last_blue).zip(last);
+                for (((red, green), blue), level) in last {
                     (*red, *green, *blue) = (level.x, level.y, level.z);
                 }
             }

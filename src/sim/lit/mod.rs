@@ -86,9 +86,11 @@ pub struct Lit {
     motions: Vec<Motion>,
     /// Of each pixel that may be a node, which of these is its own.
     kept: Vec<u32>,
-    /// By the smallest squares of which something is known as a whole.
-    squares: Vec<Square>,
-    rays: Vec<Rays>,
+    /// What is known of squares as a whole, of nothing first; and which of these is each smallest square's own.
+    known_squares: Vec<Square>,
+    squares: Vec<u32>,
+    known_rays: Vec<Rays>,
+    rays: Vec<u32>,
     /// The motion of the pixel that was asked last, mm.
     moved_mm: Vec3A,
     samples: Vec<SurfaceSample>,

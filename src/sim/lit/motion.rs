@@ -30,6 +30,15 @@ pub(super) struct Motion {
     pub change: Vec3A,
 }
 
+impl Motion {
+    /// With its ray, which meets the undeformed dome at a place with a unit normal, along a unit direction.
+    pub fn along(self, (place_mm, inside): (Vec3A, Vec3A), normal: Vec3A) -> Self {
+        let cosine = inside.dot(normal).abs();
+        let slant = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine.max(1e-3);
+        Self { place_mm, inside, slant, base_mm: place_mm - inside * (place_mm.z / inside.z), ..self }
+    }
+}
+
 /// How the pixels of a square come by their place on the membrane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Source {
@@ -69,7 +78,7 @@ impl Square {
 }
 
 /// Where the motion of nodes without a ray is kept: the rim is bonded, and what is beyond it does not move.
-const NONE: u32 = 0;
+pub(super) const NONE: u32 = 0;
 
 /// Weights of a square's three nodes at each of its columns or rows.
 const WEIGHTS: [[f32; 3]; LARGEST + 1] = {
@@ -100,10 +109,14 @@ impl Lit {
         let ((across, down), (columns, rows)) = (lay(KEPT_STEP), lay(SMALLEST));
         self.kept.clear();
         self.kept.resize(across * down, NONE);
+        self.known_squares.clear();
+        self.known_squares.push(Square::default());
         self.squares.clear();
-        self.squares.resize(columns * rows, Square::default());
+        self.squares.resize(columns * rows, 0);
+        self.known_rays.clear();
+        self.known_rays.push(Rays::default());
         self.rays.clear();
-        self.rays.resize(columns * rows, Rays::default());
+        self.rays.resize(columns * rows, 0);
     }
 
     /// Where something is known of the smallest square that holds a pixel.
@@ -113,15 +126,18 @@ impl Lit {
 
     /// What is known of the square around it.
     pub(super) fn square(&self, pixel: (usize, usize)) -> Square {
-        self.squares.get(self.square_at(pixel)).copied().unwrap_or_default()
+        let index = self.squares.get(self.square_at(pixel)).copied().unwrap_or(0);
+        self.known_squares.get(index as usize).copied().unwrap_or_default()
     }
 
     pub(super) fn set_square(&mut self, square: Square) {
         let (across, parts) = (self.width.div_ceil(SMALLEST), square.side / SMALLEST);
         let (column, row) = (square.corner.0 / SMALLEST, square.corner.1 / SMALLEST);
+        let index = self.known_squares.len() as u32;
+        self.known_squares.push(square);
         for row in row..row + parts {
             let places = self.squares.get_mut(row * across + column..row * across + column + parts);
-            places.into_iter().for_each(|places| places.fill(square));
+            places.into_iter().for_each(|places| places.fill(index));
         }
     }
 
@@ -130,9 +146,13 @@ impl Lit {
         x.is_multiple_of(KEPT_STEP) && y.is_multiple_of(KEPT_STEP)
     }
 
+    fn kept_index(&self, (x, y): (usize, usize)) -> usize {
+        y / KEPT_STEP * self.width.div_ceil(KEPT_STEP) + x / KEPT_STEP
+    }
+
     /// Keeps those of a node.
-    pub(super) fn keep(&mut self, (x, y): (usize, usize), motion: Motion) {
-        let at = y / KEPT_STEP * self.width.div_ceil(KEPT_STEP) + x / KEPT_STEP;
+    pub(super) fn keep(&mut self, node: (usize, usize), motion: Motion) {
+        let at = self.kept_index(node);
         if let Some(place) = self.kept.get_mut(at) {
             *place = self.motions.len() as u32;
             self.motions.push(motion);
@@ -140,9 +160,9 @@ impl Lit {
     }
 
     /// Where those of a node are kept.
-    pub(super) fn kept_at(&self, (x, y): (usize, usize)) -> u32 {
-        let at = y / KEPT_STEP * self.width.div_ceil(KEPT_STEP) + x / KEPT_STEP;
-        self.kept.get(at).copied().unwrap_or(NONE)
+    pub(super) fn kept_at(&self, node: (usize, usize)) -> u32 {
+        let index = self.kept_index(node);
+        self.kept.get(index).copied().filter(|_| node.0 < self.width).unwrap_or(NONE)
     }
 
     /// Those of a node that has a ray and is known.

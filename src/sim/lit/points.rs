@@ -34,7 +34,6 @@ impl Lit {
                 continue;
             }
             let Some(seen) = surface.at(y) else { continue };
-            let pixel = DVec2::new(x as f64, y as f64);
             // Where a ray may meet the membrane more than once, the least difference may show another part of it.
             let may_fold = square.source == Source::Exact && seen.dent.is_some_and(Dent::may_fold);
             let told = if rays.are_told && !may_fold {
@@ -43,26 +42,20 @@ impl Lit {
             } else {
                 None
             };
-            let trace = || {
-                work.add_base(units::RAY);
-                let hit = match surface.rays.and_then(|rays| rays.at(x, y)) {
-                    Some(ray) => seen.optics.follow_continued(ray),
-                    None => seen.optics.trace_continued(pixel),
-                };
-                hit.map(|(place_mm, inside)| (place_mm.as_vec3a(), inside.as_vec3a()))
-            };
-            let hit = told.map_or_else(trace, Ok);
+            let hit = told.or_else(|| trace((surface, seen), (x, y), work));
             let mut known = Known::Lit;
             match hit {
-                Ok(hit) => {
+                Some(hit) => {
                     let asked = Asked { pixel: (x, y), is_kept: self.is_kept((x, y)) };
                     let sample = self.sample((surface, seen), hit, &square, asked, work);
                     self.samples.push(sample);
                     self.places.push((at, 1.0));
                 }
-                Err(_) => {
+                None => {
                     known = Known::Misses;
-                    for (hit, weight) in continued(seen.optics, pixel).into_iter().flatten() {
+                    for (hit, weight) in
+                        continued(seen.optics, DVec2::new(x as f64, y as f64)).into_iter().flatten()
+                    {
                         known = Known::Lit;
                         let asked = Asked { pixel: (x, y), is_kept: false };
                         let sample = self.sample((surface, seen), hit, &square, asked, work);
@@ -80,6 +73,15 @@ impl Lit {
             if self.samples.len() >= BATCH {
                 self.light(surface, work);
             }
+        }
+    }
+
+    /// Follows the ray of a node that nothing asks for, and keeps it alone.
+    pub(super) fn keep_ray(&mut self, surface: &LitSurface<'_>, node: (usize, usize), work: &mut Work) {
+        let Some(seen) = surface.at(node.1) else { return };
+        if let Some((surface_mm, inside)) = trace((surface, seen), node, work) {
+            let normal = surface_mm * (1.0 / seen.optics.dome_radius_mm() as f32);
+            self.keep(node, Motion::default().along((surface_mm, inside), normal));
         }
     }
 
@@ -148,12 +150,7 @@ impl Lit {
             }
         }
         if asked.is_kept {
-            let cosine = inside.dot(normal).abs();
-            motion.slant = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine.max(1e-3);
-            let base_mm = surface_mm - inside * (surface_mm.z / inside.z);
-            motion.base_mm = base_mm;
-            (motion.place_mm, motion.inside) = (surface_mm, inside);
-            self.keep(asked.pixel, motion);
+            self.keep(asked.pixel, motion.along((surface_mm, inside), normal));
         }
         sample
     }
@@ -181,6 +178,21 @@ impl Lit {
         let has_moved = self.moved_mm.length_squared() > STILL_MM * STILL_MM;
         has_moved.then_some(Found { point_mm: rest_mm + dented.displacement_mm, normal: dented.normal })
     }
+}
+
+/// Follows the ray of a pixel all the way: where it meets the undeformed dome, mm, and its unit direction; `None` where it does
+/// not.
+fn trace(
+    (surface, seen): (&LitSurface<'_>, &LitSlice<'_>),
+    (x, y): (usize, usize),
+    work: &mut Work,
+) -> Option<(Vec3A, Vec3A)> {
+    work.add_base(units::RAY);
+    let hit = match surface.rays.and_then(|rays| rays.at(x, y)) {
+        Some(ray) => seen.optics.follow_continued(ray),
+        None => seen.optics.trace_continued(DVec2::new(x as f64, y as f64)),
+    };
+    hit.ok().map(|(place_mm, inside)| (place_mm.as_vec3a(), inside.as_vec3a()))
 }
 
 /// A pixel that is asked for.

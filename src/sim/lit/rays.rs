@@ -5,7 +5,7 @@
 
 use glam::Vec3A;
 
-use super::motion::SMALLEST;
+use super::motion::{NONE, SMALLEST};
 use super::{Lit, LitSurface};
 use crate::sim::field::lagrange;
 use crate::sim::work::Work;
@@ -44,7 +44,8 @@ pub(super) struct Rays {
 impl Lit {
     /// What tells the rays of the smallest settled square that holds a pixel.
     pub(super) fn rays(&self, (x, y): (usize, usize)) -> Rays {
-        self.rays.get(self.square_at((x, y))).copied().unwrap_or_default()
+        let index = self.rays.get(self.square_at((x, y))).copied().unwrap_or(0);
+        self.known_rays.get(index as usize).copied().unwrap_or_default()
     }
 
     /// Finds out whether the nodes about a square, of which the rays are known, tell its rays; the one in its middle is
@@ -56,10 +57,14 @@ impl Lit {
         for (i, at) in rays.nodes.iter_mut().enumerate() {
             let node = |corner: usize, i: usize| (corner + i * SMALLEST).checked_sub(SMALLEST);
             let (Some(x), Some(y)) = (node(corner.0, i % 4), node(corner.1, i / 4)) else { return };
-            if self.kept((x, y)).is_none() {
-                return;
+            // Beside the dome nothing else asks for them.
+            if x < self.width && y < self.height && self.kept_at((x, y)) == NONE {
+                self.keep_ray(surface, (x, y), work);
             }
-            *at = self.kept_at((x, y));
+            match self.kept_at((x, y)) {
+                NONE => return,
+                kept => *at = kept,
+            }
         }
         let middle = (corner.0 + SMALLEST / 2, corner.1 + SMALLEST / 2);
         self.ask(surface, corner, [middle], work);
@@ -70,8 +75,11 @@ impl Lit {
         let room_mm = PART * surface.tolerance / (surface.shading.steepest_per_mm() as f32).max(1e-3);
         // A ray that slants meets the dome so much further off.
         rays.are_told = SURE * (1.0 + kept.slant) * off_mm <= room_mm.min(MOST_MM);
-        let at = self.square_at(corner);
-        self.rays.get_mut(at).into_iter().for_each(|place| *place = rays);
+        let (at, index) = (self.square_at(corner), self.known_rays.len() as u32);
+        if let Some(place) = self.rays.get_mut(at) {
+            *place = index;
+            self.known_rays.push(rays);
+        }
     }
 
     #[inline]

@@ -2,7 +2,7 @@
 
 use glam::Vec3A;
 
-use super::motion::{Motion, Source, Square};
+use super::motion::{Motion, SMALLEST, Source, Square};
 use super::smooth::Verdict;
 use super::{Lit, LitSurface, nine};
 use crate::sim::shading::Turned;
@@ -16,6 +16,8 @@ const STILL_MM: f32 = 1e-6;
 const SMOOTH: f32 = 1.8;
 const LITTLE: f32 = 0.3;
 const FORESEEN: f32 = 0.8;
+const FORESEEN_FAR: f32 = 0.5;
+const SURE_TILT: f32 = 0.4;
 /// Where the edge of the dome cuts a square, the tables know less of it: there no normal in the middle may be further than
 /// this from what those on both sides say, rad.
 const AT_EDGE_RAD: f32 = 2e-3;
@@ -83,7 +85,12 @@ impl Lit {
         {
             let is_little = (further.table + further.tilt <= room
                 && self.bends_mildly(square, |motion| motion.change, LITTLE * surface.tolerance))
-                || self.was_foreseen(square, before, |motion| motion.change, FORESEEN * surface.tolerance);
+                || {
+                    let (part, most) =
+                        if square.side == SMALLEST { (FORESEEN, 1.0) } else { (FORESEEN_FAR, SURE_TILT) };
+                    further.tilt <= most * room
+                        && self.was_foreseen(square, before, |motion| motion.change, part * surface.tolerance)
+                };
             if is_little { Source::Little } else { Source::Smooth }
         } else {
             Source::Exact

@@ -223,7 +223,7 @@ impl Lit {
             }
             for (x, y) in squares.drain(..) {
                 if side >= SMALLEST && surface.tolerance > 0.0 && self.square((x, y)).is_open() {
-                    self.settle(surface, (x, y), side);
+                    self.settle(surface, (x, y), side, work);
                 }
                 // The smallest squares have no pixels between their nodes.
                 if half == 1 {

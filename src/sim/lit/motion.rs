@@ -28,6 +28,8 @@ pub(super) struct Motion {
     pub tilt: Vec3A,
     /// Change of the light, full scales.
     pub change: Vec3A,
+    /// Whether all this is known, and not the ray alone.
+    pub is_whole: bool,
 }
 
 impl Motion {

@@ -76,12 +76,29 @@ impl Lit {
         }
     }
 
-    /// Follows the ray of a node that nothing asks for, and keeps it alone.
+    /// Keeps the ray of a node that nothing has asked for.
     pub(super) fn keep_ray(&mut self, surface: &LitSurface<'_>, node: (usize, usize), work: &mut Work) {
-        let Some(seen) = surface.at(node.1) else { return };
-        if let Some((surface_mm, inside)) = trace((surface, seen), node, work) {
-            let normal = surface_mm * (1.0 / seen.optics.dome_radius_mm() as f32);
-            self.keep(node, Motion::default().along((surface_mm, inside), normal));
+        let Some(seen) = surface.at(node.1).filter(|_| node.0 < self.width && node.1 < self.height) else {
+            return;
+        };
+        if let Some(hit) = trace((surface, seen), node, work) {
+            let normal = hit.0 * (1.0 / seen.optics.dome_radius_mm() as f32);
+            self.keep(node, Motion::default().along(hit, normal));
+        }
+    }
+
+    /// Keeps ray and motion of a node of a square that a neighbour has been filled in over.
+    pub(super) fn keep_motion(
+        &mut self,
+        surface: &LitSurface<'_>,
+        square: &Square,
+        node: (usize, usize),
+        work: &mut Work,
+    ) {
+        let is_filled = self.known.get(node.1 * self.width + node.0) == Some(&Known::Lit);
+        let Some(seen) = surface.at(node.1).filter(|_| is_filled) else { return };
+        if let Some(hit) = trace((surface, seen), node, work) {
+            self.sample((surface, seen), hit, square, Asked { pixel: node, is_kept: true }, work);
         }
     }
 
@@ -150,6 +167,7 @@ impl Lit {
             }
         }
         if asked.is_kept {
+            motion.is_whole = true;
             self.keep(asked.pixel, motion.along((surface_mm, inside), normal));
         }
         sample

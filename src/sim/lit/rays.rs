@@ -57,8 +57,7 @@ impl Lit {
         for (i, at) in rays.nodes.iter_mut().enumerate() {
             let node = |corner: usize, i: usize| (corner + i * SMALLEST).checked_sub(SMALLEST);
             let (Some(x), Some(y)) = (node(corner.0, i % 4), node(corner.1, i / 4)) else { return };
-            // Beside the dome nothing else asks for them.
-            if x < self.width && y < self.height && self.kept_at((x, y)) == NONE {
+            if self.kept_at((x, y)) == NONE {
                 self.keep_ray(surface, (x, y), work);
             }
             match self.kept_at((x, y)) {

@@ -6,6 +6,7 @@ use super::motion::{Motion, SMALLEST, Source, Square};
 use super::smooth::Verdict;
 use super::{Lit, LitSurface, nine};
 use crate::sim::shading::Turned;
+use crate::sim::work::Work;
 
 /// What moves by less than this, mm, stands still.
 const STILL_MM: f32 = 1e-6;
@@ -39,7 +40,13 @@ pub(super) struct Bend {
 
 impl Lit {
     /// Decides how the pixels of a square, of which the nine nodes are known, come by their rays and places.
-    pub(super) fn settle(&mut self, surface: &LitSurface<'_>, corner: (usize, usize), side: usize) {
+    pub(super) fn settle(
+        &mut self,
+        surface: &LitSurface<'_>,
+        corner: (usize, usize),
+        side: usize,
+        work: &mut Work,
+    ) {
         let before = self.square(corner);
         let mut square = Square { corner, side, ..before };
         let mut places = [Vec3A::ZERO; 9];
@@ -47,7 +54,11 @@ impl Lit {
         square.slant = 0.0;
         for (node, at) in nine(corner, side).into_iter().zip(&mut square.nodes) {
             *at = self.kept_at(node);
-            let Some(kept) = self.kept(node) else { continue };
+            if !self.motions.get(*at as usize).is_some_and(|kept| kept.is_whole) {
+                self.keep_motion(surface, &before, node, work);
+                *at = self.kept_at(node);
+            }
+            let Some(kept) = self.motions.get(*at as usize).filter(|kept| kept.is_whole) else { continue };
             if let Some(place) = places.get_mut(count) {
                 *place = kept.place_mm;
                 square.slant = square.slant.max(kept.slant.min(MOST_SLANT));

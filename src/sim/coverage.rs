@@ -81,17 +81,24 @@ impl Coverage {
         }
         for row in self.values.chunks_exact_mut(stride) {
             let mut sum = 0.0_f32;
-            for values in row.chunks_mut(16) {
-                // Most of a wide polygon's pixels are crossed by no edge: the sum does not wait for each of them.
-                if values.iter().fold(0, |any, value| any | value.to_bits()) == 0 {
-                    values.fill(sum.abs().min(1.0));
-                    continue;
-                }
+            let mut add_up = |values: &mut [f32]| {
                 for value in values {
                     sum += *value;
                     *value = sum.abs().min(1.0);
                 }
+                sum.abs().min(1.0)
+            };
+            let (wide, last) = row.as_chunks_mut::<16>();
+            let mut so_far = 0.0;
+            for values in wide {
+                // Most of a wide polygon's pixels are crossed by no edge: the sum does not wait for each of them.
+                if values.iter().fold(0, |any, value| any | value.to_bits()) == 0 {
+                    *values = [so_far; 16];
+                } else {
+                    so_far = add_up(values);
+                }
             }
+            add_up(last);
         }
     }
 
@@ -145,19 +152,29 @@ impl Coverage {
 /// Adds an edge to the accumulation: for each row that it crosses, its height there, split between the pixels by
 /// the area to its right.
 fn add_edge(values: &mut [f32], stride: usize, from: DVec2, to: DVec2, share: f64) {
+    let (low, high) = (from.min(to), from.max(to));
+    let (first_row, column) = (floor(low.y), floor(low.x));
+    if high.y <= (first_row + 1) as f64 && high.x <= (column + 1) as f64 {
+        // Most edges of small polygons lie in one pixel: the part right of the edge's middle is covered.
+        let (height, middle) = (share * (to.y - from.y), 0.5 * (from.x + to.x) - column as f64);
+        let start = first_row * stride + column;
+        if let Some([here, right]) = values.get_mut(start..start + 2) {
+            *here += (height * (1.0 - middle)) as f32;
+            *right += (height * middle) as f32;
+        }
+        return;
+    }
     if from.y == to.y {
         return;
     }
     let (sign, a, b) = if from.y < to.y { (share, from, to) } else { (-share, to, from) };
     let per_row = (b.x - a.x) / (b.y - a.y);
-    let mut row_number = floor(a.y);
-    let mut x = a.x;
-    let mut y = a.y;
+    let mut row_number = first_row;
+    let (mut x, mut y) = (a.x, a.y);
     while y < b.y {
-        let index = row_number;
-        let Some(row) = values.get_mut(index * stride..(index + 1) * stride) else { break };
+        let Some(row) = values.get_mut(row_number * stride..(row_number + 1) * stride) else { break };
         row_number += 1;
-        let end = b.y.min((index + 1) as f64);
+        let end = b.y.min(row_number as f64);
         let next_x = if end == b.y { b.x } else { a.x + per_row * (end - a.y) };
         add_piece(row, sign * (end - y), x, next_x);
         (x, y) = (next_x, end);

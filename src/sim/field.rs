@@ -165,6 +165,7 @@ impl LensRays {
         }
         let (column, row) = (x % RAY_STEP, y % RAY_STEP);
         let flat = match *self.cells.get(cell)? {
+            Cell::Good if column + row == 0 => *self.nodes.get(cell)?,
             Cell::Good => self.mix(cell, &RAY_WEIGHTS[column], &RAY_WEIGHTS[row])?,
             Cell::Own(first) => *self.own.get(first + row * RAY_STEP + column).filter(|ray| !ray.is_nan())?,
             Cell::Dark => return None,

@@ -1,6 +1,6 @@
 //! The lit membrane in the picture: exact at as few pixels as smoothness allows, a smooth surface in between.
 //!
-//! The picture is divided into squares of 16 px. Of each the brightness at its corners, sides' middles and middle is
+//! The picture is divided into squares of 32 px. Of each the brightness at its corners, sides' middles and middle is
 //! worked out exactly (ray, deformed membrane, light). Where the middles are what the corners promise, within a
 //! tolerance, or what the square of twice the size foretold, the square is filled by the biquadratic surface through
 //! the nine; else it falls into four, down to single pixels. Pixels are their own nodes, so nothing is worked out twice.
@@ -11,8 +11,8 @@
 //! divided whatever its nodes say.
 //!
 //! What the lens and the layers do is smooth whatever the membrane does: cubics through a lattice of rays tell the others
-//! ([`rays`]). Squares of 8 px that are to be divided, where nothing moves or the change of the light is smooth, are lit pixel
-//! by pixel from what is told ([`paint`]): that takes less than dividing them.
+//! ([`rays`]). Where besides nothing moves, or so that the change of the light is smooth, squares of 8 px are divided with
+//! nodes that are told, and those of 4 px that are still not smooth are lit pixel by pixel ([`paint`]).
 
 mod motion;
 mod paint;

@@ -145,25 +145,28 @@ impl Lit {
                 }
             } else {
                 work.add(EffectName::Contact, units::SMOOTH);
-                if square.source == Source::Little {
+                let is_little = square.source == Source::Little;
+                if asked.is_kept {
+                    let parts = |node: &Motion| [node.shift_mm, node.tilt, node.change, node.moved_mm];
+                    [motion.shift_mm, motion.tilt, motion.change, motion.moved_mm] =
+                        self.told(square, asked.pixel, parts);
+                } else if is_little {
                     let parts = |node: &Motion| [node.shift_mm, node.change];
                     [motion.shift_mm, motion.change] = self.told(square, asked.pixel, parts);
                 } else {
                     let parts = |node: &Motion| [node.shift_mm, node.tilt];
                     [motion.shift_mm, motion.tilt] = self.told(square, asked.pixel, parts);
-                    sample.normal = (normal + motion.tilt).normalize_or(normal);
                 }
                 sample.point_mm += motion.shift_mm;
-                sample.moved = if square.source == Source::Little {
-                    Moved::Little(motion.change)
-                } else if asked.is_kept {
-                    // From these nodes smaller squares may learn that the change of the light is smooth.
-                    motion.moved_mm = self.foretold_mm(square, asked.pixel);
-                    motion.change = surface.shading.change(sample.point_mm, sample.normal);
-                    Moved::Little(motion.change)
-                } else {
-                    Moved::Far
-                };
+                if !is_little {
+                    sample.normal = (normal + motion.tilt).normalize_or(normal);
+                    if asked.is_kept {
+                        // From these nodes smaller squares may learn that the change of the light is smooth.
+                        motion.change = surface.shading.change(sample.point_mm, sample.normal);
+                    }
+                }
+                sample.moved =
+                    if is_little || asked.is_kept { Moved::Little(motion.change) } else { Moved::Far };
             }
         }
         if asked.is_kept {

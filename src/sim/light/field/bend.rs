@@ -13,13 +13,20 @@ use crate::sim::shading::{MovedBend, Turned};
 /// By cell of the undeformed membrane's light, of which these are the spline's coefficients: bound on its third derivative
 /// in any three directions, by the width of a cell.
 pub(super) fn thirds(still: &[Vec4], nodes: usize) -> Vec<f32> {
-    let most = |table: &[Vec4], columns: Range<isize>, rows: Range<isize>| {
-        let squares: Vec<Vec4> = table.iter().map(|v| *v * *v).collect();
-        spread(&spread(&squares, 1, columns, Vec4::max), nodes, rows, Vec4::max)
-    };
-    let (along_x, along_y) = (differences(still, 1), differences(still, nodes));
-    let thirds = Seconds::new(&along_x, &along_y, nodes).thirds(nodes, most);
-    thirds.into_iter().map(|third| third.max_element().sqrt()).collect()
+    squared_thirds(still, nodes).into_iter().map(|third| third.max_element().sqrt()).collect()
+}
+
+/// The squares of such bounds, by channel.
+pub(super) fn squared_thirds(table: &[Vec4], nodes: usize) -> Vec<Vec4> {
+    let (along_x, along_y) = (differences(table, 1), differences(table, nodes));
+    let most = |table: &[Vec4], columns, rows| squares(table, nodes, columns, rows);
+    Seconds::new(&along_x, &along_y, nodes).thirds(nodes, most)
+}
+
+/// The largest squares, by channel, over some steps along x and y from each node.
+pub(super) fn squares(table: &[Vec4], nodes: usize, columns: Range<isize>, rows: Range<isize>) -> Vec<Vec4> {
+    let squares: Vec<Vec4> = table.iter().map(|v| *v * *v).collect();
+    spread(&spread(&squares, 1, columns, Vec4::max), nodes, rows, Vec4::max)
 }
 
 impl LightField {

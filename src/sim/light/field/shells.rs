@@ -7,11 +7,12 @@
 
 use glam::{DVec2, Vec2, Vec3A, Vec4};
 
+use super::bend::{squared_thirds, squares};
 use super::continued;
 use super::places::{Scale, cells, disc_of, split};
 use crate::sim::light::dome_map::{DomeGrid, bicubic};
 use crate::sim::light::tables::{SHELLS, Tables, Ways};
-use crate::sim::rests::{Seconds, differences, largest, rest_of_jumps, spread};
+use crate::sim::rests::{largest, rest_of_jumps};
 use crate::sim::shading::{MovedBend, Turned};
 use crate::sim::splines::{Degree, quadratics, to_coefficients};
 
@@ -122,16 +123,11 @@ impl Shells {
 impl Bends {
     /// Of a flux.
     fn new(tables: &[Vec<Vec4>; 3], nodes: usize) -> Self {
-        let most = |table: &[Vec4], columns: std::ops::Range<isize>, rows: std::ops::Range<isize>| {
-            let squares: Vec<Vec4> = table.iter().map(|v| *v * *v).collect();
-            spread(&spread(&squares, 1, columns, Vec4::max), nodes, rows, Vec4::max)
-        };
         // By channel, the squares of the parts along x, y and z sum.
         let mut sums = [const { Vec::new() }; 2];
         for table in tables {
-            let (along_x, along_y) = (differences(table, 1), differences(table, nodes));
-            let thirds = Seconds::new(&along_x, &along_y, nodes).thirds(nodes, most);
-            for (sum, part) in sums.iter_mut().zip([thirds, most(table, -1..3, -1..3)]) {
+            let parts = [squared_thirds(table, nodes), squares(table, nodes, -1..3, -1..3)];
+            for (sum, part) in sums.iter_mut().zip(parts) {
                 sum.resize(part.len(), Vec4::ZERO);
                 sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
             }

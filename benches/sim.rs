@@ -14,6 +14,9 @@ use serde_json::{Value, json};
 /// Repetitions of what takes microseconds.
 const AGAIN: u32 = 200;
 
+/// A task is repeated for so long, s.
+const LEAST_S: f64 = 0.1;
+
 /// Each figure is the median of so many rounds.
 const ROUNDS: usize = 7;
 
@@ -97,23 +100,34 @@ fn frame_s(scene: &Scene, rounds: usize) -> Option<[f64; 2]> {
     let renderer = Renderer::new(scene, &plan).map_err(|error| println!("renderer: {error}")).ok()?;
     let mut scratch = Scratch::default();
     let count = scene.frame_count();
-    let mut touches = Vec::new();
-    if let Ok(Some(mut stepper)) = renderer.stepper() {
-        // The tables are made once for a design.
+    // The tables are made once for a design, and what a stepper begins with once for a run.
+    let (mut touches, mut spent_s, mut times) = (Vec::new(), 0.0, 0.0);
+    while let Ok(Some(mut stepper)) = renderer.stepper() {
         let began = clock_s();
-        for k in 0..count {
-            match stepper.next(k, scene.time_s(k), &mut Default::default()) {
-                Ok(touch) => touches.push(touch),
-                Err(error) => println!("contact: {error}"),
-            }
+        let step = |k| stepper.next(k, scene.time_s(k), &mut Default::default());
+        let solved: Result<Vec<_>, _> = (0..count).map(step).collect();
+        touches = solved.map_err(|error| println!("contact: {error}")).ok()?;
+        (spent_s, times) = (spent_s + clock_s() - began, times + 1.0);
+        if spent_s > LEAST_S {
+            break;
         }
-        let solving = (clock_s() - began) / f64::from(count);
-        return Some([
-            solving,
-            median((0..rounds).map(|_| drawing_s(&renderer, &touches, count, &mut scratch)).collect()),
-        ]);
     }
-    Some([0.0, median((0..rounds).map(|_| drawing_s(&renderer, &[], count, &mut scratch)).collect())])
+    let solving = if times > 0.0 { spent_s / times / f64::from(count) } else { 0.0 };
+    let drawing = (0..rounds).map(|_| drawing_s(&renderer, &touches, count, &mut scratch)).collect();
+    Some([solving, median(drawing)])
+}
+
+/// Seconds for a task that is done as often as the system's clock, which counts in some milliseconds, asks for.
+fn again_s(mut task: impl FnMut()) -> f64 {
+    let (began, mut times) = (clock_s(), 0_u32);
+    loop {
+        task();
+        times += 1;
+        let spent = clock_s() - began;
+        if spent > LEAST_S {
+            return spent / f64::from(times);
+        }
+    }
 }
 
 fn drawing_s(
@@ -122,15 +136,16 @@ fn drawing_s(
     count: u32,
     scratch: &mut Scratch,
 ) -> f64 {
-    let began = clock_s();
-    for k in 0..count {
-        let around = Around::of(touches, k as usize);
-        match renderer.frame_around(k, around.as_ref(), scratch) {
-            Ok(drawn) => drawn.image.into_iter().for_each(|image| scratch.give_back(image)),
-            Err(error) => println!("frame {k}: {error}"),
+    let all = || {
+        for k in 0..count {
+            let around = Around::of(touches, k as usize);
+            match renderer.frame_around(k, around.as_ref(), scratch) {
+                Ok(drawn) => drawn.image.into_iter().for_each(|image| scratch.give_back(image)),
+                Err(error) => println!("frame {k}: {error}"),
+            }
         }
-    }
-    (clock_s() - began) / f64::from(count)
+    };
+    again_s(all) / f64::from(count)
 }
 
 fn line(what: &str, seconds: [f64; 2]) {
@@ -163,14 +178,12 @@ fn frames(design: &Design) {
         println!("== frames a second, one core, 640 x 480, {} dots", scene.dots().len());
         let plan = Plan::everything(&scene).and_then(|plan| Ok((Renderer::new(&scene, &plan)?, plan)));
         if let Ok((renderer, _)) = plan {
-            let round = |_| {
-                let began = clock_s();
-                // The system counts in some milliseconds.
+            let all = || {
                 for k in 0..AGAIN * scene.frame_count() {
                     std::hint::black_box(renderer.centers(k % scene.frame_count(), None).ok());
                 }
-                (clock_s() - began) / f64::from(AGAIN * scene.frame_count())
             };
+            let round = |_| again_s(all) / f64::from(AGAIN * scene.frame_count());
             line("positions of dots and markers, no image", [0.0, median((0..ROUNDS).map(round).collect())]);
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! The lights ride on the platform, so in the sensor frame the light on the undeformed membrane never changes:
 //! one table of it serves every frame. Where an object has moved the membrane, its place and its normal differ;
-//! what that changes of their light is looked up beside it ([`shells`]).
+//! what that changes of their light is looked up beside it (`field::shells`).
 
 mod bend;
 mod own;

@@ -4,9 +4,10 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use domecast::mechanics::contact::{Contact, Elastomer, Indenter, Level, Pressed, Solid};
-use domecast::mechanics::{Suspension, suspension_of};
+use domecast::contact::{Contact, Elastomer, Indenter, Level, Pressed, Solid};
+use domecast::design::suspension_of;
 use domecast::numeric::Rigid;
+use domecast::springs::Suspension;
 use glam::DVec3;
 
 /// Force on the ball, N: a contact of a fifth of the dome's radius.
@@ -15,7 +16,7 @@ const FORCE_N: f64 = 3.0;
 fn dome() -> Option<(Elastomer, Suspension)> {
     let path = format!("{}/designs/thumb24.json", env!("CARGO_MANIFEST_DIR"));
     let design = domecast::design::load(path.as_ref()).ok()?;
-    Some((Elastomer::of_design(&design), suspension_of(&design).ok()?))
+    Some((domecast::sim::elastomer_of(&design), suspension_of(&design).ok()?))
 }
 
 fn pressed(

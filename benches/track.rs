@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use domecast::mechanics::Displacement;
+use domecast::springs::Displacement;
 use domecast::track::{Frame, Motion, TrackOptions, Tracker};
 use glam::DVec3;
 

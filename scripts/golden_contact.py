@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Displacements of a bonded hemisphere under a smooth pressure about its pole, by scikit-fem.
 
-An independent reference for the swept elements of src/mechanics/contact/fem: quadratic triangles over the meridian,
+An independent reference for the swept elements of src/contact/fem: quadratic triangles over the meridian,
 axisymmetric, displacement alone (no projection of the volume change), on two meshes so that the last digits are known.
 Prints the golden values that the tests hold: polar angle, u_r and u_z in mm.
 

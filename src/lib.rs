@@ -40,26 +40,24 @@
 //! # Ok::<(), design::DesignError>(())
 //! ```
 pub use glam;
+pub use nalgebra;
 
-pub mod accuracy;
-pub mod artwork;
-pub mod build;
-pub mod calibrate;
-pub mod camera;
-pub mod cli;
-pub mod compare;
-pub mod constants;
-pub mod design;
-pub mod frames;
+pub use domecast_cli::{accuracy, run};
+pub use domecast_contact as contact;
+pub use domecast_design as design;
+pub use domecast_design::{layout, parts, transfer};
+pub use domecast_fab::{artwork, build, compare, report};
+pub use domecast_mesh as mesh;
+pub use domecast_optics as optics;
+pub use domecast_optics::{camera, numeric, pose};
+pub use domecast_runtime::{calibrate, frames, track};
+pub use domecast_sim as sim;
+pub use domecast_springs as springs;
+
 pub mod guide;
-pub mod layout;
-pub mod mechanics;
-pub mod mesh;
-pub mod numeric;
-pub mod optics;
-pub mod parts;
-pub mod pose;
-pub mod report;
-pub mod sim;
-pub mod track;
-pub mod transfer;
+
+/// What the runtime needs to know of one sensor, how it follows from a design, and the files that carry it.
+pub mod constants {
+    pub use domecast_fab::constants::*;
+    pub use domecast_runtime::constants::*;
+}

@@ -1,6 +1,7 @@
 //! The synthetic print test: artwork, a pad that does not do what the design assumes, a measurement, a new map,
 //! new artwork, the same pad.
 
+use domecast::numeric::SeededRandom;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::fs;
@@ -20,24 +21,6 @@ fn domecast(arguments: &[&str], folder: &Path) -> Output {
         .current_dir(folder)
         .output()
         .expect("it runs")
-}
-
-/// Numbers by splitmix64 (S. Vigna, public domain), normal by Box and Muller.
-struct Chance(u64);
-
-impl Chance {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn normal_pair(&mut self) -> DVec2 {
-        let length = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        DVec2::from_angle(TAU * self.uniform()) * length
-    }
 }
 
 /// A pad: where ink from a place of the plate lands on the dome, as (polar angle, azimuth).
@@ -89,11 +72,11 @@ fn marks(svg: &Path) -> Vec<(u32, DVec2)> {
 }
 
 /// Prints and measures; a mark that lands too near the rim cannot be measured.
-fn print(marks: &[(u32, DVec2)], pad: Pad, chance: &mut Chance) -> Vec<(u32, DVec3)> {
+fn print(marks: &[(u32, DVec2)], pad: Pad, random: &mut SeededRandom) -> Vec<(u32, DVec3)> {
     let mut landed = Vec::new();
     for (id, plate_mm) in marks {
         let (phi, theta) = pad(*plate_mm);
-        let noise = chance.normal_pair() * NOISE_MM;
+        let noise = random.normal_pair() * NOISE_MM;
         if phi > 1.45 {
             continue;
         }
@@ -140,9 +123,9 @@ fn wanted(build: &Path) -> Vec<DVec3> {
         .collect()
 }
 
-fn mean_error_mm(build: &Path, pad: Pad, chance: &mut Chance) -> f64 {
+fn mean_error_mm(build: &Path, pad: Pad, random: &mut SeededRandom) -> f64 {
     let wanted = wanted(build);
-    let landed = print(&marks(&build.join("artwork/dots.svg")), pad, chance);
+    let landed = print(&marks(&build.join("artwork/dots.svg")), pad, random);
     assert_eq!(landed.len(), wanted.len());
     landed.iter().map(|(id, at)| at.distance(wanted[*id as usize])).sum::<f64>() / landed.len() as f64
 }
@@ -161,11 +144,11 @@ fn a_measured_pad_prints_as_well_as_its_noise_allows() {
     for (index, pad) in [soft_pad as Pad, equidistant_pad, stiff_pad].into_iter().enumerate() {
         let ways = [("view", 1), ("view", 3), ("angles", 1), ("dots", 2)];
         for (way, prints) in ways.into_iter().take(if index == 0 { 4 } else { 1 }) {
-            let mut chance = Chance(index as u64 * 100 + prints as u64);
+            let mut random = SeededRandom::new(index as u64 * 100 + prints as u64);
             let printed =
                 if way == "dots" { marks(&at.join("first/artwork/dots.svg")) } else { target.clone() };
-            let before_mm = mean_error_mm(&at.join("first"), pad, &mut chance);
-            let mut measured: Vec<_> = (0..prints).map(|_| print(&printed, pad, &mut chance)).collect();
+            let before_mm = mean_error_mm(&at.join("first"), pad, &mut random);
+            let mut measured: Vec<_> = (0..prints).map(|_| print(&printed, pad, &mut random)).collect();
             // Some marks are mistaken for their neighbours, or smeared.
             for landed in &mut measured {
                 landed[20].1 = landed[27].1;
@@ -192,9 +175,9 @@ fn a_measured_pad_prints_as_well_as_its_noise_allows() {
             }
             let run = domecast(&["build", "new.json", "--out", "second"], at);
             assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-            // Several prints of the new artwork, so that the test's own chance is small.
+            // Several prints of the new artwork, so that the test's own random is small.
             let after: Vec<f64> =
-                (0..8).map(|_| mean_error_mm(&at.join("second"), pad, &mut chance)).collect();
+                (0..8).map(|_| mean_error_mm(&at.join("second"), pad, &mut random)).collect();
             let after_mm = after.iter().sum::<f64>() / after.len() as f64;
             println!(
                 "pad {index} {way}: {before_mm:.4} -> {after_mm:.4} mm, noise alone {noise_alone_mm:.4}"
@@ -253,10 +236,10 @@ fn a_table_at_fault_is_refused_with_its_line() {
         assert!(message.contains("measured.csv") && message.contains(problem), "{problem}: {message}");
     }
     // Marks that were all mistaken give no map.
-    let mut chance = Chance(7);
+    let mut random = SeededRandom::new(7);
     let mut table = String::from("id,x_mm,y_mm\n");
     for id in 0..200 {
-        let place = chance.normal_pair() * 3.0;
+        let place = random.normal_pair() * 3.0;
         writeln!(table, "{id},{},{}", place.x.clamp(-6.0, 6.0), place.y.clamp(-6.0, 6.0)).expect("grows");
     }
     fs::write(at.join("measured.csv"), &table).expect("written");

@@ -92,7 +92,7 @@ fn are_apart(p: &[DVec3; 3], q: &[DVec3; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Chord, Piece, Shape};
+    use crate::{Chord, Piece, Shape};
 
     fn target(low: f64, high: f64) -> RayTarget {
         let shape = Shape::cuboid(DVec3::splat(low), DVec3::splat(high));

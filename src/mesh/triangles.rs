@@ -150,7 +150,7 @@ impl TriMesh {
     /// Joins rings of `around` vertices each, `bands` + 1 of them in a row, to
     /// a tube with flat ends. Counter-clockwise about the way it runs, its
     /// surface points outwards.
-    pub(crate) fn close_tube(&mut self, bands: u32, around: u32) {
+    pub fn close_tube(&mut self, bands: u32, around: u32) {
         for k in 0..bands {
             let (p, q) = (k * around, (k + 1) * around);
             for a in 0..around {

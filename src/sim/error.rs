@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::design::DesignError;
-use crate::layout::LayoutError;
+use domecast_design::DesignError;
+use domecast_design::layout::LayoutError;
 
 /// Why a scene cannot be simulated.
 #[derive(Debug, Clone, PartialEq)]

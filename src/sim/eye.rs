@@ -5,10 +5,10 @@ use glam::{DVec2, DVec3};
 use super::SimError;
 use super::pipeline::Geometry;
 use super::scene::Scene;
-use crate::camera::{Lens, LensSpec, Model};
-use crate::design::DesignError;
-use crate::numeric::Rigid;
-use crate::optics::{Channel, Limit, OpticsSpec, SensorOptics};
+use domecast_design::DesignError;
+use domecast_optics::camera::{Lens, LensSpec, Model};
+use domecast_optics::numeric::Rigid;
+use domecast_optics::{Channel, Limit, OpticsSpec, SensorOptics};
 
 /// The camera over sheet and dome, with the geometric effects that are used and without the others.
 #[derive(Debug, Clone)]

@@ -5,8 +5,8 @@ use std::ops::Range;
 use glam::{DVec2, DVec3};
 
 use super::lit::LARGEST;
-use crate::camera::Lens;
-use crate::optics::SensorOptics;
+use domecast_optics::SensorOptics;
+use domecast_optics::camera::Lens;
 
 /// Points at which the dome's rim is projected; a circle of 200 px is then met within 0.06 px, and its
 /// polygon is refined by [`RIM_BETWEEN`].

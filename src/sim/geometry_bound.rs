@@ -13,7 +13,7 @@ use super::shapes::Shape;
 use super::spots::Points;
 use super::touch::{Between, Stepper};
 use super::work::Work;
-use crate::mechanics::contact::Level;
+use domecast_contact::Level;
 
 /// Frames at which shifts are looked at; a longer sequence is sampled.
 const MOST_FRAMES: u32 = 17;

@@ -1,42 +1,24 @@
 //! The plan keeps its word: over random scenes and tolerances, what it leaves out is not missed.
 
+use domecast_optics::numeric::SeededRandom;
 use std::path::Path;
 
 use serde_json::{Value, json};
 
 use super::*;
-use crate::design::{self, Design};
-use crate::sim::scene::SceneFile;
+use crate::scene::SceneFile;
+use domecast_design;
+use domecast_design::Design;
 
-/// Numbers that look random and are the same each time (SplitMix64).
-struct Dice(u64);
-
-impl Dice {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn log(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-
-    fn often(&mut self, share: f64) -> bool {
-        self.next() < share
-    }
+/// From a seed: even in the logarithm between two bounds.
+fn log_between(random: &mut SeededRandom, low: f64, high: f64) -> f64 {
+    random.between(low.ln(), high.ln()).exp()
 }
 
 /// thumb24 through a quarter of its pixels, changed by a closure.
 fn small_design(change: &dyn Fn(&mut Value)) -> Design {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
-    let mut value = design::parse_json(&design::read_text(&path).unwrap()).unwrap();
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/thumb24.json");
+    let mut value = domecast_design::parse_json(&domecast_design::read_text(&path).unwrap()).unwrap();
     let camera = &mut value["camera"];
     camera["width"] = json!(160);
     camera["height"] = json!(120);
@@ -45,10 +27,10 @@ fn small_design(change: &dyn Fn(&mut Value)) -> Design {
     value["pattern"]["pitch_px"] = json!(10);
     value["pattern"]["dot_diameter_px"] = json!(4);
     change(&mut value);
-    design::from_text(&value.to_string()).unwrap_or_else(|error| panic!("{error}"))
+    domecast_design::from_text(&value.to_string()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Designs that call for more or less: lenses, a moving pupil, colours, nearly equal indices.
+/// Designs that call for more or less: lenses, a moving pupil, colours, nearly equal inrandoms.
 fn designs() -> Vec<Design> {
     let base = |_: &mut Value| {};
     let grey = |value: &mut Value| {
@@ -66,92 +48,91 @@ fn designs() -> Vec<Design> {
 }
 
 /// Each part of a real camera now and then, from hardly any to a lot of it.
-fn camera_of(dice: &mut Dice, scene: &mut Value) {
+fn camera_of(random: &mut SeededRandom, scene: &mut Value) {
     let colour = scene["frames"]["colour"] == json!(true);
     let electronics = &mut scene["electronics"];
-    if dice.often(0.25) {
-        electronics["vignetting_exponent"] = json!(dice.log(1e-4, 3.0));
+    if random.uniform() < 0.25 {
+        electronics["vignetting_exponent"] = json!(log_between(random, 1e-4, 3.0));
     }
-    if dice.often(0.2) {
-        let focus =
-            json!({ "pupil_diameter_mm": dice.log(0.003, 0.3), "distance_mm": dice.between(10.0, 20.0) });
+    if random.uniform() < 0.2 {
+        let focus = json!({ "pupil_diameter_mm": log_between(random, 0.003, 0.3), "distance_mm": random.between(10.0, 20.0) });
         electronics["focus"] = focus;
     }
-    if dice.often(0.25) {
-        let readout = if dice.often(0.5) { dice.log(1e-5, 0.02) } else { 0.0 };
-        electronics["shutter"] = json!({ "exposure_s": dice.log(1e-5, 0.02), "readout_s": readout });
+    if random.uniform() < 0.25 {
+        let readout = if random.uniform() < 0.5 { log_between(random, 1e-5, 0.02) } else { 0.0 };
+        electronics["shutter"] =
+            json!({ "exposure_s": log_between(random, 1e-5, 0.02), "readout_s": readout });
     }
-    if colour && dice.often(0.2) {
+    if colour && random.uniform() < 0.2 {
         electronics["bayer"] = json!("grbg");
     }
-    if dice.often(0.2) {
-        let noise =
-            json!({ "full_scale_electrons": dice.log(1e3, 1e7), "read_electrons": dice.log(0.1, 20.0) });
+    if random.uniform() < 0.2 {
+        let noise = json!({ "full_scale_electrons": log_between(random, 1e3, 1e7), "read_electrons": log_between(random, 0.1, 20.0) });
         electronics["noise"] = noise;
     }
-    if dice.often(0.15) {
-        electronics["jpeg_quality"] = json!(50 + (dice.next() * 50.0) as u32);
+    if random.uniform() < 0.15 {
+        electronics["jpeg_quality"] = json!(50 + (random.uniform() * 50.0) as u32);
     }
 }
 
 /// A ball that is pressed into the dome, at one of the levels; now and then under lights.
-fn touched(dice: &mut Dice, scene: &mut Value) {
+fn touched(random: &mut SeededRandom, scene: &mut Value) {
     scene.as_object_mut().unwrap().remove("motion");
-    if dice.often(0.4) {
+    if random.uniform() < 0.4 {
         scene["light"]["leds"] = json!({ "level_per_mw_mm2": 450, "stray_level": 0.005 });
     }
-    let level = ["geometric", "closed_form", "linear"][(dice.next() * 3.0) as usize];
+    let level = ["geometric", "closed_form", "linear"][(random.uniform() * 3.0) as usize];
     scene["contact"] = json!({ "level": level, "element_mm": 2.0 });
-    let depth = dice.log(0.01, 0.8);
+    let depth = log_between(random, 0.01, 0.8);
     scene["objects"] = json!([{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 }, "path": [
         { "time_s": 0, "position_mm": [0, 0, 14] },
-        { "time_s": 0.06, "position_mm": [dice.between(-1.0, 1.0), 0, 14.0 - depth] },
+        { "time_s": 0.06, "position_mm": [random.between(-1.0, 1.0), 0, 14.0 - depth] },
     ]}]);
 }
 
-fn random_scene(dice: &mut Dice) -> Value {
-    let images = dice.often(0.8);
+fn random_scene(random: &mut SeededRandom) -> Value {
+    let images = random.uniform() < 0.8;
     let mut scene = json!({
         "version": 1, "name": "random", "design": "thumb24.json",
         "frames": {
-            "count": 1 + (dice.next() * 3.0) as u32, "rate_hz": 30, "images": images, "colour": dice.often(0.7),
+            "count": 1 + (random.uniform() * 3.0) as u32, "rate_hz": 30, "images": images, "colour": random.uniform() < 0.7,
         },
-        "tolerance": { "px": dice.log(1e-4, 2.0), "grey": dice.log(0.3, 200.0) },
+        "tolerance": { "px": log_between(random, 1e-4, 2.0), "grey": log_between(random, 0.3, 200.0) },
         "light": {
-            "membrane_level": dice.between(0.3, 0.9), "marker_level": 0.95, "surround_level": dice.between(0.0, 0.3),
+            "membrane_level": random.between(0.3, 0.9), "marker_level": 0.95, "surround_level": random.between(0.0, 0.3),
         },
-        "electronics": { "gamma": if dice.often(0.3) { dice.between(1.0, 2.2) } else { 1.0 } },
+        "electronics": { "gamma": if random.uniform() < 0.3 { random.between(1.0, 2.2) } else { 1.0 } },
         "ink": {
-            "reflectance": dice.between(0.02, 0.2),
-            "edge_mm": if dice.often(0.5) { dice.log(0.001, 0.3) } else { 0.0 },
+            "reflectance": random.between(0.02, 0.2),
+            "edge_mm": if random.uniform() < 0.5 { log_between(random, 0.001, 0.3) } else { 0.0 },
         },
-        "seed": (dice.next() * 1e6) as u64,
+        "seed": (random.uniform() * 1e6) as u64,
     });
-    let size = dice.log(1e-3, 1.0);
-    let mut three = |scale: f64| json!([0, 1, 2].map(|_| scale * size * dice.between(-1.0, 1.0)));
+    let size = log_between(random, 1e-3, 1.0);
+    let mut three = |scale: f64| json!([0, 1, 2].map(|_| scale * size * random.between(-1.0, 1.0)));
     let (force, moment, shift, turn) = (three(0.4), three(4.0), three(0.5), three(1.5));
-    if dice.often(0.4) {
+    if random.uniform() < 0.4 {
         let push = [force[0].clone(), force[1].clone(), json!(-5.0 * size)];
         scene["motion"] = json!({ "wrench": [
             { "time_s": 0, "force_n": [0, 0, 0] },
             { "time_s": 0.06, "force_n": push, "moment_nmm": moment, "point_mm": [0, 0, 10] },
         ]});
-    } else if dice.often(0.7) {
+    } else if random.uniform() < 0.7 {
         scene["motion"] = json!({ "pose": [
             { "time_s": 0 }, { "time_s": 0.05, "translation_mm": shift, "rotation_deg": turn },
         ]});
     }
-    camera_of(dice, &mut scene);
-    if dice.often(0.1) {
+    camera_of(random, &mut scene);
+    if random.uniform() < 0.1 {
         scene["light"]["leds"] =
-            json!({ "level_per_mw_mm2": dice.between(200.0, 900.0), "stray_level": 0.005 });
+            json!({ "level_per_mw_mm2": random.between(200.0, 900.0), "stray_level": 0.005 });
     }
-    if dice.often(0.15) {
-        touched(dice, &mut scene);
+    if random.uniform() < 0.15 {
+        touched(random, &mut scene);
     }
-    if dice.often(0.3) {
+    if random.uniform() < 0.3 {
         scene["ink"]["broken"] =
-            json!([{ "id": 5, "left": dice.next(), "direction_deg": dice.between(0.0, 360.0) }]);
+            json!([{ "id": 5, "left": random.uniform(), "direction_deg": random.between(0.0, 360.0) }]);
     }
     scene
 }
@@ -214,10 +195,11 @@ fn honest(first: u64, count: u64) {
     let (mut out, mut tightest): (usize, f64) = (0, 0.0);
     let mut compared = 0;
     for seed in first..first + count {
-        let mut dice = Dice(seed);
-        let design = designs[(dice.next() * designs.len() as f64) as usize].clone();
-        let value = random_scene(&mut dice);
-        let file: SceneFile = design::from_value(&value).unwrap_or_else(|error| panic!("{error}: {value}"));
+        let mut random = SeededRandom::new(seed);
+        let design = designs[(random.uniform() * designs.len() as f64) as usize].clone();
+        let value = random_scene(&mut random);
+        let file: SceneFile =
+            domecast_design::from_value(&value).unwrap_or_else(|error| panic!("{error}: {value}"));
         let scene = match Scene::new(file, Path::new(""), design) {
             Ok(scene) => scene,
             // A random load may be beyond the envelope: then it is named, and there is nothing to compare.
@@ -280,7 +262,7 @@ fn one_effect_alone_runs_its_code_only() {
         for (key, part) in more.as_object().unwrap() {
             value[key] = part.clone();
         }
-        Scene::new(design::from_value(&value).unwrap(), Path::new(""), design).unwrap()
+        Scene::new(domecast_design::from_value(&value).unwrap(), Path::new(""), design).unwrap()
     };
     let still = json!({});
     let picture = json!({ "frames": { "count": 1, "rate_hz": 30, "colour": false } });

@@ -7,8 +7,8 @@ use super::pipeline::Geometry;
 use super::scene::State;
 use super::shapes::Shape;
 use super::work::Work;
-use crate::mechanics::contact::Level;
-use crate::numeric::Rigid;
+use domecast_contact::Level;
+use domecast_optics::numeric::Rigid;
 
 /// Counted work of one point: a straight ray through the lens, and what each effect adds.
 pub(super) mod units {

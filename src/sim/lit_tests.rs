@@ -13,11 +13,11 @@ use super::lit::{Lit, LitSlice, LitSurface};
 use super::shapes::Shape;
 use super::touch::Between;
 use super::*;
-use crate::design;
+use domecast_design;
 
 /// A ball rolled into the dome of thumb24 under its lights, at a level of contact; five frames, without noise.
 fn rolled(level: &str) -> Scene {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes");
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/scenes");
     let text = format!(
         r#"{{
         "version": 1, "name": "t", "design": "../thumb24.json", "frames": {{ "count": 5, "rate_hz": 10 }},
@@ -130,7 +130,7 @@ const OBJECTS: [(&str, &str); 6] = [
 
 /// An object against the dome of a design under its lights, at a level of contact.
 fn pressed(design: &str, level: &str, object: &str, grey: f64) -> Scene {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes");
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/scenes");
     let text = format!(
         r#"{{
         "version": 1, "name": "t", "design": "../{design}.json", "frames": {{ "count": 1, "rate_hz": 10 }},
@@ -230,7 +230,7 @@ fn dots_under_lights_are_where_the_truth_says() {
     for level in ["geometric", "closed_form", "linear"] {
         let scene = rolled(level);
         let mut bare = scene.file().clone();
-        bare.effects = design::from_value(&serde_json::json!({ "dots": "never" })).unwrap();
+        bare.effects = domecast_design::from_value(&serde_json::json!({ "dots": "never" })).unwrap();
         let bare = Scene::new(bare, scene.folder(), scene.design().clone()).unwrap();
         let drawn = |scene: &Scene, frame: u32| {
             let renderer = Renderer::new(scene, &Plan::everything(scene).unwrap()).unwrap();

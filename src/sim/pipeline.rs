@@ -5,7 +5,7 @@ use super::frame::{Frame, Image8};
 use super::light::LightUse;
 use super::shading::Shading;
 use super::work::Work;
-use crate::mechanics::contact::Level;
+use domecast_contact::Level;
 
 /// What the used effects have installed.
 ///

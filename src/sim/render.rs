@@ -21,8 +21,8 @@ use super::spots::{Points, Spots};
 use super::touch::{Stepper, Touch};
 use super::truth::{EffectTruth, FrameTruth, Seen, dot_truth, effects_of, marker_truth};
 use super::work::Work;
-use crate::mechanics::contact::ContactState;
-use crate::numeric::Rigid;
+use domecast_contact::ContactState;
+use domecast_optics::numeric::Rigid;
 
 /// Draws the frames of a scene with the effects of a plan.
 pub struct Renderer<'a> {

@@ -11,7 +11,8 @@ fn scene(more: &str) -> Scene {
         r#"{{ "version": 1, "name": "rows", "design": "thumb24.json", "frames": {{ "count": 3, "rate_hz": 2 }},
         "tolerance": {{ "px": 0.5, "grey": 1 }}, "seed": 1 {more} }}"#
     );
-    Scene::from_text(&text, &Path::new(env!("CARGO_MANIFEST_DIR")).join("designs")).unwrap()
+    Scene::from_text(&text, &Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs"))
+        .unwrap()
 }
 
 /// The platform on its way from rest at 0 s to the second of these at 1 s, or held at a part of the way.

@@ -263,7 +263,7 @@ fn write_extras(scene: &Scene, drawn: &Drawn, folder: &Path) -> Result<(), RunEr
     Ok(())
 }
 
-/// Heights of the undeformed dome on the raster of [`crate::mechanics::contact::ContactState::height_map_mm`].
+/// Heights of the undeformed dome on the raster of [`domecast_contact::ContactState::height_map_mm`].
 fn still_heights_mm(radius_mm: f64, side: usize) -> Vec<f64> {
     let at = |i: usize| ((2 * i + 1) as f64 / side as f64 - 1.0) * radius_mm;
     let height =

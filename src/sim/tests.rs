@@ -6,16 +6,16 @@ use proptest::prelude::*;
 use super::coverage::{Coverage, area_moment, clip};
 use super::outline::RimFit;
 use super::*;
-use crate::design;
+use domecast_design;
 
 fn scene(name: &str) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes").join(name);
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/scenes").join(name);
     Scene::load(&path).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 /// A scene of the named design's folder, from JSON text without version, name and design.
 fn scene_of(text: &str) -> Result<Scene, SimError> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes");
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/scenes");
     let whole = format!(r#"{{ "version": 1, "name": "t", "design": "../thumb24.json", {text} }}"#);
     Scene::from_text(&whole, &folder)
 }
@@ -182,7 +182,7 @@ fn faults_are_named() {
     fault(&mesh("still.json"), "objects[0].shape.file");
     // The nut with one triangle less.
     let folder = tempfile::tempdir().unwrap();
-    let nut = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes/meshes/nut.stl");
+    let nut = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/scenes/meshes/nut.stl");
     let mut bytes = std::fs::read(nut).unwrap();
     bytes.truncate(bytes.len() - 50);
     bytes[80..84].copy_from_slice(&383_u32.to_le_bytes());
@@ -215,17 +215,17 @@ fn an_object_in_the_sheet_is_named_with_its_frame() {
 #[test]
 fn bound_coils_are_said_and_the_rest_runs() {
     // Four coils bind at 20 N, before their wire is over-stressed; those of thumb24 as it is bind after it.
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs");
-    let text = design::read_text(&folder.join("thumb24.json")).unwrap();
-    let mut value = design::parse_json(&text).unwrap();
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
+    let text = domecast_design::read_text(&folder.join("thumb24.json")).unwrap();
+    let mut value = domecast_design::parse_json(&text).unwrap();
     value["springs"]["active_coils"] = serde_json::json!(4);
-    let design = design::from_text(&value.to_string()).unwrap();
+    let design = domecast_design::from_text(&value.to_string()).unwrap();
     let file = serde_json::json!({
         "version": 1, "name": "t", "design": "four-coils.json",
         "frames": { "count": 4, "rate_hz": 1, "images": false }, "tolerance": { "px": 0.1, "grey": 1 },
         "motion": { "wrench": [{ "time_s": 0, "force_n": [0, 0, 0] }, { "time_s": 3, "force_n": [0, 0, -45] }] },
     });
-    let scene = Scene::new(design::from_value(&file).unwrap(), &folder, design).unwrap();
+    let scene = Scene::new(domecast_design::from_value(&file).unwrap(), &folder, design).unwrap();
     let renderer = Renderer::new(&scene, &Plan::everything(&scene).unwrap()).unwrap();
     let truth: Vec<FrameTruth> = (0..4).map(|k| renderer.frame(k).unwrap().truth).collect();
     let status: Vec<&str> = truth.iter().map(|t| t.status.as_str()).collect();

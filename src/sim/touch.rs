@@ -10,12 +10,10 @@ use super::scene::object::Hold;
 use super::scene::{Held, Scene, State};
 use super::truth::ContactTruth;
 use super::work::Work;
-use crate::design::DesignError;
-use crate::mechanics::Displacement;
-use crate::mechanics::contact::{
-    Contact, ContactError, ContactState, Elastomer, Extent, Level, PressStatus, Pressed,
-};
-use crate::numeric::Rigid;
+use domecast_contact::{Contact, ContactError, ContactState, Extent, Level, PressStatus, Pressed};
+use domecast_design::DesignError;
+use domecast_optics::numeric::Rigid;
+use domecast_springs::Displacement;
 
 /// The dome touched at one time.
 #[derive(Debug, Clone)]
@@ -41,7 +39,7 @@ impl<'a> Stepper<'a> {
     /// # Errors
     /// An elastomer that the level cannot work with.
     pub fn new(scene: &'a Scene, level: Level) -> Result<Self, SimError> {
-        let contact = Contact::new(Elastomer::of_design(scene.design()), level).map_err(|error| {
+        let contact = Contact::new(crate::elastomer_of(scene.design()), level).map_err(|error| {
             DesignError::at("contact", "", error.to_string(), "an elastomer and a level that fit")
         })?;
         Ok(Self { scene, contact, last: None })

@@ -7,7 +7,7 @@ use super::effect::EffectName;
 use super::plan::Plan;
 use super::scene::Scene;
 use super::spots::{Spot, Spots};
-use crate::mechanics::contact::{ContactState, Pressed, Status};
+use domecast_contact::{ContactState, Pressed, Status};
 
 /// A dot in a frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -3,6 +3,7 @@
 //! A fixed seed per lens makes every failure a one-line rerun: the message names
 //! the seed, and `DOMECAST_FUZZ_SEED=seed` starts the test at it.
 
+use domecast::numeric::SeededRandom;
 use std::f64::consts::PI;
 
 use domecast::camera::{Lens, LensLimit, LensSpec, Model};
@@ -15,121 +16,96 @@ use rayon::prelude::*;
 use super::dd::{Dd, dd};
 use super::reference::{self, distance, field_angle, unit, v3};
 
-/// Splitmix64 (S. Vigna, public domain): small, good enough, the same anywhere.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn range(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    pub fn one_in(&mut self, n: u64) -> bool {
-        self.bits().is_multiple_of(n)
-    }
-}
-
-pub fn lens_spec(r: &mut Random) -> LensSpec {
-    let (model, distortion, widest) = match r.bits() % 8 {
+pub fn lens_spec(r: &mut SeededRandom) -> LensSpec {
+    let (model, distortion, widest) = match r.next_u64() % 8 {
         0 => (Model::Pinhole, vec![], 179.9),
         // Like published ones, then anything.
         1 | 2 => {
-            let p = if r.one_in(2) { 0.0 } else { 0.005 };
+            let p = if r.next_u64().is_multiple_of(2) { 0.0 } else { 0.005 };
             let k = vec![
-                r.range(-0.35, 0.1),
-                r.range(-0.05, 0.12),
-                p * r.range(-1.0, 1.0),
-                p * r.range(-1.0, 1.0),
-                r.range(-0.02, 0.02),
+                r.between(-0.35, 0.1),
+                r.between(-0.05, 0.12),
+                p * r.between(-1.0, 1.0),
+                p * r.between(-1.0, 1.0),
+                r.between(-0.02, 0.02),
             ];
             (Model::BrownConrady, k, 179.9)
         }
         3 => {
-            let size = 10f64.powf(r.range(-2.0, 2.0));
-            let mut k: Vec<f64> = (0..5).map(|_| size * r.range(-1.0, 1.0)).collect();
+            let size = 10f64.powf(r.between(-2.0, 2.0));
+            let mut k: Vec<f64> = (0..5).map(|_| size * r.between(-1.0, 1.0)).collect();
             k[2] *= 0.02;
             k[3] *= 0.02;
             (Model::BrownConrady, k, 179.9)
         }
         4 => {
-            let mut k: Vec<f64> = (0..8).map(|_| r.range(-1.0, 1.0)).collect();
+            let mut k: Vec<f64> = (0..8).map(|_| r.between(-1.0, 1.0)).collect();
             k[2] *= 0.01;
             k[3] *= 0.01;
             (Model::BrownConrady, k, 179.9)
         }
         5 | 6 => {
-            let k = (0..4).map(|_| r.range(-0.06, 0.06)).collect();
+            let k = (0..4).map(|_| r.between(-0.06, 0.06)).collect();
             (Model::KannalaBrandt, k, 260.0)
         }
         _ => {
-            let k = (0..4).map(|_| r.range(-0.5, 0.5)).collect();
+            let k = (0..4).map(|_| r.between(-0.5, 0.5)).collect();
             (Model::KannalaBrandt, k, 360.0)
         }
     };
-    let fx = 10f64.powf(r.range(1.7, 3.3));
+    let fx = 10f64.powf(r.between(1.7, 3.3));
     LensSpec {
         model,
         width: 640,
         height: 480,
         matrix: [
-            [fx, 0.0, r.range(200.0, 400.0)],
-            [0.0, fx * r.range(0.95, 1.05), r.range(100.0, 300.0)],
+            [fx, 0.0, r.between(200.0, 400.0)],
+            [0.0, fx * r.between(0.95, 1.05), r.between(100.0, 300.0)],
             [0.0, 0.0, 1.0],
         ],
         distortion,
-        field_of_view_rad: r.range(20.0, widest).to_radians(),
+        field_of_view_rad: r.between(20.0, widest).to_radians(),
         pupil_shift_mm: vec![],
     }
 }
 
-fn optics_spec(r: &mut Random, mut lens: LensSpec) -> OpticsSpec {
-    let radius = 10f64.powf(r.range(-1.0, 3.0));
+fn optics_spec(r: &mut SeededRandom, mut lens: LensSpec) -> OpticsSpec {
+    let radius = 10f64.powf(r.between(-1.0, 3.0));
     let mut layers = Vec::new();
     let mut last = 1.0;
-    for _ in 0..r.bits() % 5 {
-        let index = match r.bits() % 8 {
+    for _ in 0..r.next_u64() % 5 {
+        let index = match r.next_u64() % 8 {
             0 => last,
             1 => 1.0,
-            _ => r.range(1.0, 2.5),
+            _ => r.between(1.0, 2.5),
         };
         last = index;
-        let thickness = if r.one_in(5) { 0.0 } else { radius * r.range(0.0, 0.3) };
+        let thickness = if r.next_u64().is_multiple_of(5) { 0.0 } else { radius * r.between(0.0, 0.3) };
         layers.push(Layer {
             name: "sheet".into(),
             index: [index, (index * 1.002).min(2.5), index * 1.005],
             thickness_mm: Some(thickness),
         });
     }
-    let fill = if r.one_in(6) { 1.0 } else { r.range(1.0, 2.0) };
+    let fill = if r.next_u64().is_multiple_of(6) { 1.0 } else { r.between(1.0, 2.0) };
     layers.push(Layer { name: "fill".into(), index: [fill; 3], thickness_mm: None });
     let bottom: f64 = layers.iter().filter_map(|l| l.thickness_mm).sum();
-    let gap = match r.bits() % 8 {
+    let gap = match r.next_u64() % 8 {
         0 => 0.0,
         1 => radius * 1e-4,
-        _ => radius * r.range(0.01, 2.0),
+        _ => radius * r.between(0.01, 2.0),
     };
     let mut rotation = DMat3::IDENTITY;
     let mut at = DVec3::new(0.0, 0.0, -bottom - gap);
-    if r.one_in(2) {
-        rotation = DMat3::from_rotation_z(r.range(-PI, PI)) * DMat3::from_rotation_x(r.range(-0.5, 0.5));
-        at.x = radius * r.range(-0.5, 0.5);
-        at.y = radius * r.range(-0.5, 0.5);
+    if r.next_u64().is_multiple_of(2) {
+        rotation = DMat3::from_rotation_z(r.between(-PI, PI)) * DMat3::from_rotation_x(r.between(-0.5, 0.5));
+        at.x = radius * r.between(-0.5, 0.5);
+        at.y = radius * r.between(-0.5, 0.5);
     }
-    if r.one_in(4) && gap > 0.0 {
+    if r.next_u64().is_multiple_of(4) && gap > 0.0 {
         // A shift worth up to a fifth of the gap at the domain's end.
         let half = (0.5 * lens.field_of_view_rad).min(PI);
-        lens.pupil_shift_mm = vec![0.2 * gap * r.range(-1.0, 1.0) / (half * half)];
+        lens.pupil_shift_mm = vec![0.2 * gap * r.between(-1.0, 1.0) / (half * half)];
     }
     OpticsSpec { lens, sensor_from_camera: Rigid::new(rotation, at), layers, dome_radius_mm: radius }
 }
@@ -279,11 +255,11 @@ impl Run<'_> {
         winding.abs() > PI && nearest > largest
     }
 
-    fn random_pixel(&mut self, r: &mut Random) {
+    fn random_pixel(&mut self, r: &mut SeededRandom) {
         let [[fx, _, cx], [_, fy, cy], _] = self.lens().spec().matrix;
         let reach = (1.1 * self.lens().max_radius_px() / fx).min(30.0);
-        let (radius, phi) = (reach * r.unit(), r.range(-PI, PI));
-        let pixel = match r.bits() % 32 {
+        let (radius, phi) = (reach * r.uniform(), r.between(-PI, PI));
+        let pixel = match r.next_u64() % 32 {
             0 => DVec2::new(cx, cy),
             1 => DVec2::new(cx + 1e-12, cy - 1e-13),
             _ => DVec2::new(cx + fx * radius * phi.cos(), cy + fy * radius * phi.sin()),
@@ -368,13 +344,13 @@ impl Run<'_> {
         self.projected(hit.surface_mm, Some(pixel));
     }
 
-    fn random_ray(&mut self, r: &mut Random) {
+    fn random_ray(&mut self, r: &mut SeededRandom) {
         let seed = self.seed;
         self.seen.checks += 1;
-        let phi = r.range(-PI, PI);
-        if r.one_in(4) {
+        let phi = r.between(-PI, PI);
+        if r.next_u64().is_multiple_of(4) {
             // Past the end.
-            let past = self.end * (1.0 + 1e-6) + (PI - self.end) * r.unit().powi(4);
+            let past = self.end * (1.0 + 1e-6) + (PI - self.end) * r.uniform().powi(4);
             if past < PI {
                 let found = self.lens().project(Self::direction(past, phi));
                 let wanted = [self.lens().end_limit(), LensLimit::BehindCamera];
@@ -383,12 +359,12 @@ impl Run<'_> {
             }
             return;
         }
-        let inside = match r.bits() % 4 {
-            0 => 1.0 - LAST * (1.0 + 100.0 * r.unit()),
-            1 => r.unit() * 1e-6,
-            _ => r.unit() * (1.0 - LAST),
+        let inside = match r.next_u64() % 4 {
+            0 => 1.0 - LAST * (1.0 + 100.0 * r.uniform()),
+            1 => r.uniform() * 1e-6,
+            _ => r.uniform() * (1.0 - LAST),
         };
-        let ray = Self::direction(self.end * inside, phi) * 10f64.powf(r.range(-3.0, 3.0));
+        let ray = Self::direction(self.end * inside, phi) * 10f64.powf(r.between(-3.0, 3.0));
         let [u, v] = self.reference.lens.pixel(v3(ray));
         let truth = DVec2::new(u.f64(), v.f64());
         let (pixel, slope) = match self.lens().project_with_jacobian(ray) {
@@ -419,17 +395,17 @@ impl Run<'_> {
         self.seen.ok += 1;
     }
 
-    fn random_point(&mut self, r: &mut Random) {
+    fn random_point(&mut self, r: &mut SeededRandom) {
         self.seen.checks += 1;
         let radius = self.optics.dome_radius_mm();
-        let (phi, z) = (r.range(-PI, PI), r.unit());
+        let (phi, z) = (r.between(-PI, PI), r.uniform());
         let flat = (1.0 - z * z).sqrt();
         let on_dome = DVec3::new(flat * phi.cos(), flat * phi.sin(), z) * radius;
-        let point = match r.bits() % 8 {
-            0 => on_dome * r.unit(),
-            1 => DVec3::new(phi.cos(), phi.sin(), 0.0) * radius * r.range(0.0, 2.0),
+        let point = match r.next_u64() % 8 {
+            0 => on_dome * r.uniform(),
+            1 => DVec3::new(phi.cos(), phi.sin(), 0.0) * radius * r.between(0.0, 2.0),
             2 => DVec3::new(phi.cos(), phi.sin(), 0.0) * radius,
-            3 => DVec3::new(0.0, 0.0, radius * r.unit()),
+            3 => DVec3::new(0.0, 0.0, radius * r.uniform()),
             _ => on_dome,
         };
         self.projected(point, None);
@@ -500,10 +476,10 @@ impl Run<'_> {
 }
 
 fn run(seed: u64, per_lens: u64) -> Seen {
-    let mut r = Random(seed);
+    let mut r = SeededRandom::new(seed);
     let lens = lens_spec(&mut r);
     let spec = optics_spec(&mut r, lens);
-    let channel = Channel::ALL[(r.bits() % 3) as usize];
+    let channel = Channel::ALL[(r.next_u64() % 3) as usize];
     let optics = match SensorOptics::new(&spec) {
         Ok(optics) => optics.for_channel(channel),
         Err(error) => panic!("seed {seed}: {error}"),

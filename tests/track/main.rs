@@ -13,13 +13,11 @@ use std::sync::LazyLock;
 
 use domecast::constants::{Constants, MarkerSight};
 use domecast::design::Design;
+use domecast::design::{limits_of, suspension_of};
 use domecast::layout::Layout;
-use domecast::mechanics::{
-    Direction, Displacement, Suspension, Wrench, limits_of, reach, standard_directions, suspension_of,
-    try_load,
-};
 use domecast::numeric::Rigid;
 use domecast::optics::SensorOptics;
+use domecast::springs::{Direction, Displacement, Suspension, Wrench, reach, standard_directions, try_load};
 use domecast::track::{Frame, MarkState, Springs, TrackOptions, Tracked, Tracker};
 use glam::{DVec2, DVec3};
 use render::{draw, still};

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use glam::Vec4;
 
-use crate::sim::rests::{Seconds, differences, inside, largest, rest, spread};
-use crate::sim::shading::Turned;
+use crate::rests::{Seconds, differences, inside, largest, rest, spread};
+use crate::shading::Turned;
 
 /// Bounds of a spline by cell, at the place of the cell's lower node.
 #[derive(Debug, Clone, Default)]

@@ -3,9 +3,9 @@
 use glam::{DVec3, Vec2, Vec3A, Vec4};
 
 use super::bends::Bends;
-use crate::sim::shading::Turned;
-use crate::sim::splines::{cubic_slopes, cubics};
-use crate::sim::touch::Between;
+use crate::shading::Turned;
+use crate::splines::{cubic_slopes, cubics};
+use crate::touch::Between;
 
 /// Fewest and most nodes along a side.
 const NODES: [usize; 2] = [12, 160];

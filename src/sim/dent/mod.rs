@@ -16,7 +16,7 @@ use glam::{DVec3, Vec2, Vec3A};
 use self::chart::{Chart, Moved};
 use super::shading::Turned;
 use super::touch::Between;
-use crate::mechanics::contact::Extent;
+use domecast_contact::Extent;
 
 /// Displacements of less than this bend nothing that a picture shows, mm.
 const STILL_MM: f64 = 1e-4;

@@ -3,11 +3,11 @@
 //! The interpolation is bilinear: every missing colour is the mean of the nearest pixels that have it. Its weights
 //! are positive and add up to 1, so it never amplifies what another effect changed.
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::frame::Frame;
-use crate::sim::pipeline::{Pass, PassContext, Stage};
-use crate::sim::scene::electronics::BayerPattern;
-use crate::sim::{Pipeline, Scene, SimError, Work};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::frame::Frame;
+use crate::pipeline::{Pass, PassContext, Stage};
+use crate::scene::electronics::BayerPattern;
+use crate::{Pipeline, Scene, SimError, Work};
 
 /// See the module.
 pub struct Bayer;

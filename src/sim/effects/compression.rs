@@ -6,11 +6,11 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::frame::Image8;
-use crate::sim::pipeline::{CodedPass, PassContext};
-use crate::sim::scene::electronics::JpegChroma;
-use crate::sim::{Pipeline, Scene, SimError, Work};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::frame::Image8;
+use crate::pipeline::{CodedPass, PassContext};
+use crate::scene::electronics::JpegChroma;
+use crate::{Pipeline, Scene, SimError, Work};
 
 /// See the module.
 pub struct Compression;

@@ -1,11 +1,11 @@
 //! Objects dent the dome, and press the platform on its springs.
 
-use crate::mechanics::contact::{Elastomer, Level, estimate, most_force_n};
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::scene::file::LevelName;
-use crate::sim::scene::object::Hold;
-use crate::sim::spots::Points;
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::scene::file::LevelName;
+use crate::scene::object::Hold;
+use crate::spots::Points;
+use crate::{Pipeline, Scene, SimError};
+use domecast_contact::{Level, estimate, most_force_n};
 
 /// See the module.
 pub struct Contact;
@@ -38,7 +38,7 @@ pub fn level_of(scene: &Scene) -> Level {
 
 /// Predicted work of a level for a frame.
 fn per_frame(scene: &Scene, name: LevelName) -> u64 {
-    let elastomer = Elastomer::of_design(scene.design());
+    let elastomer = crate::elastomer_of(scene.design());
     let depth_mm = 0.1 * elastomer.dome_radius_mm;
     let work = scene.objects().first().map_or(0.0, |object| {
         estimate(level_named(scene, name), &elastomer, &object.indenter, depth_mm).work
@@ -54,7 +54,7 @@ pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
     let best = scene.file().contact.level;
     let Some(depth_mm) = deepest_mm(scene) else { return Vec::new() };
     let Some(object) = scene.objects().first() else { return Vec::new() };
-    let elastomer = Elastomer::of_design(scene.design());
+    let elastomer = crate::elastomer_of(scene.design());
     let hardest_n = most_force_n(&elastomer, &object.indenter, depth_mm);
     let errors = |name| {
         let found = estimate(level_named(scene, name), &elastomer, &object.indenter, depth_mm);
@@ -121,7 +121,7 @@ impl Effect for Contact {
     fn calls_for(&self, scene: &Scene) -> Option<String> {
         let radius_mm = scene.optics().dome_radius_mm();
         let end_s = scene.time_s(scene.frame_count().saturating_sub(1));
-        let touches = |object: &&crate::sim::scene::object::SceneObject| {
+        let touches = |object: &&crate::scene::object::SceneObject| {
             (0..LOOKS).any(|k| object.may_touch(end_s * f64::from(k) / f64::from(LOOKS - 1), radius_mm))
         };
         let object = scene.objects().iter().find(touches)?;
@@ -135,7 +135,7 @@ impl Effect for Contact {
 
     fn cost(&self, scene: &Scene) -> Cost {
         let name = scene.file().contact.level;
-        let elastomer = Elastomer::of_design(scene.design());
+        let elastomer = crate::elastomer_of(scene.design());
         let once = scene
             .objects()
             .first()

@@ -8,13 +8,14 @@
 
 use glam::DVec2;
 
-use crate::optics::SensorOptics;
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::frame::Frame;
-use crate::sim::light::bounds::{self, LightBounds};
-use crate::sim::pipeline::{Pass, PassContext, Stage};
-use crate::sim::scene::electronics::FocusSection;
-use crate::sim::{Pipeline, Scene, SimError, Work};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::frame::Frame;
+use crate::light::bounds;
+use crate::light::bounds::LightBounds;
+use crate::pipeline::{Pass, PassContext, Stage};
+use crate::scene::electronics::FocusSection;
+use crate::{Pipeline, Scene, SimError, Work};
+use domecast_optics::SensorOptics;
 
 /// See the module.
 pub struct Defocus;

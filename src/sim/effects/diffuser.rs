@@ -1,9 +1,10 @@
 //! The tape before the lights: it spreads their lobes and takes its share.
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::light::bounds::{self, LightBounds};
-use crate::sim::light::{lit_by_leds, shade};
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::light::bounds;
+use crate::light::bounds::LightBounds;
+use crate::light::{lit_by_leds, shade};
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct Diffuser;

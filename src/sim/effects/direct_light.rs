@@ -1,8 +1,8 @@
 //! The lights, their colours and lobes, through the sheet.
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::light::{lit_by_leds, shade};
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::light::{lit_by_leds, shade};
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct DirectLight;

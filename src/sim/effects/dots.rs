@@ -1,8 +1,8 @@
 //! The printed dots.
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::instant::units;
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::instant::units;
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct Dots;

@@ -1,9 +1,10 @@
 //! Falloff with distance and the cosine at the membrane: without it every point is lit like the pole.
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::light::bounds::{self, LightBounds};
-use crate::sim::light::{lit_by_leds, shade};
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::light::bounds;
+use crate::light::bounds::LightBounds;
+use crate::light::{lit_by_leds, shade};
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct Falloff;

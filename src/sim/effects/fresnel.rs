@@ -1,10 +1,11 @@
 //! Light lost and thrown back at the sheet's faces: on the way in, inside the dome, and on the way to the camera.
 
 use super::direct_light::SAMPLES;
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::light::bounds::{self, LightBounds};
-use crate::sim::light::{lit_by_leds, shade};
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::light::bounds;
+use crate::light::bounds::LightBounds;
+use crate::light::{lit_by_leds, shade};
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct Fresnel;

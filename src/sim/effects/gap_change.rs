@@ -1,12 +1,12 @@
 //! The air gap changes as the platform moves, and the bend with it: without it, the points that a straight ray
 //! shows at rest move rigidly with the platform, and no ray is solved in a frame.
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::geometry_bound::{called_for, shift_px};
-use crate::sim::instant::units;
-use crate::sim::pipeline::Geometry;
-use crate::sim::spots::Points;
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::geometry_bound::{called_for, shift_px};
+use crate::instant::units;
+use crate::pipeline::Geometry;
+use crate::spots::Points;
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct GapChange;

@@ -1,9 +1,9 @@
 //! The ink fades out at a dot's edge: evenly, over a width about the outline, as six nested outlines of a sixth of the
 //! ink each.
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::instant::units;
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::instant::units;
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct InkEdge;
@@ -29,7 +29,7 @@ impl Effect for InkEdge {
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
         let ink = &scene.file().ink;
         let light = &scene.file().light;
-        let edge = |dot: &crate::layout::Dot| {
+        let edge = |dot: &domecast_design::layout::Dot| {
             let share = ink.edge_mm / dot.diameter_mm;
             let radius_px = WIDER * 0.5 * dot.image_outline.widths().1;
             // Half of the ramp's width, px, and what the nested outlines' unlike areas do to the centroid: its

@@ -1,11 +1,11 @@
 //! The lens bends the image: without it, a pinhole of the same camera matrix.
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::geometry_bound::{called_for, shift_px};
-use crate::sim::instant::units;
-use crate::sim::pipeline::Geometry;
-use crate::sim::spots::Points;
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::geometry_bound::{called_for, shift_px};
+use crate::instant::units;
+use crate::pipeline::Geometry;
+use crate::spots::Points;
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct LensDistortion;

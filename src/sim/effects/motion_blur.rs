@@ -4,9 +4,9 @@
 //! one to the next below half a pixel.
 
 use super::speed::fastest_px_per_s;
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::pipeline::Exposure;
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::pipeline::Exposure;
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct MotionBlur;

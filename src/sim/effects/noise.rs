@@ -5,14 +5,15 @@
 //! converter rounds to one of `2^bits` steps from 0 to full scale. Every random number is a hash of seed, frame,
 //! plane and pixel, so the same picture comes out for any number of threads.
 
+use domecast_optics::numeric::mix64;
 use rayon::prelude::*;
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::frame::Frame;
-use crate::sim::light::bounds;
-use crate::sim::pipeline::{Pass, PassContext, Stage};
-use crate::sim::scene::electronics::NoiseSection;
-use crate::sim::{Pipeline, Scene, SimError, Work};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::frame::Frame;
+use crate::light::bounds;
+use crate::pipeline::{Pass, PassContext, Stage};
+use crate::scene::electronics::NoiseSection;
+use crate::{Pipeline, Scene, SimError, Work};
 
 /// See the module.
 pub struct Noise;
@@ -82,7 +83,7 @@ impl Sensor {
     #[inline]
     fn value(&self, light: f32, key: u64) -> f32 {
         let expected = (light * self.electrons).max(0.0);
-        let random = mix(key);
+        let random = mix64(key);
         let first = normal(random as u32);
         let gathered = if expected < POISSON_BELOW {
             poisson(expected, (random >> 32) as u32) + self.read * first
@@ -107,7 +108,7 @@ impl Pass for Sensor {
     fn run(&self, frame: &mut Frame, context: &PassContext, work: &mut Work) {
         let width = frame.width();
         for (c, plane) in frame.planes.iter_mut().enumerate() {
-            let stream = mix(context.seed ^ mix((u64::from(context.frame) << 2) | c as u64));
+            let stream = mix64(context.seed ^ mix64((u64::from(context.frame) << 2) | c as u64));
             plane.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
                 for (x, value) in row.iter_mut().enumerate() {
                     *value = self.value(*value, stream.wrapping_add((y * width + x) as u64));
@@ -117,16 +118,6 @@ impl Pass for Sensor {
         let values: usize = frame.planes.iter().map(Vec::len).sum();
         work.add(EffectName::Noise, values as u64 * VALUE_UNITS);
     }
-}
-
-/// A hash of 64 bits whose every bit depends on every bit of the input (the finaliser of splitmix64; Steele, Lea
-/// and Flood, OOPSLA 2014).
-#[inline]
-fn mix(input: u64) -> u64 {
-    let mut z = input.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }
 
 /// A Gaussian of mean 0 and variance 1 from 32 random bits, by the inverse of its distribution (Acklam's rational

@@ -6,9 +6,9 @@
 //! tolerance, [`MOST_SLICES`] at most.
 
 use super::speed::fastest_px_per_s;
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::pipeline::Rolling;
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::pipeline::Rolling;
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct RollingShutter;

@@ -1,10 +1,10 @@
 //! The platform moves on its springs: without it, it stays at rest.
 
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::geometry_bound::{called_for, shift_px};
-use crate::sim::instant::units;
-use crate::sim::pipeline::Geometry;
-use crate::sim::{Pipeline, Scene, SimError};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::geometry_bound::{called_for, shift_px};
+use crate::instant::units;
+use crate::pipeline::Geometry;
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct SheetMotion;

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use crate::mechanics::{Displacement, Wrench};
-use crate::sim::scene::Scene;
-use crate::sim::scene::file::{MotionSection, PoseKey, WrenchKey};
+use crate::scene::Scene;
+use crate::scene::file::{MotionSection, PoseKey, WrenchKey};
+use domecast_springs::{Displacement, Wrench};
 
 /// A load's way between two keys is curved; the speed on it is at most this often that of the straight line. The
 /// springs stiffen towards the end of their way by less than that.
@@ -108,7 +108,8 @@ mod tests {
     use glam::DVec2;
 
     fn scene(name: &str) -> Scene {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/scenes");
+        let folder =
+            std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/scenes");
         Scene::load(&folder.join(name)).unwrap()
     }
 

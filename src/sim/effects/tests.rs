@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::sim::effect::{Bound, EffectName};
-use crate::sim::plan::Plan;
-use crate::sim::render::Renderer;
-use crate::sim::{Image8, Scene, Work};
+use crate::effect::{Bound, EffectName};
+use crate::plan::Plan;
+use crate::render::Renderer;
+use crate::{Image8, Scene, Work};
 
 const ELECTRONICS: &str = r#", "electronics": { "vignetting_exponent": 0.4,
     "focus": { "pupil_diameter_mm": 0.3, "distance_mm": 15.5 } }"#;
@@ -16,7 +16,8 @@ fn scene(level: f64, more: &str) -> Scene {
         "frames": {{ "count": 1, "rate_hz": 30 }}, "tolerance": {{ "px": 0.001, "grey": 0.001 }},
         "light": {{ "surround_level": 0, "leds": {{ "level_per_mw_mm2": {level} }} }} {more} }}"#
     );
-    Scene::from_text(&text, &Path::new(env!("CARGO_MANIFEST_DIR")).join("designs")).unwrap()
+    Scene::from_text(&text, &Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs"))
+        .unwrap()
 }
 
 /// The first frame by all effects of the scene, but one.
@@ -72,7 +73,9 @@ fn what_an_effect_of_brightness_changes_stays_within_its_bound() {
 fn a_scene_without_lights_and_electronics_runs_none_of_it() {
     let text = r#"{ "version": 1, "name": "plain", "design": "thumb24.json",
         "frames": { "count": 1, "rate_hz": 30 }, "tolerance": { "px": 0.01, "grey": 0.5 } }"#;
-    let scene = Scene::from_text(text, &Path::new(env!("CARGO_MANIFEST_DIR")).join("designs")).unwrap();
+    let scene =
+        Scene::from_text(text, &Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs"))
+            .unwrap();
     let (_, work, _) = picture(&scene, None);
     for effect in EffectName::ALL.into_iter().filter(|effect| *effect >= EffectName::DirectLight) {
         assert_eq!(work.of(effect), 0, "{effect}");
@@ -99,7 +102,7 @@ fn one_effect_of_the_electronics_alone_runs_alone() {
             r#"{{ "version": 1, "name": "one", "design": "thumb24.json",
             "frames": {{ "count": 1, "rate_hz": 30 }}, "tolerance": {{ "px": 0.01, "grey": 0.5 }} {more} }}"#
         );
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs");
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
         let scene = Scene::from_text(&text, &folder).unwrap();
         let (image, work, _) = picture(&scene, None);
         for other in EffectName::ALL.into_iter().filter(|other| *other >= EffectName::DirectLight) {

@@ -2,11 +2,11 @@
 
 use glam::DVec2;
 
-use crate::camera::Lens;
-use crate::sim::effect::{Bound, Cost, Effect, EffectName};
-use crate::sim::frame::Frame;
-use crate::sim::pipeline::{Pass, PassContext, Stage};
-use crate::sim::{Pipeline, Scene, SimError, Work};
+use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::frame::Frame;
+use crate::pipeline::{Pass, PassContext, Stage};
+use crate::{Pipeline, Scene, SimError, Work};
+use domecast_optics::camera::Lens;
 
 /// See the module.
 pub struct Vignetting;

@@ -14,9 +14,9 @@ use super::direct::EmitterRule;
 use super::setup::{self, Channels};
 use super::shade::leaves;
 use super::tables::{self, SHELLS, Ways};
-use crate::optics::SensorOptics;
-use crate::sim::scene::Scene;
-use crate::sim::{Bound, SimError};
+use crate::scene::Scene;
+use crate::{Bound, SimError};
+use domecast_optics::SensorOptics;
 
 /// What stands between two samples may pass them by this factor.
 const MARGIN: f64 = 1.3;

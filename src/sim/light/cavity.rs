@@ -6,7 +6,7 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use crate::mesh::{Construction, Piece, ProfileEdge, Shape};
+use domecast_mesh::{Construction, Piece, ProfileEdge, Shape};
 
 /// Gap between two intervals, as a share of the ray, that is rounding.
 const ROUNDING: f64 = 1e-9;

@@ -1,6 +1,6 @@
 //! Light straight from the emitters: through the sheet into the silicone, to a point.
 //!
-//! Between a place of the emitter and a point there is one refracted way ([`crate::optics::LightTube`]). What a
+//! Between a place of the emitter and a point there is one refracted way ([`domecast_optics::LightTube`]). What a
 //! small area `dA` of the emitter of intensity `I` gives a surface there is
 //! `I dA/A * transmitted * sr_per_mm2 * (arriving . normal)`, so the sum over the emitter is a vector, the
 //! *vector irradiance*, whose product with the normal is the irradiance of any surface that faces the light.
@@ -11,7 +11,7 @@ use super::cavity::Cavities;
 use super::fresnel;
 use super::lobe::Lobe;
 use super::quadrature::GaussRule;
-use crate::optics::SensorOptics;
+use domecast_optics::SensorOptics;
 
 /// Places across the emitter, each way. The emitter is small against its distance from the dome: with four,
 /// the rule's error is below 1e-5 (tested against 64).

@@ -16,7 +16,7 @@
 use glam::{DVec2, DVec3};
 
 use super::fresnel;
-use crate::optics::SensorOptics;
+use domecast_optics::SensorOptics;
 
 /// Rings of equal area from rim to pole, and patches in each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,12 +7,13 @@ use super::cavity::Cavities;
 use super::direct::Emitter;
 use super::lobe::{Diffuser, Lobe};
 use super::tables::{Source, Ways};
-use crate::design::sections::LedColor;
-use crate::design::{Design, DesignError};
-use crate::optics::{Channel, SensorOptics};
-use crate::parts::{self, Measures};
-use crate::sim::SimError;
-use crate::sim::scene::Scene;
+use crate::SimError;
+use crate::scene::Scene;
+use domecast_design::parts;
+use domecast_design::parts::Measures;
+use domecast_design::sections::LedColor;
+use domecast_design::{Design, DesignError};
+use domecast_optics::{Channel, SensorOptics};
 
 /// Channels of the camera.
 pub type Channels = [f64; 3];

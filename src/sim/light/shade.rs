@@ -5,12 +5,12 @@ use glam::{DVec3, Vec3A, Vec4};
 use super::field::{FieldParts, LightField};
 use super::setup::{self, Channels};
 use super::{LightUse, fresnel, tables};
-use crate::design::sections::LedColor;
-use crate::sim::SimError;
-use crate::sim::effect::EffectName;
-use crate::sim::scene::Scene;
-use crate::sim::shading::{Moved, MovedBend, PlainSample, Shading, SurfaceSample, Turned};
-use crate::sim::work::Work;
+use crate::SimError;
+use crate::effect::EffectName;
+use crate::scene::Scene;
+use crate::shading::{Moved, MovedBend, PlainSample, Shading, SurfaceSample, Turned};
+use crate::work::Work;
+use domecast_design::sections::LedColor;
 
 /// Work of one look-up in the table of the undeformed membrane.
 pub const STILL_UNITS: u64 = 25;
@@ -171,7 +171,7 @@ impl LitDome {
 }
 
 /// Share of the light that leaves through the sheet into the air of the camera.
-pub(super) fn leaves(optics: &crate::optics::SensorOptics, momentum: f64, beside: bool) -> f64 {
+pub(super) fn leaves(optics: &domecast_optics::SensorOptics, momentum: f64, beside: bool) -> f64 {
     let layers = optics.layers();
     let count = if beside && layers.len() > 2 { layers.len() - 1 } else { layers.len() };
     let indices: Vec<f64> = layers[..count].iter().map(|l| l.index_for(optics.channel())).collect();

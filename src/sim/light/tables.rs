@@ -11,7 +11,7 @@ use super::cavity::Cavities;
 use super::direct::{DirectLight, Emitter, EmitterRule};
 use super::dome_map::{DomeGrid, bicubic};
 use super::radiosity::{DomeRoom, Rings, Underside};
-use crate::optics::SensorOptics;
+use domecast_optics::SensorOptics;
 
 /// Cells of the coarsest table, and of those that are tried after it.
 const CELLS: [usize; 2] = [36, 60];

@@ -15,11 +15,11 @@ use super::radiosity::{DomeRoom, Rings, Underside};
 use super::setup;
 use super::shade::LitDome;
 use super::tables::{Prepared, Source, Ways};
-use crate::camera::{LensSpec, Model};
-use crate::numeric::Rigid;
-use crate::optics::{Layer, OpticsSpec, SensorOptics};
-use crate::sim::shading::Moved;
-use crate::sim::{EffectName, Shading, SurfaceSample, Work};
+use crate::shading::Moved;
+use crate::{EffectName, Shading, SurfaceSample, Work};
+use domecast_optics::camera::{LensSpec, Model};
+use domecast_optics::numeric::Rigid;
+use domecast_optics::{Layer, OpticsSpec, SensorOptics};
 
 const WIDE: DVec2 = DVec2::splat(1e6);
 
@@ -303,7 +303,7 @@ fn a_table_of_something_smooth_is_exact_to_its_order() {
 
 #[test]
 fn the_way_is_free_where_the_hollows_join() {
-    use crate::mesh::{Construction, Fit, Piece, Profile, Shape};
+    use domecast_mesh::{Construction, Fit, Piece, Profile, Shape};
     let cut = vec![
         Piece::new("box", Shape::cuboid(DVec3::new(0.0, -1.0, 0.0), DVec3::new(4.0, 1.0, 2.0))),
         Piece::new(
@@ -325,14 +325,14 @@ fn the_way_is_free_where_the_hollows_join() {
     assert!(free([-2.0, 0.0, 0.1], [-2.0, 2.9, 3.9]), "up through cone and cylinder");
 }
 
-fn scene(more: &str) -> crate::sim::Scene {
+fn scene(more: &str) -> crate::Scene {
     let text = format!(
         r#"{{ "version": 1, "name": "lit", "design": "thumb24.json",
         "frames": {{ "count": 1, "rate_hz": 30 }}, "tolerance": {{ "px": 0.01, "grey": 0.5 }},
         "light": {{ "leds": {{ "level_per_mw_mm2": 450 }} }} {more} }}"#
     );
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("designs");
-    crate::sim::Scene::from_text(&text, &folder).unwrap()
+    let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
+    crate::Scene::from_text(&text, &folder).unwrap()
 }
 
 const ALL: LightUse = LightUse::ALL;
@@ -468,9 +468,9 @@ fn numbers_for_lights_that_are_not_there_are_refused() {
     let text = scene("").file().clone();
     let mut file = text;
     file.light.leds.as_mut().unwrap().each = vec![1.0, 1.0];
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("designs");
-    let design = crate::design::load(&folder.join("thumb24.json")).unwrap();
-    let scene = crate::sim::Scene::new(file, &folder, design).unwrap();
+    let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
+    let design = domecast_design::load(&folder.join("thumb24.json")).unwrap();
+    let scene = crate::Scene::new(file, &folder, design).unwrap();
     let error = setup::sources(&scene, &ALL).unwrap_err().to_string();
     assert!(error.contains("light.leds.each"), "{error}");
 }
@@ -537,12 +537,12 @@ fn no_effect_of_light_passes_its_bound() {
     }
 }
 
-fn scene_of_power(power: f64) -> crate::sim::Scene {
+fn scene_of_power(power: f64) -> crate::Scene {
     let mut file = scene("").file().clone();
     file.light.leds.as_mut().unwrap().power = power;
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("designs");
-    let design = crate::design::load(&folder.join("thumb24.json")).unwrap();
-    crate::sim::Scene::new(file, &folder, design).unwrap()
+    let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
+    let design = domecast_design::load(&folder.join("thumb24.json")).unwrap();
+    crate::Scene::new(file, &folder, design).unwrap()
 }
 
 #[test]
@@ -554,7 +554,8 @@ fn codes_change_most_from_dark() {
 
 /// What Mitsuba found for the same sensor; made by scripts/golden_light.py.
 fn golden() -> serde_json::Value {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/golden_light.json");
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+        .join("tests/cases/golden_light.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

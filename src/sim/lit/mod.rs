@@ -33,7 +33,7 @@ use super::dent::Dent;
 use super::field::LensRays;
 use super::shading::{PlainSample, Shading, SurfaceSample};
 use super::work::Work;
-use crate::optics::SensorOptics;
+use domecast_optics::SensorOptics;
 
 /// Side of the largest squares, px; a power of two.
 pub(super) const LARGEST: usize = 32;

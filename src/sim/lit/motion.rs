@@ -4,7 +4,7 @@ use glam::Vec3A;
 
 use super::rays::Rays;
 use super::{LARGEST, Lit};
-use crate::sim::shading::Turned;
+use crate::shading::Turned;
 
 /// Distance of the pixels of which ray and motion are kept, px: the nodes of the squares half as large as the largest.
 const KEPT_STEP: usize = SMALLEST / 2;

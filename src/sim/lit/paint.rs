@@ -4,8 +4,8 @@ use glam::Vec3A;
 
 use super::motion::{Motion, SMALLEST, Source, shares};
 use super::{Known, Lit, LitSurface, rays, units};
-use crate::sim::shading::PlainSample;
-use crate::sim::work::Work;
+use crate::shading::PlainSample;
+use crate::work::Work;
 
 impl Lit {
     /// Lights every so many-th pixel, those on all four sides included, of a part of a smallest settled square of which the rays

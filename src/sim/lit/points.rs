@@ -4,11 +4,11 @@ use glam::{DVec2, Vec3A, Vec4};
 
 use super::motion::{Motion, Source, Square};
 use super::{Known, LARGEST, Lit, LitSlice, LitSurface, units};
-use crate::optics::SensorOptics;
-use crate::sim::dent::Dent;
-use crate::sim::effect::EffectName;
-use crate::sim::shading::{Moved, SurfaceSample};
-use crate::sim::work::Work;
+use crate::dent::Dent;
+use crate::effect::EffectName;
+use crate::shading::{Moved, SurfaceSample};
+use crate::work::Work;
+use domecast_optics::SensorOptics;
 
 /// Rays are traced and lit this many at a time.
 const BATCH: usize = 512;

@@ -7,8 +7,8 @@ use glam::Vec3A;
 
 use super::motion::{NONE, SMALLEST};
 use super::{Lit, LitSurface};
-use crate::sim::field::lagrange;
-use crate::sim::work::Work;
+use crate::field::lagrange;
+use crate::work::Work;
 
 /// Part of the tolerance that a told ray may take where the light is steepest, and the most that it may be off, mm.
 const PART: f32 = 0.1;

@@ -5,8 +5,8 @@ use glam::Vec3A;
 use super::motion::{Motion, SMALLEST, Source, Square};
 use super::smooth::Verdict;
 use super::{Lit, LitSurface, nine};
-use crate::sim::shading::Turned;
-use crate::sim::work::Work;
+use crate::shading::Turned;
+use crate::work::Work;
 
 /// What moves by less than this, mm, stands still.
 const STILL_MM: f32 = 1e-6;

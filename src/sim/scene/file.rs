@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::electronics::ElectronicsSection;
 use super::light::LightSection;
 use super::objects::ObjectSection;
-use crate::design::sections::Why;
-use crate::sim::effect::EffectChoices;
+use crate::effect::EffectChoices;
+use domecast_design::sections::Why;
 
 /// What the sensor is made to feel, how it is lit and recorded, and how exact the frames shall be.
 ///

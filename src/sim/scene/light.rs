@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::design::sections::Why;
+use domecast_design::sections::Why;
 
 /// Brightness. Levels are parts of the image's full scale, linear in light.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

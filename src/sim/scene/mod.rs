@@ -13,11 +13,11 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use crate::design::{Design, DesignError};
-use crate::layout::Layout;
-use crate::mechanics::Suspension;
-use crate::optics::SensorOptics;
-use crate::pose::Marker;
+use domecast_design::layout::Layout;
+use domecast_design::{Design, DesignError};
+use domecast_optics::SensorOptics;
+use domecast_optics::pose::Marker;
+use domecast_springs::Suspension;
 
 pub use file::SceneFile;
 pub use motion::{Held, Motion, State};

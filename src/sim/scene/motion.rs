@@ -3,10 +3,9 @@
 use glam::DVec3;
 
 use super::file::{MotionSection, PoseKey, WrenchKey};
-use crate::mechanics::{
-    Check, Displacement, Limit, Limits, MechanicsError, Suspension, Wrench, limits_of, try_load,
-};
-use crate::numeric::Rigid;
+use domecast_design::limits_of;
+use domecast_optics::numeric::Rigid;
+use domecast_springs::{Check, Displacement, Limit, Limits, MechanicsError, Suspension, Wrench, try_load};
 
 /// Pose and load of the platform at one time.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,7 +65,7 @@ impl Motion {
     /// The motion of a scene; keys are in order of time.
     pub(super) fn new(
         section: Option<&MotionSection>,
-        design: &crate::design::Design,
+        design: &domecast_design::Design,
         suspension: &Suspension,
     ) -> Self {
         let course = match section {

@@ -6,10 +6,10 @@ use glam::DVec3;
 
 use super::motion::interpolate;
 use super::objects::{ObjectSection, ShapeSection};
-use crate::design::DesignError;
-use crate::mechanics::contact::{ContactError, Indenter, Solid};
-use crate::mesh::read_stl;
-use crate::numeric::{Rigid, rotation_from_vector};
+use domecast_contact::{ContactError, Indenter, Solid};
+use domecast_design::DesignError;
+use domecast_mesh::read_stl;
+use domecast_optics::numeric::{Rigid, rotation_from_vector};
 
 /// An object that may touch the dome.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::design::sections::Why;
+use domecast_design::sections::Why;
 
 /// A body and its way.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

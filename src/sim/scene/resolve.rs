@@ -9,15 +9,17 @@ use super::file::{MotionSection, SceneFile};
 use super::motion::Motion;
 use super::object::SceneObject;
 use super::{RIM_POINTS, Scene, SceneDot};
-use crate::design::{self, Design, DesignError};
-use crate::layout::{Dot, Layout};
-use crate::mechanics::{Suspension, suspension_of};
-use crate::optics::SensorOptics;
-use crate::pose::Marker;
-use crate::sim::SimError;
+use crate::SimError;
+use domecast_design;
+use domecast_design::layout::{Dot, Layout};
+use domecast_design::suspension_of;
+use domecast_design::{Design, DesignError};
+use domecast_optics::SensorOptics;
+use domecast_optics::pose::Marker;
+use domecast_springs::Suspension;
 
 pub(super) fn load(path: &Path) -> Result<Scene, SimError> {
-    let text = design::read_text(path)?;
+    let text = domecast_design::read_text(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     from_text(&text, folder).map_err(|error| match error {
         SimError::Input(error) if error.file.is_none() => error.in_file(path).into(),
@@ -26,10 +28,10 @@ pub(super) fn load(path: &Path) -> Result<Scene, SimError> {
 }
 
 pub(super) fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
-    let value = design::parse_json(text)?;
-    let file: SceneFile = design::from_value(&value)?;
+    let value = domecast_design::parse_json(text)?;
+    let file: SceneFile = domecast_design::from_value(&value)?;
     let path = folder.join(&file.design);
-    let design = design::load(&path)?;
+    let design = domecast_design::load(&path)?;
     resolve(file, folder, design)
 }
 

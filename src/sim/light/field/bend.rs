@@ -7,8 +7,8 @@ use glam::{Vec3A, Vec4};
 use super::LightField;
 use super::places::cells;
 use super::shells::over;
-use crate::sim::rests::{Seconds, differences, rest, spread};
-use crate::sim::shading::{MovedBend, Turned};
+use crate::rests::{Seconds, differences, rest, spread};
+use crate::shading::{MovedBend, Turned};
 
 /// By cell of the undeformed membrane's light, of which these are the spline's coefficients: bound on its third derivative
 /// in any three directions, by the width of a cell.

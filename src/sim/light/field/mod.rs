@@ -18,7 +18,7 @@ use self::shells::Shells;
 use super::direct::EmitterRule;
 use super::dome_map::{DomeGrid, bicubic, direction_from_disc};
 use super::tables::{Prepared, Tables, Ways};
-use crate::sim::splines::{Degree, cubics, to_coefficients};
+use crate::splines::{Degree, cubics, to_coefficients};
 
 /// Places in a cell, each way, at which the undeformed membrane's brightest and steepest light is looked for.
 const LOOKS: usize = 6;

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use crate::sim::light::dome_map::{DomeGrid, bicubic};
-use crate::sim::light::radiosity::Rings;
-use crate::sim::light::tables::{Prepared, Ways};
+use crate::light::dome_map::{DomeGrid, bicubic};
+use crate::light::radiosity::Rings;
+use crate::light::tables::{Prepared, Ways};
 
 /// The membrane's own light at the patches of a room.
 #[derive(Debug, Clone)]

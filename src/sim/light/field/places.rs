@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3A};
 
-use crate::sim::light::dome_map::DomeGrid;
+use crate::light::dome_map::DomeGrid;
 
 /// The disc's place of a unit direction, as [`super::dome_map::disc_continued`] tells it.
 #[inline]

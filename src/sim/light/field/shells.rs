@@ -10,11 +10,11 @@ use glam::{DVec2, Vec2, Vec3A, Vec4};
 use super::bend::{squared_thirds, squares};
 use super::continued;
 use super::places::{Scale, cells, disc_of, split};
-use crate::sim::light::dome_map::{DomeGrid, bicubic};
-use crate::sim::light::tables::{SHELLS, Tables, Ways};
-use crate::sim::rests::{largest, rest_of_jumps};
-use crate::sim::shading::{MovedBend, Turned};
-use crate::sim::splines::{Degree, quadratics, to_coefficients};
+use crate::light::dome_map::{DomeGrid, bicubic};
+use crate::light::tables::{SHELLS, Tables, Ways};
+use crate::rests::{largest, rest_of_jumps};
+use crate::shading::{MovedBend, Turned};
+use crate::splines::{Degree, quadratics, to_coefficients};
 
 /// Fluxes of the three channels along x, y and z.
 type Flux = [Vec3A; 3];

@@ -1,0 +1,97 @@
+//! The lens's inverse: from a pixel to its ray.
+
+use glam::{DVec2, DVec3};
+
+use super::clock::{Patience, time};
+use super::ladder::{Ladder, Law, Rung};
+use domecast_design::layout::Layout;
+use domecast_optics::camera::{Lens, Model};
+
+/// Newton steps of the ladder.
+const NEWTON_STEPS: [u32; 7] = [0, 1, 2, 3, 4, 5, 6];
+/// Rounds of the fixed point; OpenCV's `undistortPoints` takes five unless told otherwise.
+const FIXED_POINT_ROUNDS: [u32; 6] = [2, 5, 10, 20, 40, 80];
+
+/// The ladder for the pixels of the dots; `None` for a lens without distortion, which has nothing to invert.
+pub fn ladder(lens: &Lens, layout: &Layout, asked_px: Option<f64>, patience: Patience) -> Option<Ladder> {
+    if lens.spec().model == Model::Pinhole {
+        return None;
+    }
+    let pixels: Vec<DVec2> = layout.dots.iter().map(|dot| dot.image_px).collect();
+    let error_px = |pixel: DVec2, ray: Option<DVec3>| match ray.and_then(|ray| lens.project(ray).ok()) {
+        Some(again) => again.distance(pixel),
+        None => f64::NAN,
+    };
+    let mut rungs = Vec::new();
+    let mut add = |way: &'static str, label: String, dial: f64, solve: &dyn Fn(DVec2) -> Option<DVec3>| {
+        let errors = pixels.iter().map(|&pixel| error_px(pixel, solve(pixel)));
+        let time = time(patience, || pixels.iter().filter(|pixel| solve(**pixel).is_some()).count());
+        rungs.push(Rung::of((way, label), dial, errors, (time, pixels.len()), "pixels without a ray"));
+    };
+    for rounds in FIXED_POINT_ROUNDS {
+        let label = format!("fixed point, {rounds} rounds");
+        add("fixed point", label, f64::from(rounds), &|pixel| fixed_point(lens, pixel, rounds));
+    }
+    for steps in NEWTON_STEPS {
+        let label = format!("Newton from the pinhole's ray, {steps} steps");
+        add("newton", label, f64::from(steps), &|pixel| newton(lens, pixel, steps));
+    }
+    add("table", "table and one Newton step".into(), 1.0, &|pixel| lens.unproject(pixel).ok());
+    let in_use = rungs.len() - 1;
+    let span_px = lens.max_radius_px();
+    Some(
+        Ladder {
+            name: "lens",
+            title: "The ray of a pixel".into(),
+            dial: "steps",
+            error: "distance of the ray's own pixel from the one asked for, the worst of the dots",
+            unit: "px",
+            item: "pixel",
+            items: pixels.len(),
+            reference: "the pixel itself, which the lens's formula takes the ray back to".into(),
+            floor: 4.0 * f64::EPSILON * span_px,
+            law: Law::Steps { order: 2.0 },
+            observed: None,
+            rungs,
+            in_use: Some(in_use),
+            asked: asked_px,
+            meets: None,
+            says: "Exact rays cost less than rough ones: there is nothing to choose.".into(),
+        }
+        .finish(),
+    )
+}
+
+/// The point of the plane z = 1 that a pixel would show without distortion.
+fn plain(lens: &Lens, pixel: DVec2) -> DVec2 {
+    let [[fx, skew, cx], [_, fy, cy], _] = lens.spec().matrix;
+    let y = (pixel.y - cy) / fy;
+    DVec2::new((pixel.x - cx - skew * y) / fx, y)
+}
+
+/// `x <- x + (y - f(x)) / (|f(x)| / |x|)`: OpenCV's iteration where distortion is radial.
+fn fixed_point(lens: &Lens, pixel: DVec2, rounds: u32) -> Option<DVec3> {
+    let wanted = plain(lens, pixel);
+    let mut at = wanted;
+    for _ in 0..rounds {
+        let image = plain(lens, lens.project(at.extend(1.0)).ok()?);
+        let size = at.length();
+        let factor = if size > 0.0 { image.length() / size } else { 1.0 };
+        at += (wanted - image) / factor;
+    }
+    at.is_finite().then(|| at.extend(1.0).normalize())
+}
+
+fn newton(lens: &Lens, pixel: DVec2, steps: u32) -> Option<DVec3> {
+    let mut at = plain(lens, pixel);
+    for _ in 0..steps {
+        let (image, slope) = lens.project_with_jacobian(at.extend(1.0)).ok()?;
+        let off = pixel - image;
+        let slope = glam::DMat2::from_cols(
+            DVec2::new(slope[(0, 0)], slope[(1, 0)]),
+            DVec2::new(slope[(0, 1)], slope[(1, 1)]),
+        );
+        at += slope.inverse() * off;
+    }
+    at.is_finite().then(|| at.extend(1.0).normalize())
+}

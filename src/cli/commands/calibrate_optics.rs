@@ -1,0 +1,183 @@
+//! `domecast calibrate-optics FRAMES|CENTROIDS.csv CONSTANTS`
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec2;
+use serde_json::json;
+
+use super::calibrate_force::{input_fault, measured_beside, read_constants, write_whole};
+use super::output::{Failure, Output};
+use domecast_design::read_text;
+use domecast_runtime::calibrate::detect::Detector;
+use domecast_runtime::calibrate::optics::{Kind, Observation, fit};
+use domecast_runtime::calibrate::{Table, TableError};
+use domecast_runtime::constants::Constants;
+use domecast_runtime::frames::Gray;
+
+const COLUMNS: &str = "columns frame,kind,id,u,v; kind is white or black; the lowest frame is at rest";
+
+const FRAMES: &str = "a folder of PNG frames, raw as the camera gives them; the first by name are at rest";
+
+/// Where results go.
+pub struct Files<'a> {
+    /// The measured constants; beside the nominal ones where it is not given.
+    pub out: Option<&'a Path>,
+    /// The centroids that were found in frames.
+    pub centroids: Option<&'a Path>,
+}
+
+/// Fits the optics to frames or centroids and writes measured constants.
+pub fn run(
+    output: &Output,
+    seen: &Path,
+    constants_path: &Path,
+    files: &Files,
+    rest_frames: usize,
+) -> Result<(), Failure> {
+    let constants = read_constants(constants_path)?;
+    let Some(priors) = constants.tolerances else {
+        let problem = "has no \"tolerances\", which are the priors of this calibration";
+        return Err(input_fault(constants_path, problem, "constants written by `domecast build`"));
+    };
+    let (observations, missing) = if seen.is_dir() || is_png(seen) {
+        let found = observations_in(output, &frames_of(seen)?, &constants)?;
+        if let Some(path) = files.centroids {
+            write_whole(path, &table_of(&found.0))?;
+        }
+        found
+    } else {
+        let text = read_text(seen)?;
+        (observations_of(&text).map_err(|e| input_fault(seen, e.to_string(), COLUMNS))?, 0)
+    };
+    output.step("fitting the optics");
+    let mut found = fit(&constants, &observations, &priors, rest_frames)
+        .map_err(|error| input_fault(seen, error.to_string(), "marks of this sensor"))?;
+    found.constants.calibrations.push(json!({
+        "kind": "optics",
+        "frames": found.poses.len(),
+        "rms_px": found.rms_px,
+        "parameters": found.parameters,
+    }));
+    let path = files.out.map_or_else(|| measured_beside(constants_path), Path::to_path_buf);
+    write_whole(&path, &found.constants.to_json())?;
+    output.steps_done();
+    let [before, after] = found.rms_px;
+    output.say(&format!(
+        "{} frames, {} centroids: {before:.3} px rms before, {after:.3} after {} steps, {} beyond three sd",
+        found.poses.len(),
+        observations.len(),
+        found.iterations,
+        found.outliers
+    ))?;
+    if missing > 0 {
+        output.warn(&format!("{missing} black dots were not found in their frames"));
+    }
+    for p in &found.parameters {
+        let word = if p.observed { "" } else { "  (not observed: the tolerance stands)" };
+        output
+            .say(&format!("{:<24} {:>10.5} -> {:>10.5} +- {:.5}{word}", p.name, p.nominal, p.value, p.sd))?;
+    }
+    output.say(&format!("wrote {}", path.display()))?;
+    output.result(&json!({
+        "constants": path.display().to_string(),
+        "frames": found.poses.len(),
+        "rms_px": found.rms_px,
+        "iterations": found.iterations,
+        "outliers": found.outliers,
+        "black_dots_missing": missing,
+        "parameters": found.parameters,
+    }))
+}
+
+fn is_png(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+}
+
+/// The frames of a folder by name, or the one that is named.
+fn frames_of(path: &Path) -> Result<Vec<PathBuf>, Failure> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_path_buf()]);
+    }
+    let entries = std::fs::read_dir(path)
+        .map_err(|error| input_fault(path, format!("cannot be read ({error})"), FRAMES))?;
+    let mut frames: Vec<PathBuf> =
+        entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| is_png(p)).collect();
+    frames.sort();
+    if frames.is_empty() {
+        return Err(input_fault(path, "holds no PNG frame", FRAMES));
+    }
+    Ok(frames)
+}
+
+/// The marks in frames, and how many dots were not found.
+fn observations_in(
+    output: &Output,
+    frames: &[PathBuf],
+    constants: &Constants,
+) -> Result<(Vec<Observation>, usize), Failure> {
+    let detector =
+        Detector::new(constants).map_err(|e| input_fault(Path::new("constants"), e.to_string(), FRAMES))?;
+    let (mut observations, mut missing) = (Vec::new(), 0);
+    for (number, path) in frames.iter().enumerate() {
+        output.step(&format!("finding the marks in frame {number}"));
+        let fault = |problem: String| input_fault(path, problem, FRAMES);
+        let bytes = std::fs::read(path).map_err(|error| fault(format!("cannot be read ({error})")))?;
+        let frame = Gray::from_png(&bytes).map_err(|error| fault(error.to_string()))?;
+        let found = detector.observe(&frame, number).map_err(|error| fault(error.to_string()))?;
+        missing += found.black_missing;
+        observations.extend(found.observations);
+    }
+    Ok((observations, missing))
+}
+
+/// The table that [`observations_of`] reads.
+fn table_of(observations: &[Observation]) -> String {
+    let mut text = String::from("frame,kind,id,u,v\n");
+    for Observation { frame, kind, id, centroid_px } in observations {
+        let kind = if *kind == Kind::White { "white" } else { "black" };
+        text += &format!("{frame},{kind},{id},{:.5},{:.5}\n", centroid_px.x, centroid_px.y);
+    }
+    text
+}
+
+fn observations_of(text: &str) -> Result<Vec<Observation>, TableError> {
+    let table = Table::parse(text)?;
+    let column = |name: &str| {
+        table.column(name).ok_or_else(|| TableError {
+            line: 1,
+            column: Some(name.into()),
+            problem: "this column is missing".into(),
+        })
+    };
+    let [frame, kind, id, u, v] =
+        [column("frame")?, column("kind")?, column("id")?, column("u")?, column("v")?];
+    let whole = |row: usize, at: usize| {
+        let value = table.required(row, at)?;
+        if value >= 0.0 && value.fract() == 0.0 && value < 1e9 {
+            Ok(value as usize)
+        } else {
+            Err(TableError {
+                line: table.lines[row],
+                column: table.columns.get(at).cloned(),
+                problem: format!("{value} is not a whole number from 0"),
+            })
+        }
+    };
+    let mut found = Vec::with_capacity(table.rows.len());
+    for row in 0..table.rows.len() {
+        let kind = match table.rows[row][kind].as_str() {
+            "white" => Kind::White,
+            "black" => Kind::Black,
+            other => {
+                return Err(TableError {
+                    line: table.lines[row],
+                    column: Some("kind".into()),
+                    problem: format!("\"{other}\" is neither white nor black"),
+                });
+            }
+        };
+        let centroid_px = DVec2::new(table.required(row, u)?, table.required(row, v)?);
+        found.push(Observation { frame: whole(row, frame)?, kind, id: whole(row, id)?, centroid_px });
+    }
+    Ok(found)
+}

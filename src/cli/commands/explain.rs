@@ -1,0 +1,56 @@
+//! `domecast explain FIELD`
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::output::{Failure, Output};
+use domecast_design;
+
+/// The design whose values and reasons are shown where none is named.
+const EXAMPLE: &str = include_str!("../../../designs/thumb24.json");
+
+/// Tells what a field means, what may stand there, and what a design says there and why.
+pub fn run(output: &Output, field: &str, design: Option<&Path>) -> Result<(), Failure> {
+    let (name, value): (String, Value) = match design {
+        Some(path) => {
+            let text = domecast_design::read_text(path)?;
+            (
+                path.display().to_string(),
+                domecast_design::parse_json(&text).map_err(|error| error.in_file(path))?,
+            )
+        }
+        None => ("thumb24".into(), serde_json::from_str(EXAMPLE).unwrap_or_default()),
+    };
+    let found = domecast_design::explain(field, &value)?;
+    if !found.field.is_empty() {
+        output.say(&found.field)?;
+    }
+    if !found.meaning.is_empty() {
+        output.say(&format!("  {}", found.meaning))?;
+    }
+    for (head, text) in [("unit", found.unit), ("allowed", &found.allowed), ("", &found.presence)] {
+        if !text.is_empty() && !found.field.is_empty() {
+            output.say(&if head.is_empty() { format!("  {text}") } else { format!("  {head}: {text}") })?;
+        }
+    }
+    if let Some(value) = found.value.as_ref().filter(|_| found.below.is_empty()) {
+        output.say(&format!("  {name} has {value}"))?;
+    }
+    if let Some(why) = &found.why {
+        output.say(&format!("  because: {why}"))?;
+    }
+    for (field, meaning) in &found.below {
+        output.say(&format!("    {field:<28} {meaning}"))?;
+    }
+    output.result(&json!({
+        "field": found.field,
+        "meaning": found.meaning,
+        "unit": found.unit,
+        "allowed": found.allowed,
+        "presence": found.presence,
+        "value": found.value.and_then(|value| serde_json::from_str::<Value>(&value).ok()),
+        "why": found.why,
+        "below": found.below.iter().map(|(field, _)| field).collect::<Vec<_>>(),
+    }))
+}

@@ -1,0 +1,144 @@
+//! How results, progress and failures reach a person or a program.
+
+use std::io::{self, IsTerminal, Write};
+
+use serde_json::{Value, json};
+
+use domecast_design::DesignError;
+use domecast_fab::build::WriteError;
+
+/// Why a command did not do what it was asked for.
+#[derive(Debug)]
+pub enum Failure {
+    /// The design, or another input, is at fault.
+    Input(Box<DesignError>),
+    /// The result could not be written.
+    Write(WriteError),
+    /// The command ran and its answer is "no" (a check that failed); its result is already told.
+    Negative,
+    /// Standard output could not be written.
+    Print(io::Error),
+    /// Something that must not happen, whatever the input.
+    Internal(String),
+}
+
+impl From<DesignError> for Failure {
+    fn from(error: DesignError) -> Self {
+        Self::Input(Box::new(error))
+    }
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::Print(error)
+    }
+}
+
+impl Failure {
+    /// 1 the input is at fault, 3 our fault. A reader that closes the pipe early is neither.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Print(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
+            Self::Input(_) | Self::Write(_) | Self::Negative | Self::Print(_) => 1,
+            Self::Internal(_) => 3,
+        }
+    }
+
+    fn message(&self) -> Option<String> {
+        match self {
+            Self::Input(error) => Some(error.to_string()),
+            Self::Write(error) => Some(error.to_string()),
+            Self::Negative => None,
+            Self::Print(error) if error.kind() == io::ErrorKind::BrokenPipe => None,
+            Self::Print(error) => Some(format!("standard output: cannot be written ({error})")),
+            Self::Internal(what) => Some(format!("a fault in domecast itself, please report it: {what}")),
+        }
+    }
+}
+
+/// Standard output and standard error, as the user wants them.
+#[derive(Debug)]
+pub struct Output {
+    json: bool,
+    quiet: bool,
+    progress: bool,
+}
+
+impl Output {
+    /// Progress shows only on a terminal.
+    pub fn new(json: bool, quiet: bool) -> Self {
+        Self { json, quiet, progress: !json && !quiet && io::stderr().is_terminal() }
+    }
+
+    /// Whether the result is wanted as JSON.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
+    /// Says what is being done now; the line is replaced by the next.
+    pub fn step(&self, doing: &str) {
+        if self.progress {
+            // progress is a courtesy: a terminal that cannot take it must not stop the work
+            let _ = write!(io::stderr(), "\r\x1b[2K{doing} ...");
+            let _ = io::stderr().flush();
+        }
+    }
+
+    /// Clears the progress line.
+    pub fn steps_done(&self) {
+        if self.progress {
+            let _ = write!(io::stderr(), "\r\x1b[2K");
+        }
+    }
+
+    /// A line of a summary, for people only.
+    pub fn say(&self, line: &str) -> Result<(), Failure> {
+        if !self.json && !self.quiet {
+            writeln!(io::stdout(), "{line}")?;
+        }
+        Ok(())
+    }
+
+    /// A warning, for people only (the JSON result carries warnings itself).
+    pub fn warn(&self, line: &str) {
+        if !self.json && !self.quiet {
+            let _ = writeln!(io::stderr(), "warning: {line}");
+        }
+    }
+
+    /// A fault, for people, whatever the mode.
+    pub fn error(&self, line: &str) {
+        let _ = writeln!(io::stderr(), "error: {line}");
+    }
+
+    /// The result, for programs only.
+    pub fn result(&self, value: &Value) -> Result<(), Failure> {
+        if self.json {
+            writeln!(io::stdout(), "{value:#}")?;
+        }
+        Ok(())
+    }
+
+    /// Text that is the command's very answer, whatever the mode.
+    pub fn answer(&self, text: &str) -> Result<(), Failure> {
+        let mut out = io::stdout().lock();
+        out.write_all(text.as_bytes())?;
+        out.flush()?;
+        Ok(())
+    }
+
+    /// Tells a failure: on standard error for people, on standard output for programs.
+    pub fn failure(&self, failure: &Failure) {
+        self.steps_done();
+        let Some(message) = failure.message() else { return };
+        if self.json {
+            let error = match failure {
+                Failure::Input(error) => error.to_json(),
+                _ => json!({ "message": message }),
+            };
+            let _ = writeln!(io::stdout(), "{:#}", json!({ "error": error }));
+        } else {
+            self.error(&message);
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! `domecast trace` and `domecast project`: points in, one JSON object a line out, in order.
+
+use std::fmt::Write as _;
+use std::io::Read as _;
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+use serde_json::{Value, json};
+
+use super::output::{Failure, Output};
+use domecast_design::{DesignError, load_optics, parse_json, read_text};
+use domecast_optics::SensorOptics;
+use domecast_optics::numeric::Rigid;
+
+/// Answers this many points at a time, so that output starts early and memory stays flat.
+const CHUNK: usize = 4096;
+
+/// `domecast trace DESIGN --pixels FILE|-`
+pub fn trace(output: &Output, design: &Path, pixels: &Path, pose: Option<&Path>) -> Result<(), Failure> {
+    let optics = optics(design, pose)?;
+    let spec = optics.lens().spec();
+    let (width, height) = (spec.width, spec.height);
+    answer(output, pixels, ["u", "v"], |[u, v]| {
+        let pixel = DVec2::new(u, v);
+        let in_image = on_raster(pixel, width, height);
+        match optics.trace(pixel) {
+            Ok(hit) => json!({
+                "pixel": [u, v], "status": "ok",
+                "surface_mm": hit.surface_mm.to_array(), "normal": hit.normal.to_array(),
+                "field_angle_rad": hit.field_angle_rad, "in_image": in_image,
+            }),
+            Err(limit) => json!({
+                "pixel": finite([u, v]), "status": limit.as_str(),
+                "surface_mm": null, "normal": null, "field_angle_rad": null, "in_image": in_image,
+            }),
+        }
+    })
+}
+
+/// `domecast project DESIGN --points FILE|-`
+pub fn project(output: &Output, design: &Path, points: &Path, pose: Option<&Path>) -> Result<(), Failure> {
+    let optics = optics(design, pose)?;
+    let spec = optics.lens().spec();
+    let (width, height) = (spec.width, spec.height);
+    answer(output, points, ["x", "y", "z"], |point| match optics.project(DVec3::from_array(point)) {
+        Ok(pixel) => json!({
+            "point_mm": point, "status": "ok", "image_px": pixel.to_array(),
+            "in_image": on_raster(pixel, width, height),
+        }),
+        Err(limit) => json!({
+            "point_mm": finite(point), "status": limit.as_str(), "image_px": null, "in_image": null,
+        }),
+    })
+}
+
+/// Pixel centres are whole numbers, so the raster reaches half a pixel beyond the first and the last.
+fn on_raster(pixel: DVec2, width: u32, height: u32) -> bool {
+    let within = |value: f64, count: u32| value >= -0.5 && value < f64::from(count) - 0.5;
+    within(pixel.x, width) && within(pixel.y, height)
+}
+
+/// JSON has no NaN: a coordinate that is not finite becomes null.
+fn finite<const N: usize>(values: [f64; N]) -> Value {
+    values.iter().map(|value| if value.is_finite() { json!(value) } else { Value::Null }).collect()
+}
+
+fn optics(design: &Path, pose: Option<&Path>) -> Result<SensorOptics, Failure> {
+    let optics = load_optics(design)?;
+    let Some(path) = pose else { return Ok(optics) };
+    let value = parse_json(&read_text(path)?).map_err(|error| error.in_file(path))?;
+    let allowed = "[[r,r,r,x],[r,r,r,y],[r,r,r,z],[0,0,0,1]]: a rotation, and a translation in mm";
+    let fault = |problem: String| DesignError::at("pose", &value, problem, allowed).in_file(path);
+    let rows: [[f64; 4]; 4] = serde_json::from_value(value.clone())
+        .map_err(|error| fault(format!("this is not a 4x4 matrix ({error})")))?;
+    let rest_from_platform = Rigid::from_rows_4x4(&rows).map_err(|error| fault(error.to_string()))?;
+    Ok(optics.at_pose(&rest_from_platform).map_err(|error| fault(error.to_string()))?)
+}
+
+/// Reads the points and prints an answer for each. A row that holds no point is answered with the
+/// status `malformed`, the rest goes on, and the first such row is the command's failure.
+fn answer<const N: usize>(
+    output: &Output,
+    path: &Path,
+    names: [&str; N],
+    one: impl Fn([f64; N]) -> Value,
+) -> Result<(), Failure> {
+    let rows = read_rows(path, names)?;
+    let mut first_bad = None;
+    let mut text = String::new();
+    for chunk in rows.chunks(CHUNK) {
+        text.clear();
+        for row in chunk {
+            let value = match &row.point {
+                Ok(point) => one(*point),
+                Err(fault) => {
+                    first_bad = first_bad.or(Some((row.line, fault)));
+                    json!({ "line": row.line, "status": "malformed" })
+                }
+            };
+            // writing to a String cannot fail
+            let _ = writeln!(text, "{value}");
+        }
+        output.answer(&text)?;
+    }
+    match first_bad {
+        None => Ok(()),
+        Some((line, fault)) => {
+            let mut error = DesignError::at("", "", fault.clone(), format!("numbers {}", names.join(",")));
+            error.place = Some((line, 1));
+            Err(error.in_file(path).into())
+        }
+    }
+}
+
+/// A row of the input: where it stands, and its point or what is wrong with it.
+struct Row<const N: usize> {
+    line: usize,
+    point: Result<[f64; N], String>,
+}
+
+fn read_rows<const N: usize>(path: &Path, names: [&str; N]) -> Result<Vec<Row<N>>, DesignError> {
+    let text = if path.as_os_str() == "-" {
+        let mut text = String::new();
+        std::io::stdin().read_to_string(&mut text).map_err(|error| {
+            DesignError::at("", "", format!("standard input cannot be read ({error})"), "UTF-8 text")
+        })?;
+        text
+    } else {
+        read_text(path)?
+    };
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    if text.trim_start().starts_with(['[', '{']) {
+        json_rows(text, names).map_err(|error| error.in_file(path))
+    } else {
+        csv_rows(text, names).map_err(|error| error.in_file(path))
+    }
+}
+
+fn json_rows<const N: usize>(text: &str, names: [&str; N]) -> Result<Vec<Row<N>>, DesignError> {
+    // Python writes NaN and Infinity into JSON; such a point has an answer ("not_finite"), so let it pass
+    let text = text.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
+    let value = parse_json(&text)?;
+    let Value::Array(items) = &value else {
+        return Err(DesignError::at(
+            "",
+            &value,
+            "not a list of points",
+            format!("a list of [{}]", names.join(",")),
+        ));
+    };
+    let coordinate = |value: Option<&Value>| match value {
+        Some(Value::Null) => Ok(f64::NAN),
+        Some(Value::Number(number)) => Ok(number.as_f64().unwrap_or(f64::NAN)),
+        _ => Err(()),
+    };
+    let point = |item: &Value| -> Result<[f64; N], ()> {
+        let mut point = [0.0; N];
+        for (index, name) in names.iter().enumerate() {
+            point[index] = match item {
+                Value::Array(list) if list.len() == N => coordinate(list.get(index))?,
+                Value::Object(map) => coordinate(map.get(*name))?,
+                _ => return Err(()),
+            };
+        }
+        Ok(point)
+    };
+    let rows = items.iter().enumerate().map(|(index, item)| Row {
+        line: index + 1,
+        point: point(item).map_err(|()| format!("entry {} is {item}, not a point", index + 1)),
+    });
+    Ok(rows.collect())
+}
+
+fn csv_rows<const N: usize>(text: &str, names: [&str; N]) -> Result<Vec<Row<N>>, DesignError> {
+    let mut columns: Option<[usize; N]> = None;
+    let mut headerless = false;
+    let mut rows = Vec::new();
+    for (index, raw) in text.lines().enumerate() {
+        let line = raw.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let cells: Vec<&str> = line.split(',').map(|cell| cell.trim().trim_matches('"')).collect();
+        let at = match columns {
+            Some(at) => at,
+            // the first row with anything in it may be a header
+            None if names.iter().any(|name| cells.contains(name)) => {
+                let mut at = [0; N];
+                for (slot, name) in at.iter_mut().zip(names) {
+                    *slot = cells.iter().position(|cell| cell == &name).ok_or_else(|| {
+                        let mut fault = DesignError::at(
+                            "",
+                            "",
+                            format!("the header has no column \"{name}\""),
+                            names.join(","),
+                        );
+                        fault.place = Some((index + 1, 1));
+                        fault
+                    })?;
+                }
+                columns = Some(at);
+                continue;
+            }
+            None => {
+                headerless = true;
+                let at = std::array::from_fn(|column| column);
+                columns = Some(at);
+                at
+            }
+        };
+        if headerless && cells.len() != N {
+            // without names, another number of columns is another kind of file
+            let fault = format!("\"{line}\" has {} columns, not {N}", cells.len());
+            rows.push(Row { line: index + 1, point: Err(fault) });
+            continue;
+        }
+        rows.push(Row { line: index + 1, point: csv_point(&cells, at, names, line) });
+    }
+    Ok(rows)
+}
+
+fn csv_point<const N: usize>(
+    cells: &[&str],
+    at: [usize; N],
+    names: [&str; N],
+    line: &str,
+) -> Result<[f64; N], String> {
+    let mut point = [0.0; N];
+    for ((slot, column), name) in point.iter_mut().zip(at).zip(names) {
+        let cell = cells.get(column).copied().unwrap_or_default();
+        *slot = cell.parse().map_err(|_| format!("\"{line}\" has no number for {name}"))?;
+    }
+    Ok(point)
+}

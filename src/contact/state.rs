@@ -1,0 +1,154 @@
+//! What a contact solve answers.
+
+use glam::DVec3;
+
+use super::field::Field;
+use domecast_optics::numeric::{LengthMismatch, Rigid, batch};
+use domecast_springs::Wrench;
+
+/// How a solve ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Status {
+    /// Nothing touches.
+    Free,
+    /// Solved to its tolerance.
+    Solved,
+    /// The bound on iterations was reached, or no step gained any more; the state is the last one, its residuals say how
+    /// far it is off.
+    BoundReached,
+    /// The level's formulas do not cover this contact; the state is that of the geometric level.
+    NotApplicable(&'static str),
+}
+
+/// A node of the dome's surface that bears a force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TouchedNode {
+    /// Its place on the undeformed dome, sensor frame, mm.
+    pub at_mm: DVec3,
+    /// The surface it stands for, mm2.
+    pub area_mm2: f64,
+    /// The force on the dome, sensor frame, N.
+    pub force_n: DVec3,
+    /// Its part along the contact normal, over the area, MPa.
+    pub pressure_mpa: f64,
+    /// Whether it sticks to the object.
+    pub sticks: bool,
+}
+
+/// Where the dome moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Direction from the base's centre to the middle of the touched region.
+    pub direction: DVec3,
+    /// Half angle of a cap about it, rad.
+    pub angle_rad: f64,
+    /// No point outside the cap moves by more than this, mm.
+    pub beyond_mm: f64,
+}
+
+/// What the next state must know of this one for friction.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct History {
+    /// Where the object was.
+    pub sensor_from_object: Option<Rigid>,
+    /// Friction force and moment about the normal of a level with one spring for the whole contact, N, N*mm.
+    pub tangential_n: DVec3,
+    pub torsion_nmm: f64,
+    /// Unknowns of the last solve, by node of the level's grid: force in the node's frame, tangential displacement.
+    pub nodes: Vec<NodeMemory>,
+}
+
+/// One node's part of [`History`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct NodeMemory {
+    pub node: u32,
+    pub force_n: DVec3,
+    pub displacement_mm: DVec3,
+}
+
+/// A dome touched by an object.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactState {
+    /// How the solve ended.
+    pub status: Status,
+    /// What the object puts on the dome, about the base's centre, sensor frame.
+    pub wrench: Wrench,
+    /// The nodes that bear it.
+    pub nodes: Vec<TouchedNode>,
+    /// Radius of a disc of the touched area, mm, measured by moments of the pressure (or push-out) that make it exact
+    /// for Hertz' half ellipsoid and smooth as nodes come and go.
+    pub contact_radius_mm: f64,
+    /// Largest pressure, MPa.
+    pub peak_pressure_mpa: f64,
+    /// How deep a node of the deformed dome still lies in the (deformed) object, mm; 0 if none does.
+    pub penetration_mm: f64,
+    /// What the last iteration changed, mm.
+    pub residual_mm: f64,
+    /// The largest force by which a free node of bricks is out of balance, N; `None` where the level has none to balance,
+    /// or no step could be taken.
+    pub imbalance_n: Option<f64>,
+    /// Iterations of the outer loop.
+    pub iterations: u32,
+    /// Counted work, multiplications.
+    pub work: f64,
+    pub(super) field: Field,
+    pub(super) history: History,
+}
+
+impl ContactState {
+    /// Nothing touches.
+    pub(super) fn free(sensor_from_object: &Rigid) -> Self {
+        Self {
+            status: Status::Free,
+            wrench: Wrench::default(),
+            nodes: Vec::new(),
+            contact_radius_mm: 0.0,
+            peak_pressure_mpa: 0.0,
+            penetration_mm: 0.0,
+            residual_mm: 0.0,
+            imbalance_n: None,
+            iterations: 0,
+            work: 0.0,
+            field: Field::Still,
+            history: History { sensor_from_object: Some(*sensor_from_object), ..Default::default() },
+        }
+    }
+
+    /// Displacement of a point of the undeformed dome (sensor frame, mm); zero if the point is not finite.
+    pub fn displacement_mm(&self, at_mm: DVec3) -> DVec3 {
+        let u = if at_mm.is_finite() { self.field.at(at_mm) } else { DVec3::ZERO };
+        if u.is_finite() { u } else { DVec3::ZERO }
+    }
+
+    /// The displacements of many points; each depends on its own point only.
+    ///
+    /// # Errors
+    /// [`LengthMismatch`].
+    pub fn displacements_mm(&self, at_mm: &[DVec3], out: &mut [DVec3]) -> Result<(), LengthMismatch> {
+        self.field.prepare(at_mm.len());
+        batch::fill(at_mm, out, |at| self.displacement_mm(*at))
+    }
+
+    /// Where the dome moves.
+    pub fn extent(&self) -> Extent {
+        self.field.extent()
+    }
+
+    /// Heights of the deformed membrane over the base's square [-R, R]^2, row by row from -y, `side` by `side`
+    /// samples at the cells' middles, mm; 0 beside the dome.
+    ///
+    /// Each sample is the dome's point over it, moved: its height is that point's z after the motion.
+    pub fn height_map_mm(&self, dome_radius_mm: f64, side: usize) -> Vec<f64> {
+        let at = |i: usize| ((2 * i + 1) as f64 / side as f64 - 1.0) * dome_radius_mm;
+        let mut points = Vec::with_capacity(side * side);
+        for row in 0..side {
+            for column in 0..side {
+                let (x, y) = (at(column), at(row));
+                let z2 = dome_radius_mm * dome_radius_mm - x * x - y * y;
+                points.push(if z2 > 0.0 { DVec3::new(x, y, z2.sqrt()) } else { DVec3::ZERO });
+            }
+        }
+        self.field.prepare(points.len());
+        points.iter().map(|p| if p.z > 0.0 { p.z + self.displacement_mm(*p).z } else { 0.0 }).collect()
+    }
+}

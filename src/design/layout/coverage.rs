@@ -1,0 +1,196 @@
+//! How much of the dome the camera covers, at rest and under load, and which dots it loses on the way.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::Layout;
+use super::dot::{Carrier, Dot};
+use super::frame::EvenFrame;
+use super::lost::Reason;
+use super::region::dome_point;
+use super::spec::LayoutSpec;
+use super::window::Window;
+use super::zones::{ImageZone, check_corners, marker_zones};
+use domecast_optics::SensorOptics;
+
+/// Rings and points per ring at which the dome is looked at. Rings are at equal steps of height, so that every
+/// point stands for the same area.
+const RINGS: u32 = 90;
+const AROUND: u32 = 72;
+
+/// Points on a dot's edge that are followed where something is near that may hide it.
+const EDGE_POINTS: u32 = 16;
+
+/// What is this much nearer than a dot's own reach at rest is looked at closely: the image of a dot grows less
+/// between rest and full load, and less from the raw image to the undistorted one.
+const NEAR: f64 = 6.0;
+
+/// How much of the dome is seen at one pose.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Share of the dome's area that the lens sees through the layers, on the raster or not.
+    pub seen_by_lens: f64,
+    /// Share that lies on the camera's raster.
+    pub on_raster: f64,
+    /// Share that lies inside the runtime's mask as well.
+    pub in_mask: f64,
+    /// Share of all that, less what white markers or the platform's window hide.
+    pub in_sight: f64,
+    /// Polar angle up to which every point is in sight, degrees.
+    pub whole_to_deg: f64,
+    /// The nearest that the line of sight of a dot comes to the edge of the upper platform's window, mm sideways;
+    /// null where the window is not known.
+    pub window_gap_mm: Option<f64>,
+    /// Laid-out dots that are not seen whole at this pose.
+    pub unseen_dots: Vec<UnseenDot>,
+}
+
+/// A laid-out dot that is not seen whole.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct UnseenDot {
+    /// Its number.
+    pub id: u32,
+    /// Why, by name.
+    pub reason: &'static str,
+    /// Why, in words.
+    pub because: String,
+}
+
+/// Looks at the dome from one pose of the platform, which `optics` carries.
+pub fn coverage(
+    spec: &LayoutSpec,
+    layout: &Layout,
+    optics: &SensorOptics,
+    window: Option<&Window>,
+) -> Coverage {
+    let sight = Sight { spec, optics, markers: marker_zones(optics, &spec.white_markers), window };
+    let radius_mm = optics.dome_radius_mm();
+    let (mut lens, mut raster, mut mask, mut free, mut whole) = (0u32, 0u32, 0u32, 0u32, true);
+    let mut whole_to_rad = 0.0;
+    for ring in 0..RINGS {
+        let height = 1.0 - (f64::from(ring) + 0.5) / f64::from(RINGS);
+        let polar_rad = height.acos();
+        let before = free;
+        for k in 0..AROUND {
+            let azimuth_rad = TAU * f64::from(k) / f64::from(AROUND);
+            let reason = sight.point(dome_point(radius_mm, polar_rad, azimuth_rad)).err();
+            lens += u32::from(!matches!(reason, Some(Reason::Unseen(_))));
+            raster += u32::from(!matches!(reason, Some(Reason::Unseen(_) | Reason::OutsideImage)));
+            mask += u32::from(!matches!(
+                reason,
+                Some(Reason::Unseen(_) | Reason::OutsideImage | Reason::OutsideMask)
+            ));
+            free += u32::from(reason.is_none());
+        }
+        whole &= free - before == AROUND;
+        if whole {
+            whole_to_rad = if ring + 1 == RINGS { FRAC_PI_2 } else { polar_rad };
+        }
+    }
+    let all = f64::from(RINGS * AROUND);
+    let (window_gap_mm, unseen_dots) = sight.dots(layout);
+    Coverage {
+        seen_by_lens: f64::from(lens) / all,
+        on_raster: f64::from(raster) / all,
+        in_mask: f64::from(mask) / all,
+        in_sight: f64::from(free) / all,
+        whole_to_deg: f64::to_degrees(whole_to_rad),
+        window_gap_mm,
+        unseen_dots,
+    }
+}
+
+/// The camera's sight at one pose: everything that can end it.
+struct Sight<'a> {
+    spec: &'a LayoutSpec,
+    optics: &'a SensorOptics,
+    markers: Vec<ImageZone>,
+    window: Option<&'a Window>,
+}
+
+/// A point that is in sight.
+struct Seen {
+    pixel: DVec2,
+    /// Distance from the mask's edge in the undistorted frame, px; infinite without a mask.
+    mask_px: f64,
+    /// Gap to the window's edge, mm; infinite where no window is known.
+    window_mm: f64,
+}
+
+impl Sight<'_> {
+    /// A point of the dome: lens, raster, mask, markers and window, in this order.
+    fn point(&self, point_mm: DVec3) -> Result<Seen, Reason> {
+        let pixel = self.optics.project(point_mm).map_err(Reason::Unseen)?;
+        if self.raster_px(pixel) < 0.0 {
+            return Err(Reason::OutsideImage);
+        }
+        let mask_px = match &self.spec.mask {
+            None => f64::INFINITY,
+            Some(mask) => (self.spec.undistorted.from_raw(self.optics.lens(), pixel).ok())
+                .map(|place| mask.radius_px - place.distance(mask.center_px))
+                .filter(|left| *left >= 0.0)
+                .ok_or(Reason::OutsideMask)?,
+        };
+        check_corners(&self.markers, &[pixel])?;
+        let window_mm =
+            self.window.and_then(|window| window.gap_mm(self.optics, pixel)).unwrap_or(f64::INFINITY);
+        if window_mm < 0.0 { Err(Reason::HiddenByPlatform) } else { Ok(Seen { pixel, mask_px, window_mm }) }
+    }
+
+    /// Distance from the edge of the raster, px; negative outside.
+    fn raster_px(&self, pixel: DVec2) -> f64 {
+        let lens = self.optics.lens().spec();
+        let last = DVec2::new(f64::from(lens.width), f64::from(lens.height)) - 0.5;
+        (pixel + 0.5).min_element().min((last - pixel).min_element())
+    }
+
+    /// The narrowest gap of all dots to the window, and the dots that are not seen whole.
+    fn dots(&self, layout: &Layout) -> (Option<f64>, Vec<UnseenDot>) {
+        let carrier = Carrier {
+            optics: &self.spec.optics,
+            frame: EvenFrame::new(self.spec.optics.lens(), self.spec.pattern.even_in, self.spec.undistorted),
+            transfer: &layout.transfer,
+            size: layout.size,
+            outline_tolerance_mm: self.spec.print.outline_mm(),
+        };
+        let looked_at: Vec<Result<f64, Reason>> =
+            layout.dots.par_iter().map(|dot| self.dot(&carrier, dot)).collect();
+        let narrowest = looked_at.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let unseen = layout.dots.iter().zip(&looked_at).filter_map(|(dot, looked_at)| {
+            let reason = looked_at.as_ref().err()?;
+            Some(UnseenDot { id: dot.id, reason: reason.as_str(), because: reason.to_string() })
+        });
+        (narrowest.is_finite().then_some(narrowest), unseen.collect())
+    }
+
+    /// A whole dot; its gap to the window's edge, mm. The edge of the dot is followed only where something is near.
+    fn dot(&self, carrier: &Carrier<'_>, dot: &Dot) -> Result<f64, Reason> {
+        let middle = self.point(dot.surface_mm)?;
+        let (low, high) = dot.image_outline.bounds();
+        let near_px = NEAR * 0.5 * low.distance(high);
+        let (low, high) = (middle.pixel - near_px, middle.pixel + near_px);
+        let square = [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)];
+        let alone = middle.mask_px > near_px
+            && self.raster_px(middle.pixel) > near_px
+            && middle.window_mm > NEAR * dot.diameter_mm
+            && check_corners(&self.markers, &square).is_ok();
+        if alone {
+            return Ok(middle.window_mm);
+        }
+        let curve = carrier.curve(dot.even_px, dot.surface_mm);
+        let mut window_mm = middle.window_mm;
+        let mut corners = Vec::with_capacity(EDGE_POINTS as usize);
+        for k in 0..EDGE_POINTS {
+            let (point, _) = curve.on_dome(TAU * f64::from(k) / f64::from(EDGE_POINTS))?;
+            let seen = self.point(point)?;
+            window_mm = window_mm.min(seen.window_mm);
+            // A hair inside, so that a dot that just clears a marker in the layout does so here.
+            corners.push(middle.pixel.lerp(seen.pixel, 0.995));
+        }
+        check_corners(&self.markers, &corners)?;
+        Ok(window_mm)
+    }
+}

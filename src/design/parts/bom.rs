@@ -1,0 +1,205 @@
+//! Bill of materials.
+
+use std::fmt::Write as _;
+
+use super::Part;
+use super::measures::Measures;
+use crate::spec::Design;
+use crate::spec::sections::LedColor;
+
+/// What to print, cut, cast and buy, with tolerances and where each comes from,
+/// as CSV: one line per item.
+pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
+    let sections = design.sections();
+    let mut out =
+        String::from("item,quantity,unit,description,size_mm,tolerance_mm,made_of,source,design_field\n");
+    let mut row = |cells: [&str; 9]| {
+        let line: Vec<String> = cells.iter().map(|c| quoted(c)).collect();
+        let _ = writeln!(out, "{}", line.join(","));
+    };
+    let process = &m.process;
+    let printed_tolerance = format!("+-{}", process.tolerance_mm);
+    for part in parts.iter().filter(|p| p.name != "acrylic_sheet") {
+        let size = part.bounds.size_mm();
+        let size = format!("{:.2} x {:.2} x {:.2}", size.x, size.y, size.z);
+        let grams = part.volume_mm3 * 1e-3 * process.density_g_per_cm3;
+        let tool = !part.name.ends_with("platform");
+        let description = format!("{}{}, {grams:.1} g", part.summary, if tool { " (tool)" } else { "" });
+        let file = format!("parts/{}.stl", part.name);
+        row([
+            &part.name,
+            "1",
+            "piece",
+            &description,
+            &size,
+            &printed_tolerance,
+            &process.name,
+            &file,
+            "process",
+        ]);
+    }
+    let sheet = format!("{} x {} x {}", m.sheet_size_mm.x, m.sheet_size_mm.y, m.sheet_thickness_mm);
+    let sheet_material = sections.optics.layers.first().map_or("clear sheet", |layer| layer.name.as_str());
+    let slack = format!("outline +0/-{}", m.sheet.clearance_mm);
+    row([
+        "acrylic_sheet",
+        "1",
+        "piece",
+        "clear sheet, laser-cut",
+        &sheet,
+        &slack,
+        sheet_material,
+        "parts/acrylic_sheet.dxf",
+        "sheet",
+    ]);
+    let volume_ml = 2.0 / 3.0 * std::f64::consts::PI * m.dome_radius_mm.powi(3) * 1e-3;
+    let elastomer = &sections.elastomer.material;
+    let dome = format!("radius {}", m.dome_radius_mm);
+    let amount = format!("{volume_ml:.1}");
+    row([
+        "dome",
+        &amount,
+        "ml",
+        "clear elastomer for one dome, without waste",
+        &dome,
+        "",
+        elastomer,
+        "cast in the mould",
+        "elastomer",
+    ]);
+    let membrane = format!("{}", m.membrane_mm);
+    row([
+        "membrane",
+        "1",
+        "coat",
+        "reflective coat on the dome, thickness",
+        &membrane,
+        "",
+        "reflective silicone paint",
+        "sprayed or dipped",
+        "elastomer.membrane_thickness_mm",
+    ]);
+
+    let body = &m.camera_body;
+    let camera = format!("diameter {} x {}", body.diameter_mm, body.length_mm);
+    let lens = format!(
+        "camera {} x {} px, {} degrees",
+        sections.camera.width, sections.camera.height, sections.camera.field_of_view_deg
+    );
+    let bore = format!("diameter +{}/-any", 2.0 * body.bore_clearance_mm);
+    row(["camera", "1", "piece", &lens, &camera, &bore, "", "bought", "camera_body"]);
+    let count = m.spring_axes_mm.len().to_string();
+    let springs = &sections.springs;
+    let size = format!(
+        "wire {} x outer {} x free {}, {} active coils",
+        springs.wire_diameter_mm, springs.outer_diameter_mm, springs.free_length_mm, springs.active_coils
+    );
+    let tolerance = format!(
+        "wire {}, outer {}",
+        sections.tolerances.wire_diameter_mm, sections.tolerances.spring_diameter_mm
+    );
+    row([
+        "spring",
+        &count,
+        "piece",
+        "compression spring (tolerances are one sigma)",
+        &size,
+        &tolerance,
+        &springs.wire.name,
+        "bought",
+        "springs",
+    ]);
+    let count = (2 * m.spring_axes_mm.len()).to_string();
+    let size = format!("diameter {} x {}", m.magnets.diameter_mm, m.magnets.thickness_mm);
+    let pocket = format!("diameter +{}/-any", m.pockets.diameter_clearance_mm);
+    row([
+        "magnet",
+        &count,
+        "piece",
+        "disc magnet, glued into its pocket",
+        &size,
+        &pocket,
+        "NdFeB",
+        "bought",
+        "magnets",
+    ]);
+    for (color, name) in [
+        (LedColor::Red, "red"),
+        (LedColor::Green, "green"),
+        (LedColor::Blue, "blue"),
+        (LedColor::White, "white"),
+    ] {
+        let n = m.leds.list.iter().filter(|led| led.color == color).count();
+        if n > 0 {
+            let size =
+                format!("{} x {} x {}", m.leds.package_mm[0], m.leds.package_mm[1], m.leds.package_height_mm);
+            let item = format!("LED {name}");
+            row([
+                &item,
+                &n.to_string(),
+                "piece",
+                "surface-mounted LED",
+                &size,
+                "",
+                "",
+                "bought",
+                "leds.list",
+            ]);
+        }
+    }
+    if !m.leds.list.is_empty() {
+        let n = m.leds.list.len().to_string();
+        let size = format!("{} x {} x {}", m.leds.board_mm[0], m.leds.board_mm[1], m.leds.board_thickness_mm);
+        let slack = format!("+-{}", m.leds.clearance_mm);
+        row([
+            "LED board",
+            &n,
+            "piece",
+            "circuit board for one LED",
+            &size,
+            &slack,
+            "FR4",
+            "ordered",
+            "leds.board_mm",
+        ]);
+        if m.leds.diffuser_thickness_mm > 0.0 {
+            let t = m.leds.diffuser_thickness_mm.to_string();
+            row([
+                "diffuser",
+                &n,
+                "piece",
+                "diffuser tape before the LED, thickness",
+                &t,
+                "",
+                "tape",
+                "bought",
+                "leds.diffuser_thickness_mm",
+            ]);
+        }
+    }
+    let clamps = m.platforms.lower.clamp.azimuth_deg.len();
+    if clamps > 0 {
+        let size = format!("for a tapping hole of {}", m.platforms.lower.clamp.hole_diameter_mm);
+        row([
+            "set screw",
+            &clamps.to_string(),
+            "piece",
+            "holds the camera",
+            &size,
+            "",
+            "steel",
+            "bought",
+            "platforms.lower.clamp",
+        ]);
+    }
+    out
+}
+
+/// A CSV cell, quoted where it must be (RFC 4180).
+fn quoted(cell: &str) -> String {
+    if cell.contains([',', '"', '\n']) {
+        format!("\"{}\"", cell.replace('"', "\"\""))
+    } else {
+        cell.to_owned()
+    }
+}

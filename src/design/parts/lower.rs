@@ -1,0 +1,109 @@
+//! The lower platform: a block that holds the camera and carries the springs.
+
+use glam::{DAffine3, DVec3};
+
+use super::measures::{Measures, polar};
+use super::{Blueprint, Feature, PartError};
+use domecast_mesh::{Fit, Profile, Shape};
+
+pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
+    let lower = &m.platforms.lower;
+    let (top, bottom, over) = (m.lower_top_z_mm, lower.underside_z_mm, m.overcut_mm);
+    let h = 0.5 * m.outer_mm;
+    let mut b = Blueprint::new(
+        "lower_platform",
+        "lower platform: camera bore, clamp, magnet pockets, mounting holes, cable exit; printed",
+        m.chord,
+    );
+    // A bore is crossed by what leads into it; push-out holes may end in the
+    // cable's channel.
+    b.may_meet =
+        &[("camera bore", "clamp hole"), ("camera bore", "cable exit"), ("push-out hole", "cable exit")];
+    if top <= bottom {
+        return Err(b.infeasible(
+            "height",
+            top - bottom,
+            m.process.min_wall_mm,
+            "platforms.lower.underside_z_mm",
+        ));
+    }
+    b.added.push(Feature::new(
+        "block",
+        "platforms.outer_mm",
+        Shape::cuboid(DVec3::new(-h.x, -h.y, bottom), DVec3::new(h.x, h.y, top)),
+    ));
+
+    // The bore follows the camera's own axis, through the whole block.
+    let reach = 2.0 * (h.length() + (top - bottom) + m.pupil_mm().length());
+    let bore = Shape::cylinder(m.bore_radius_mm(), -reach, reach, Fit::Outside);
+    b.cut.push(
+        Feature::new("camera bore", "camera_body.bore_clearance_mm", bore).placed(m.sensor_from_camera),
+    );
+    b.genus += 1;
+
+    let clamp = &lower.clamp;
+    for (i, &azimuth_deg) in clamp.azimuth_deg.iter().enumerate() {
+        let outwards = DAffine3::from_translation(m.pupil_mm().with_z(clamp.z_mm))
+            * DAffine3::from_rotation_z(azimuth_deg.to_radians())
+            * DAffine3::from_rotation_y(std::f64::consts::FRAC_PI_2);
+        // From inside the bore, but not so far in that two of them meet there.
+        let hole =
+            Shape::cylinder(0.5 * clamp.hole_diameter_mm, 0.5 * m.bore_radius_mm(), reach, Fit::Outside);
+        let feature = Feature::new("clamp hole", "platforms.lower.clamp", hole);
+        b.cut.push(feature.numbered(i).placed(outwards));
+        b.genus += 1;
+    }
+
+    m.cut_magnet_pockets(&mut b, top, bottom - over);
+
+    let mounting = &lower.mounting;
+    for (i, at) in mounting.at_mm.iter().enumerate() {
+        let (hole, head) = (0.5 * mounting.hole_diameter_mm, 0.5 * mounting.counterbore_diameter_mm);
+        let profile = if head > hole && mounting.counterbore_depth_mm > 0.0 {
+            let step = top - mounting.counterbore_depth_mm;
+            if step <= bottom {
+                return Err(b.infeasible(
+                    format!("floor under counterbore {i}"),
+                    step - bottom,
+                    m.process.min_wall_mm,
+                    "platforms.lower.mounting.counterbore_depth_mm",
+                ));
+            }
+            Profile::lines(&[(hole, bottom - over), (hole, step), (head, step), (head, top + over)])
+        } else {
+            Profile::lines(&[(hole, bottom - over), (hole, top + over)])
+        };
+        let shape = Shape::Turned { profile, fit: Fit::Outside };
+        let feature = Feature::new("mounting hole", "platforms.lower.mounting", shape);
+        b.cut.push(feature.numbered(i).at(at[0], at[1]));
+        b.genus += 1;
+    }
+
+    if lower.wire_hole_diameter_mm > 0.0 {
+        for (i, led) in m.leds.list.iter().enumerate() {
+            let at = polar(lower.wire_hole_ring_radius_mm, led.azimuth_deg);
+            let hole =
+                Shape::cylinder(0.5 * lower.wire_hole_diameter_mm, bottom - over, top + over, Fit::Area);
+            let feature = Feature::new("wire hole", "platforms.lower.wire_hole_ring_radius_mm", hole);
+            b.cut.push(feature.numbered(i).at(at.x, at.y));
+            b.genus += 1;
+        }
+    }
+
+    let exit = &lower.cable_exit;
+    if exit.width_mm > 0.0 && exit.height_mm > 0.0 {
+        let roof = top - bottom - exit.height_mm;
+        if roof <= 0.0 || roof < m.process.min_wall_mm {
+            let field = "platforms.lower.cable_exit.height_mm";
+            return Err(b.infeasible("roof over the cable exit", roof, m.process.min_wall_mm, field));
+        }
+        // Open below and joined to the bore: a notch, no handle.
+        let w = 0.5 * exit.width_mm;
+        let channel =
+            Shape::cuboid(DVec3::new(0.0, -w, bottom - over), DVec3::new(reach, w, bottom + exit.height_mm));
+        let turn = DAffine3::from_translation(m.pupil_mm().with_z(0.0))
+            * DAffine3::from_rotation_z(exit.azimuth_deg.to_radians());
+        b.cut.push(Feature::new("cable exit", "platforms.lower.cable_exit", channel).placed(turn));
+    }
+    Ok(b)
+}

@@ -1,0 +1,188 @@
+//! The parts that are printed, cut and cast, as exact solids and as meshes.
+//!
+//! Every dimension comes from the resolved design through [`Measures`]; a part
+//! is first a [`Construction`] of exact shapes, then a mesh. What a part should
+//! be is stated beside it, from the count of its features and not from the
+//! mesh: the number of handles ([`Part::genus`]) is checked against the mesh by
+//! [`Part::check`], and again by independent programs that read the written
+//! file.
+//!
+//! Frames: the platforms are in the sensor frame at rest, the mould has its own
+//! with the parting plane at z = 0 and the cavity below.
+
+mod accessories;
+mod assembly;
+mod bom;
+mod bought;
+mod checks;
+mod drawing;
+mod error;
+mod feature;
+mod files;
+mod lower;
+mod measures;
+mod mould;
+mod poses;
+mod process;
+mod sight;
+mod undercut;
+mod upper;
+mod view;
+mod walls;
+
+#[cfg(test)]
+pub(crate) mod tests;
+
+use std::io::{self, Write};
+
+use glam::DAffine3;
+use rayon::prelude::*;
+
+pub use assembly::{Assembly, Item};
+pub use checks::check_assembly;
+pub use error::PartError;
+use feature::{Blueprint, Feature};
+pub use files::{PartFile, files};
+pub use measures::Measures;
+pub use poses::Pose;
+pub use sight::{EdgeRay, MarkerView, markers_of};
+pub use view::ViewCone;
+
+use crate::layout::Hit;
+use crate::spec::sections::LedsSection;
+use domecast_mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, write_stl};
+
+/// One part, ready to be written.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// Name, also of its files: `upper_platform`.
+    pub name: String,
+    /// One line on what it is and what it is made of.
+    pub summary: &'static str,
+    /// The exact shapes that it is made of.
+    pub construction: Construction,
+    /// Tolerance that the mesh was made with.
+    pub chord_tolerance_mm: f64,
+    /// The mesh as a reader of the STL gets it: vertices rounded to `f32` and
+    /// welded.
+    pub mesh: TriMesh,
+    /// Volume before rounding to `f32`, mm^3.
+    pub volume_mm3: f64,
+    /// Surface, mm^2.
+    pub area_mm2: f64,
+    /// Handles that the part has by the count of its holes.
+    pub genus: i64,
+    /// Box of the mesh.
+    pub bounds: BoundingBox,
+}
+
+type Maker = fn(&Measures) -> Result<Blueprint, PartError>;
+
+impl Blueprint {
+    /// Meshes the part, checks its walls, and looks at what came out.
+    fn build(&self, m: &Measures) -> Result<Part, PartError> {
+        let construction = self.construction();
+        let made = construction.solid(self.chord).map(|solid| solid.to_mesh());
+        // First the walls: they tell better what is wrong with a part that cannot be made.
+        walls::check(self, m, made.as_ref().ok())?;
+        let in_f64 = made.map_err(|error| PartError::Mesh { part: self.name.clone(), error })?;
+        let mesh = in_f64.welded_f32();
+        let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
+        let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
+        let genus = match inspect(&mesh).genus() {
+            Some(found) if self.genus_is_least => found.max(self.genus),
+            _ => self.genus,
+        };
+        let part = Part {
+            name: self.name.clone(),
+            summary: self.summary,
+            construction,
+            chord_tolerance_mm: self.chord.tolerance_mm(),
+            volume_mm3: in_f64.volume_mm3(),
+            area_mm2: in_f64.area_mm2(),
+            genus,
+            bounds,
+            mesh,
+        };
+        part.check()?;
+        Ok(part)
+    }
+}
+
+impl Part {
+    /// Looks at the welded mesh.
+    pub fn inspect(&self) -> Inspection {
+        inspect(&self.mesh)
+    }
+
+    /// One closed solid with the handles that were designed?
+    ///
+    /// # Errors
+    /// [`PartError::Broken`] with what is wrong.
+    pub fn check(&self) -> Result<(), PartError> {
+        let found = self.inspect();
+        let problem = found.problem().or_else(|| {
+            let genus = found.genus()?;
+            (genus != self.genus).then(|| {
+                format!(
+                    "its mesh has {genus} handles, its features make {}: features touch or miss",
+                    self.genus
+                )
+            })
+        });
+        match problem {
+            None => Ok(()),
+            Some(problem) => Err(PartError::Broken { part: self.name.clone(), problem }),
+        }
+    }
+
+    /// Writes the mesh as binary STL.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_stl(&self, writer: &mut impl Write) -> io::Result<()> {
+        write_stl(&self.mesh, writer)
+    }
+}
+
+/// The upper platform as exact shapes in the sensor frame, before any mesh: what stands in the way of the lights.
+///
+/// # Errors
+/// A platform that the design cannot have.
+pub fn upper_platform(measures: &Measures) -> Result<Construction, PartError> {
+    Ok(upper::blueprint(measures)?.construction())
+}
+
+/// Pose of LED `i`: origin at the centre of its emitting face, x across the board, y up the board, z out of the
+/// emitting face; sensor frame.
+pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
+    upper::platform_from_led(leds, i)
+}
+
+/// Makes all parts, in a fixed order, and checks each against the process. One
+/// pad-printing jig is made for each hit.
+///
+/// # Errors
+/// The first part, in that order, that cannot be made.
+pub fn build(m: &Measures, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
+    let makers: [Maker; 7] = [
+        upper::blueprint,
+        lower::blueprint,
+        mould::cavity,
+        mould::base,
+        accessories::sheet,
+        accessories::stencil,
+        accessories::coupon,
+    ];
+    let jig = |i: usize| {
+        let name = if hits.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") };
+        hits.get(i).map(|hit| accessories::jig(m, &name, hit))
+    };
+    (0..makers.len() + hits.len())
+        .into_par_iter()
+        .filter_map(|i| makers.get(i).map(|make| make(m)).or_else(|| jig(i - makers.len())))
+        .map(|blueprint| blueprint?.build(m))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .collect()
+}

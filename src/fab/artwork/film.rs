@@ -1,0 +1,296 @@
+//! The film of one hit: dots, registration and notes on a sheet at 1:1.
+//!
+//! Two transfers (plate to pad, pad to part) cancel: the plate seen from above reads like the part seen from
+//! outside, and nothing is mirrored. The camera, inside, sees the mirror image of both.
+
+use glam::DVec2;
+
+use super::drawing::{Anchor, Drawing, Ink, Item, Layer, NotFinite, Path, Shape};
+use domecast_design::layout::Layout;
+use domecast_design::layout::outline::Outline;
+use domecast_design::layout::target::TargetMark;
+use domecast_design::transfer::TransferMap;
+
+/// Half the length of a registration cross, mm.
+const CROSS_ARM_MM: f64 = 1.5;
+/// Width of the lines of crosses and scale bar, mm: what films and plates hold surely.
+const LINE_MM: f64 = 0.1;
+/// Free space between the pad's footprint and anything else, and around the sheet, mm.
+const MARGIN_MM: f64 = 1.0;
+/// Length of the scale bar, mm.
+const SCALE_BAR_MM: f64 = 10.0;
+/// Height of the chiral mark, mm.
+const CHIRAL_MM: f64 = 3.0;
+/// Height of the capitals of notes, mm, and the distance of their lines.
+const TEXT_MM: f64 = 1.0;
+const TEXT_LINE_MM: f64 = 1.9;
+/// Width of the notes, mm, and the characters that surely fit: the lettering takes 0.92 mm each.
+const NOTES_WIDTH_MM: f64 = 40.0;
+const NOTES_CHARACTERS: usize = 40;
+
+/// What the notes of a film say beside what the layout knows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FilmLabel {
+    /// The design's name.
+    pub design: String,
+    /// The design's hash, in hexadecimal digits.
+    pub hash: String,
+}
+
+impl FilmLabel {
+    /// As much of the hash as a person compares.
+    fn short_hash(&self) -> &str {
+        self.hash.get(..12).unwrap_or(&self.hash)
+    }
+}
+
+/// The film of one hit of a layout.
+///
+/// `pad_over_image` is the pad's footprint over the picture's diameter.
+///
+/// # Errors
+/// A coordinate is not finite.
+pub fn film(
+    layout: &Layout,
+    hit: usize,
+    pad_over_image: f64,
+    label: &FilmLabel,
+) -> Result<Drawing, NotFinite> {
+    let dots = layout.dots.iter().filter(|dot| dot.hit == hit);
+    let marks: Vec<Mark<'_>> =
+        dots.map(|dot| Mark { id: dot.id, plate_mm: dot.plate_mm, outline: &dot.plate_outline }).collect();
+    let films = layout.hits.len();
+    let (tilt_deg, azimuth_deg) = layout
+        .hits
+        .get(hit)
+        .map_or((0.0, 0.0), |hit| (hit.tilt_rad.to_degrees(), hit.azimuth_rad.to_degrees()));
+    let jig = if tilt_deg == 0.0 {
+        "pole upright".to_owned()
+    } else {
+        format!("jig {tilt_deg:.2} deg: the dome's azimuth {azimuth_deg:.2} deg is tilted up to the pad")
+    };
+    Film {
+        name: format!("film {} of {films}", hit + 1),
+        shape: "dot",
+        first_note: format!("film {} of {films}: {} dots, {jig}", hit + 1, marks.len()),
+        marks,
+        facts: vec![
+            ("film".into(), format!("{} of {films}", hit + 1)),
+            ("tilt-deg".into(), tilt_deg.to_string()),
+            ("azimuth-deg".into(), azimuth_deg.to_string()),
+        ],
+        further_notes: Vec::new(),
+    }
+    .drawing(&layout.transfer, pad_over_image, label)
+}
+
+/// The film of the test target by which a pad's map is measured.
+///
+/// # Errors
+/// A coordinate is not finite.
+pub fn target_film(
+    target: &[TargetMark],
+    transfer: &TransferMap,
+    pad_over_image: f64,
+    label: &FilmLabel,
+) -> Result<Drawing, NotFinite> {
+    let marks = target
+        .iter()
+        .map(|mark| Mark { id: mark.id, plate_mm: mark.plate_mm, outline: &mark.outline })
+        .collect();
+    Film {
+        name: "print target".to_owned(),
+        shape: "mark",
+        marks,
+        first_note: format!("test target: {} marks, pole upright", target.len()),
+        facts: vec![("film".into(), "print target".into())],
+        further_notes: vec![
+            "Mark 0 is the pole; rings of 6, 12, 18 .. marks follow, numbered counter-clockwise from the large \
+             marks along +x. Print it, measure each mark from outside (id,x_mm,y_mm, pole at the origin), and run \
+             domecast calibrate-print."
+                .to_owned(),
+        ],
+    }
+    .drawing(transfer, pad_over_image, label)
+}
+
+/// A mark of a film.
+struct Mark<'a> {
+    id: u32,
+    plate_mm: DVec2,
+    outline: &'a Outline,
+}
+
+/// What differs from film to film.
+struct Film<'a> {
+    name: String,
+    shape: &'static str,
+    marks: Vec<Mark<'a>>,
+    first_note: String,
+    facts: Vec<(String, String)>,
+    further_notes: Vec<String>,
+}
+
+impl Film<'_> {
+    fn drawing(
+        self,
+        transfer: &TransferMap,
+        pad_over_image: f64,
+        label: &FilmLabel,
+    ) -> Result<Drawing, NotFinite> {
+        let mut layer = Layer::new("dots");
+        for mark in &self.marks {
+            layer.items.push(Item::Shape(Shape {
+                id: format!("{}-{}", self.shape, mark.id),
+                facts: vec![
+                    ("id".into(), mark.id.to_string()),
+                    ("x-mm".into(), mark.plate_mm.x.to_string()),
+                    ("y-mm".into(), mark.plate_mm.y.to_string()),
+                ],
+                path: Path::of_outline(mark.outline)?,
+                ink: Ink::Fill,
+            }));
+        }
+        let footprint_mm = pad_over_image * picture_radius_mm(self.marks.iter().map(|mark| mark.outline));
+        let map = match transfer.correction() {
+            None => transfer.nominal().as_str().to_owned(),
+            Some(_) => format!("{}, corrected by measurement", transfer.nominal().as_str()),
+        };
+        let mut notes = vec![
+            format!("{}  sha256 {}", label.design, label.short_hash()),
+            self.first_note,
+            format!("1:1 in mm, positive: black is ink; map {map}"),
+            "Seen from above the plate, with the F upright and unmirrored: reads like the part seen from outside, \
+             x to the right, y up. The camera inside sees the mirror image. Do not mirror."
+                .to_owned(),
+        ];
+        notes.extend(self.further_notes);
+        let notes = wrapped(&notes);
+        let sheet = Sheet::new(footprint_mm, notes.len());
+        let mut facts = vec![
+            ("design".into(), label.design.clone()),
+            ("design-sha256".into(), label.hash.clone()),
+            ("frame".into(), "plate: origin under the pole, seen from above, y up, mm".into()),
+            ("map".into(), map),
+            ("pad-footprint-radius-mm".into(), footprint_mm.to_string()),
+        ];
+        facts.extend(self.facts);
+        Ok(Drawing {
+            title: format!("{} {}", label.design, self.name),
+            description: format!(
+                "Pad-print film of {} ({}), 1:1 in mm, seen from above the plate, y up. One user unit is 1 mm; a \
+                 plate point (x, y) is drawn at (x, -y). Reads like the part seen from outside; do not mirror.",
+                label.design, label.hash
+            ),
+            page_mm: sheet.page_mm(),
+            facts,
+            layers: vec![layer, sheet.registration()?, sheet.notes(&notes)?],
+        })
+    }
+}
+
+/// Breaks lines between words where they would not fit.
+fn wrapped(paragraphs: &[String]) -> Vec<String> {
+    let mut lines = Vec::new();
+    for paragraph in paragraphs {
+        let mut line = String::new();
+        for word in paragraph.split(' ') {
+            if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > NOTES_CHARACTERS {
+                lines.push(std::mem::take(&mut line));
+            }
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+        lines.push(line);
+    }
+    lines
+}
+
+/// Radius of the circle around the stroke's axis that holds all outlines, mm.
+pub fn picture_radius_mm<'a>(outlines: impl Iterator<Item = &'a Outline>) -> f64 {
+    outlines.flat_map(|outline| outline.polygon(4)).map(|p| p.length()).fold(0.0, f64::max)
+}
+
+/// What surrounds the picture: crosses, scale bar, chiral mark, notes.
+pub(super) struct Sheet {
+    footprint_mm: f64,
+    /// Crosses stand at (+-cross, +-cross).
+    cross_mm: f64,
+    half_width_mm: f64,
+    top_mm: f64,
+    lines: usize,
+}
+
+impl Sheet {
+    pub(super) fn new(footprint_mm: f64, lines: usize) -> Self {
+        // The arm's end nearest to the centre, (c - arm, c), lies one margin outside the footprint.
+        let clear = footprint_mm + MARGIN_MM;
+        let cross_mm =
+            0.5 * (CROSS_ARM_MM + (2.0 * clear * clear - CROSS_ARM_MM * CROSS_ARM_MM).max(0.0).sqrt());
+        let top_mm = clear.max(cross_mm + CROSS_ARM_MM + MARGIN_MM);
+        Self { footprint_mm, cross_mm, half_width_mm: top_mm.max(0.5 * NOTES_WIDTH_MM), top_mm, lines }
+    }
+
+    /// Top of the notes.
+    fn notes_top_mm(&self) -> f64 {
+        -self.top_mm - MARGIN_MM
+    }
+
+    pub(super) fn page_mm(&self) -> (DVec2, DVec2) {
+        let notes_mm = CHIRAL_MM + 2.0 * MARGIN_MM + TEXT_LINE_MM * self.lines as f64;
+        let low = DVec2::new(-self.half_width_mm, self.notes_top_mm() - notes_mm);
+        (low, DVec2::new(self.half_width_mm, self.top_mm))
+    }
+
+    pub(super) fn registration(&self) -> Result<Layer, NotFinite> {
+        let mut layer = Layer::new("registration");
+        for (x, y) in [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)] {
+            let at = DVec2::new(x, y) * self.cross_mm;
+            for arm in [DVec2::X, DVec2::Y] {
+                let line = [at - arm * CROSS_ARM_MM, at + arm * CROSS_ARM_MM];
+                layer.draw(Path::polyline(&line, false)?, Ink::Line(LINE_MM));
+            }
+        }
+        let base = DVec2::new(-0.5 * NOTES_WIDTH_MM + MARGIN_MM, self.notes_top_mm() - CHIRAL_MM);
+        for (from, to) in [
+            (DVec2::ZERO, DVec2::new(SCALE_BAR_MM, 0.0)),
+            (DVec2::new(0.0, -0.75), DVec2::new(0.0, 0.75)),
+            (DVec2::new(SCALE_BAR_MM, -0.75), DVec2::new(SCALE_BAR_MM, 0.75)),
+        ] {
+            layer.draw(Path::polyline(&[base + from, base + to], false)?, Ink::Line(LINE_MM));
+        }
+        let mark = DVec2::new(0.5 * NOTES_WIDTH_MM - MARGIN_MM - 0.6 * CHIRAL_MM, base.y);
+        // The letter F, in units of its height: no turn or mirror image of it looks the same.
+        let letter = [
+            (0.0, 0.0),
+            (0.2, 0.0),
+            (0.2, 0.4),
+            (0.5, 0.4),
+            (0.5, 0.6),
+            (0.2, 0.6),
+            (0.2, 0.8),
+            (0.6, 0.8),
+            (0.6, 1.0),
+            (0.0, 1.0),
+        ]
+        .map(|(x, y)| mark + DVec2::new(x, y) * CHIRAL_MM);
+        layer.draw(Path::polyline(&letter, true)?, Ink::Fill);
+        debug_assert!(self.cross_mm.hypot(self.cross_mm - CROSS_ARM_MM) >= self.footprint_mm);
+        Ok(layer)
+    }
+
+    pub(super) fn notes(&self, lines: &[String]) -> Result<Layer, NotFinite> {
+        let mut layer = Layer::new("notes");
+        let left = -0.5 * NOTES_WIDTH_MM + MARGIN_MM;
+        let base = self.notes_top_mm() - CHIRAL_MM;
+        let bar_end = DVec2::new(left + SCALE_BAR_MM + MARGIN_MM, base - 0.5 * TEXT_MM);
+        layer.write(bar_end, TEXT_MM, Anchor::Start, format!("{SCALE_BAR_MM} mm"));
+        for (i, words) in lines.iter().enumerate() {
+            let at = DVec2::new(left, base - MARGIN_MM - TEXT_LINE_MM * (i as f64 + 0.5) - TEXT_MM);
+            layer.write(at, TEXT_MM, Anchor::Start, words.clone());
+        }
+        Ok(layer)
+    }
+}

@@ -1,0 +1,108 @@
+//! What a print shop gets: films as drawings, their writers, and pictures of the result.
+//!
+//! A [`Drawing`] is a resolved tree in millimetres, y up; [`film`] makes one for each hit of a layout, and
+//! each writer spells it in its format without deciding anything.
+
+mod camera_view;
+pub mod canvas;
+pub mod drawing;
+mod dxf_file;
+mod film;
+mod outside_view;
+mod pdf_file;
+pub mod strokes;
+mod svg_file;
+#[cfg(test)]
+mod tests;
+mod tiff_file;
+
+use std::fmt;
+
+pub use camera_view::camera_view;
+pub use drawing::Drawing;
+pub use dxf_file::to_dxf;
+pub use film::{FilmLabel, film, target_film};
+pub use outside_view::outside_view;
+pub use pdf_file::to_pdf;
+pub use svg_file::to_svg;
+pub use tiff_file::to_tiff;
+
+use domecast_design::layout::target::print_target;
+use domecast_design::layout::{Layout, LayoutSpec};
+
+/// A file of the artwork.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ArtworkFile {
+    /// Path in the build, with `/`: `artwork/dots.svg`.
+    pub path: String,
+    /// Content.
+    pub bytes: Vec<u8>,
+}
+
+/// Artwork that could not be drawn. None of these follows from a resolved design.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RenderError {
+    /// A coordinate is not a finite number.
+    NotFinite,
+    /// A picture has no size that can be drawn.
+    Size,
+    /// A library could not write the picture.
+    Encode(String),
+}
+
+impl fmt::Display for RenderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite => write!(f, "a coordinate of the drawing is not a finite number"),
+            Self::Size => write!(f, "the picture has no size that can be drawn"),
+            Self::Encode(what) => write!(f, "the picture could not be written: {what}"),
+        }
+    }
+}
+
+impl std::error::Error for RenderError {}
+
+impl From<drawing::NotFinite> for RenderError {
+    fn from(_: drawing::NotFinite) -> Self {
+        Self::NotFinite
+    }
+}
+
+/// Path of the film of a hit in a build, for a kind of file (`svg`): `artwork/dots.svg` for the first hit,
+/// `artwork/dots-2.svg` for the second.
+pub fn film_path(hit: usize, kind: &str) -> String {
+    if hit == 0 { format!("artwork/dots.{kind}") } else { format!("artwork/dots-{}.{kind}", hit + 1) }
+}
+
+/// All artwork of a layout, in a fixed order.
+///
+/// # Errors
+/// See [`RenderError`].
+pub fn files(spec: &LayoutSpec, layout: &Layout, label: &FilmLabel) -> Result<Vec<ArtworkFile>, RenderError> {
+    let mut files = Vec::new();
+    for hit in 0..layout.hits.len() {
+        let drawing = film(layout, hit, spec.print.pad_over_image, label)?;
+        files.extend(film_files(&drawing, |kind| film_path(hit, kind), spec)?);
+    }
+    let target = print_target(&layout.transfer, &spec.print);
+    let drawing = target_film(&target, &layout.transfer, spec.print.pad_over_image, label)?;
+    files.extend(film_files(&drawing, |kind| format!("artwork/print-target.{kind}"), spec)?);
+    files.push(ArtworkFile { path: "artwork/camera-view.png".into(), bytes: camera_view(spec, layout)? });
+    files.push(ArtworkFile { path: "artwork/outside-view.png".into(), bytes: outside_view(layout)? });
+    Ok(files)
+}
+
+/// One film in every format.
+fn film_files(
+    drawing: &Drawing,
+    path: impl Fn(&str) -> String,
+    spec: &LayoutSpec,
+) -> Result<[ArtworkFile; 4], RenderError> {
+    let file = |kind: &str, bytes: Vec<u8>| ArtworkFile { path: path(kind), bytes };
+    Ok([
+        file("svg", to_svg(drawing)),
+        file("pdf", to_pdf(drawing)?),
+        file("dxf", to_dxf(drawing, spec.print.outline_mm())?),
+        file("tif", to_tiff(drawing, spec.print.dpi)?),
+    ])
+}

@@ -1,0 +1,152 @@
+//! What a build wrote, from which design, with what warnings.
+
+use std::fs;
+use std::path::{Component, Path};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::tree::Tree;
+use domecast_design::DesignError;
+
+/// The manifest's name in the folder of a build.
+pub const MANIFEST_NAME: &str = "manifest.json";
+/// The exact copy of the design file, in the folder of a build.
+pub const DESIGN_NAME: &str = "design.json";
+/// Marks the file for readers.
+const FORMAT: &str = "domecast-manifest";
+/// Raised when a reader of an earlier version would misread the file.
+const VERSION: u32 = 1;
+
+/// The manifest of a build.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Always `domecast-manifest`.
+    pub format: String,
+    /// Version of this file's form.
+    pub version: u32,
+    /// The release of domecast that wrote it.
+    pub domecast: String,
+    /// The design that it was made from.
+    pub design: DesignRecord,
+    /// The meshes, with what a checker should find in them.
+    pub parts: Vec<PartRecord>,
+    /// What the maker should look at, each with the field to change.
+    pub warnings: Vec<Warning>,
+    /// Every file but this one, by path.
+    pub files: Vec<FileRecord>,
+}
+
+/// The design of a build; the file itself stands beside the manifest as `design.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DesignRecord {
+    /// Its name.
+    pub name: String,
+    /// SHA-256 of the design file's bytes, hexadecimal.
+    pub sha256: String,
+}
+
+/// What a mesh must turn out to be when it is read back.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PartRecord {
+    /// Name of the part.
+    pub name: String,
+    /// Its mesh, relative to the folder.
+    pub file: String,
+    /// Volume of the mesh, mm^3.
+    pub volume_mm3: f64,
+    /// Number of handles of the surface.
+    pub genus: i64,
+    /// Lowest and highest corner, mm, in the part's own frame.
+    pub bbox_mm: [[f64; 3]; 2],
+}
+
+/// One file of a build.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileRecord {
+    /// Path relative to the folder, with `/`.
+    pub path: String,
+    /// Size in bytes.
+    pub bytes: u64,
+    /// SHA-256, hexadecimal.
+    pub sha256: String,
+}
+
+impl FileRecord {
+    /// Whether the path stays in the folder: a manifest that was tampered with must not lead out of it.
+    pub fn is_inside(&self) -> bool {
+        Path::new(&self.path).components().all(|part| matches!(part, Component::Normal(_)))
+    }
+
+    /// Whether this is the file as it was written.
+    pub fn is_of(&self, bytes: &[u8]) -> bool {
+        bytes.len() as u64 == self.bytes && sha256_hex(bytes) == self.sha256
+    }
+}
+
+/// Something that does not stop a build but that its maker should know.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Warning {
+    /// The design field to change, as a path.
+    pub field: String,
+    /// What is the matter, with numbers.
+    pub message: String,
+}
+
+impl Manifest {
+    /// The manifest of the files in `tree`.
+    pub fn new(design: DesignRecord, parts: Vec<PartRecord>, warnings: Vec<Warning>, tree: &Tree) -> Self {
+        let files = tree
+            .files()
+            .map(|(path, bytes)| FileRecord {
+                path: path.to_owned(),
+                bytes: bytes.len() as u64,
+                sha256: sha256_hex(bytes),
+            })
+            .collect();
+        Self {
+            format: FORMAT.into(),
+            version: VERSION,
+            domecast: env!("CARGO_PKG_VERSION").into(),
+            design,
+            parts,
+            warnings,
+            files,
+        }
+    }
+
+    /// Reads the manifest of a folder, which must be `allowed`.
+    ///
+    /// # Errors
+    /// No folder, no manifest in it, or one of another kind.
+    pub fn read(dir: &Path, allowed: &str) -> Result<Self, DesignError> {
+        let path = dir.join(MANIFEST_NAME);
+        let fault = |problem: String| {
+            DesignError::at("", "", problem, format!("{allowed}, with its {MANIFEST_NAME}")).in_file(&path)
+        };
+        let text = fs::read_to_string(&path)
+            .map_err(|error| fault(format!("nothing can be read here ({error})")))?;
+        Self::parse(&text).map_err(fault)
+    }
+
+    /// Reads a manifest's text.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong with it.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let manifest: Self =
+            serde_json::from_str(text).map_err(|error| format!("is not a manifest: {error}"))?;
+        if manifest.format != FORMAT || manifest.version != VERSION {
+            return Err(format!(
+                "has format \"{}\" version {}; this release reads \"{FORMAT}\" version {VERSION}",
+                manifest.format, manifest.version
+            ));
+        }
+        Ok(manifest)
+    }
+}
+
+/// SHA-256 of `bytes`, hexadecimal.
+pub fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,340 @@
+//! The main job: from a design to the folder with everything that is needed to make the sensor.
+//!
+//! [`build`] makes all files in memory, [`Tree::write`] puts them in place whole, and [`check::check`]
+//! reads them again. The only things shared between artwork, parts and constants are the resolved design
+//! and its layout; that is why they agree.
+
+pub mod check;
+mod manifest;
+mod measured;
+mod tree;
+
+pub use manifest::{
+    DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning, sha256_hex,
+};
+pub use measured::Measured;
+pub use tree::{Tree, WriteError, list_files};
+
+use std::fmt;
+
+use crate::artwork;
+use crate::artwork::{FilmLabel, RenderError};
+use crate::constants;
+use crate::report;
+use domecast_design::layout::report::LayoutReport;
+use domecast_design::layout::{Layout, LayoutError, LayoutSpec};
+use domecast_design::parts;
+use domecast_design::parts::PartError;
+use domecast_design::settings::SAFETY;
+use domecast_design::{Design, DesignError};
+use domecast_design::{claims_of, suspension_of};
+use domecast_optics::numeric::Rigid;
+use domecast_springs::Check;
+
+/// Why a build could not be made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum BuildError {
+    /// The design is at fault.
+    Design(Box<DesignError>),
+    /// A library failed on something that every resolved design should allow: domecast is at fault.
+    Ours(String),
+}
+
+impl From<DesignError> for BuildError {
+    fn from(error: DesignError) -> Self {
+        Self::Design(Box::new(error))
+    }
+}
+
+impl From<LayoutError> for BuildError {
+    fn from(error: LayoutError) -> Self {
+        DesignError::from(error).into()
+    }
+}
+
+impl From<RenderError> for BuildError {
+    fn from(error: RenderError) -> Self {
+        match error {
+            RenderError::Size => DesignError::at(
+                "print.dpi",
+                "",
+                "the film would be wider or higher than 60000 px at this resolution",
+                "a lower resolution, or a smaller dome",
+            )
+            .into(),
+            error => Self::Ours(format!("the artwork could not be drawn: {error}")),
+        }
+    }
+}
+
+impl From<PartError> for BuildError {
+    fn from(error: PartError) -> Self {
+        DesignError::from(error).into()
+    }
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Design(error) => error.fmt(f),
+            Self::Ours(what) => f.write_str(what),
+        }
+    }
+}
+
+impl std::error::Error for BuildError {}
+
+/// Everything that a build writes.
+#[derive(Debug)]
+pub struct Build {
+    /// The files, the manifest among them.
+    pub tree: Tree,
+    /// The manifest.
+    pub manifest: Manifest,
+    /// Number of dots.
+    pub dot_count: usize,
+    /// What the layout comes to, a sentence each.
+    pub headlines: Vec<String>,
+}
+
+impl Build {
+    /// Lets an open page see that it is out of date: adds the script that asks, and what it asks for. The files
+    /// of a watched build differ from those of a plain one in this alone.
+    pub fn keep_fresh(&mut self) {
+        const PAGE: &str = "report/index.html";
+        const STAMP: &str = "report/fresh-stamp.js";
+        let page = self.tree.files().find(|(path, _)| *path == PAGE).map(|(_, bytes)| bytes.to_vec());
+        let Some(page) = page.and_then(|bytes| String::from_utf8(bytes).ok()) else { return };
+        self.tree.add(PAGE, report::watched(&page).into_bytes());
+        self.tree.add(STAMP, report::stamp(&self.manifest.design.sha256).into_bytes());
+        // the manifest lists all files but itself
+        self.tree.remove(MANIFEST_NAME);
+        let Manifest { design, parts, warnings, .. } = self.manifest.clone();
+        self.manifest = Manifest::new(design, parts, warnings, &self.tree);
+        self.tree.add(MANIFEST_NAME, pretty(&self.manifest));
+    }
+}
+
+/// Makes everything; `step` is told what is being made. Nothing is written to the disk.
+///
+/// # Errors
+/// The first fault of the design that only shows when it is laid out, loaded or made.
+pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, BuildError> {
+    build_with(design, None, step)
+}
+
+/// [`build`] with what was measured of the design, which goes into the report.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_with(
+    design: &Design,
+    measured: Option<&Measured>,
+    step: &mut dyn FnMut(&str),
+) -> Result<Build, BuildError> {
+    make(design, measured, step).map_err(|error| match error {
+        BuildError::Design(error) => design.beside_suspicions(with_value(design, *error)).into(),
+        ours @ BuildError::Ours(_) => ours,
+    })
+}
+
+fn make(
+    design: &Design,
+    measured: Option<&Measured>,
+    step: &mut dyn FnMut(&str),
+) -> Result<Build, BuildError> {
+    let mut tree = Tree::default();
+    for (path, bytes) in measured.map_or(&[][..], Measured::files) {
+        tree.add(path.as_str(), bytes.clone());
+    }
+    let mut warnings: Vec<Warning> = design
+        .warnings()
+        .iter()
+        .map(|warning| Warning { field: warning.field.clone(), message: warning.message.clone() })
+        .collect();
+    tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
+    let sha256 = sha256_hex(design.text().as_bytes());
+
+    step("trying the claimed loads");
+    let sight = try_claims(design)?;
+    step("laying out the dots");
+    let (spec, layout) = lay_out(design)?;
+    step("writing the constants");
+    let springs = constants::springs_of(design, sight)?;
+    let constants = constants::with_springs(design, &layout, &springs)?;
+    tree.add("constants/constants.json", constants.to_json().into_bytes());
+    // four pieces of work that share nothing but what they read, on as many threads as there are
+    step("drawing the artwork, making the parts, driving the loads to their limits");
+    let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
+    let ((films, judged), (parts, forces)) = rayon::join(
+        || {
+            rayon::join(
+                || artwork::files(&spec, &layout, &label),
+                || LayoutReport::new(design, &spec, &layout),
+            )
+        },
+        || {
+            rayon::join(
+                || make_parts(design, &layout, &springs),
+                || constants::force_report(design, &springs),
+            )
+        },
+    );
+    for file in films? {
+        tree.add(file.path, file.bytes);
+    }
+    tree.add("artwork/layout.json", pretty(&judged));
+    let MadeParts { made, files, poses } = parts?;
+    for file in files {
+        tree.add(file.path, file.bytes);
+    }
+    let records = made
+        .iter()
+        .map(|part| PartRecord {
+            name: part.name.clone(),
+            file: format!("parts/{}.stl", part.name),
+            volume_mm3: part.volume_mm3,
+            genus: part.genus,
+            bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
+        })
+        .collect();
+    let forces = forces?;
+    for (path, text) in forces.files() {
+        tree.add(path, text.into_bytes());
+    }
+    step("writing what other programs read");
+    tree.add(
+        "constants/constants.schema.json",
+        domecast_runtime::constants::Constants::schema().into_bytes(),
+    );
+    let forms = constants::formats::format_files(design, &constants, &made);
+    for (path, text) in forms.files {
+        tree.add(path, text.into_bytes());
+    }
+    warnings.extend(forms.left_out.into_iter().map(|message| Warning { field: "constants".into(), message }));
+    warnings.extend(
+        judged.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
+    );
+
+    step("writing the page");
+    let told: Vec<(String, String)> =
+        warnings.iter().map(|warning| (warning.field.clone(), warning.message.clone())).collect();
+    let page = report::page(&report::Subject {
+        design,
+        layout: &layout,
+        judged: &judged,
+        constants: &constants,
+        forces: &forces,
+        parts: &made,
+        poses: &poses,
+        warnings: &told,
+        hash: &sha256,
+        files: &tree.files().collect::<Vec<_>>(),
+    });
+    tree.add("report/index.html", page.into_bytes());
+
+    let record = DesignRecord { name: design.name().to_owned(), sha256 };
+    let manifest = Manifest::new(record, records, warnings, &tree);
+    tree.add(MANIFEST_NAME, pretty(&manifest));
+    let mut headlines = judged.headlines();
+    if let (Some(asked), Some(frames)) = (&design.sections().accuracy, forces.frames_to_average) {
+        headlines.push(format!(
+            "accuracy.force_n = {}: average {frames} frame{}, which keeps it {SAFETY} times over as far as noise goes",
+            asked.force_n,
+            if frames == 1 { "" } else { "s" }
+        ));
+    }
+    Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines })
+}
+
+/// A file for programs.
+fn pretty(value: &impl serde::Serialize) -> Vec<u8> {
+    // numbers, strings and lists only: nothing here can fail to be written
+    let mut text = serde_json::to_string_pretty(value).unwrap_or_default();
+    text.push('\n');
+    text.into_bytes()
+}
+
+/// The parts, checked in their assembly, and their files.
+struct MadeParts {
+    made: Vec<parts::Part>,
+    files: Vec<parts::PartFile>,
+    /// Names of the positions at which the assembly was checked.
+    poses: Vec<String>,
+}
+
+fn make_parts(
+    design: &Design,
+    layout: &Layout,
+    springs: &constants::DesignSprings,
+) -> Result<MadeParts, PartError> {
+    let measures = springs.sight.measures()?;
+    let made = parts::build(measures, &layout.hits)?;
+    let assembly = parts::Assembly::of(measures, &made)?;
+    parts::check_assembly(measures, &made, &assembly)?;
+    let files = parts::files(design, measures, &made, &assembly)?;
+    let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
+    Ok(MadeParts { made, files, poses })
+}
+
+/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight; gives back who watches them.
+fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
+    let sight = constants::MarkerSight::of(design);
+    sight.require(design, &Rigid::identity(), "at rest")?;
+    let suspension = suspension_of(design)?;
+    for (index, (claim, case)) in
+        design.sections().loads.claims.iter().zip(claims_of(design, &suspension)).enumerate()
+    {
+        let field = format!("loads.claims[{index}]");
+        let passed = case.passed().next().map(|check| {
+            let Check { limit, part, value, bound, unit } = check;
+            DesignError::at(
+                field.clone(),
+                serde_json::json!(claim),
+                format!(
+                    "the load \"{}\" passes a limit: {} at {part}, {value:.3} {unit}",
+                    claim.name,
+                    limit.as_str()
+                ),
+                format!("at most {bound:.3} {unit}"),
+            )
+            .with_help(
+                "claim less, or change `springs`, `magnets.grip_force_n` or the heights of the platforms",
+            )
+        });
+        if let Some(error) = passed {
+            return Err(error);
+        }
+        let balance = case.equilibrium.map_err(|error| {
+            DesignError::at(
+                field,
+                serde_json::json!(claim),
+                error.to_string(),
+                "a load that the springs carry",
+            )
+        })?;
+        let pose = balance.displacement.to_pose(suspension.at_mm());
+        sight.require(design, &pose, &format!("under the load \"{}\"", claim.name))?;
+    }
+    Ok(sight)
+}
+
+/// The layout of a design's dots, and what it was made from.
+fn lay_out(design: &Design) -> Result<(LayoutSpec, Layout), DesignError> {
+    let spec = LayoutSpec::of_design(design)?;
+    let layout = Layout::new(&spec)?;
+    Ok((spec, layout))
+}
+
+/// Makers report the field at fault; its value stands in the design.
+fn with_value(design: &Design, mut error: DesignError) -> DesignError {
+    if error.value.is_empty() && !error.field.is_empty() {
+        let pointer = format!("/{}", error.field.replace(['.', '['], "/").replace(']', ""));
+        let tree: serde_json::Value = serde_json::from_str(design.text()).unwrap_or_default();
+        if let Some(value) = tree.pointer(&pointer) {
+            let filled = DesignError::at(error.field.clone(), value, "", "");
+            error.value = filled.value;
+        }
+    }
+    error
+}

@@ -1,0 +1,66 @@
+//! All the forms of the constants, as files beside `constants.json`.
+
+use glam::DVec3;
+
+use super::{
+    BodyPart, MassProperties, Robot, camera_info_yaml, kalibr_yaml, mass_of_mesh, mjcf, opencv_yaml, urdf,
+};
+use domecast_design::Design;
+use domecast_design::parts::Part;
+use domecast_runtime::constants::Constants;
+
+/// Files of a build's `constants/` folder besides `constants.json`, and why others are left out.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FormatFiles {
+    /// Path in the build's tree, and content.
+    pub files: Vec<(String, String)>,
+    /// What could not be said, and why: one sentence a file.
+    pub left_out: Vec<String>,
+}
+
+/// Writes every form that can say this sensor. The robot forms need the two platforms among `parts`.
+pub fn format_files(design: &Design, constants: &Constants, parts: &[Part]) -> FormatFiles {
+    let mut made = FormatFiles::default();
+    let mut add = |name: &str, text: String| made.files.push((format!("constants/{name}"), text));
+    add("opencv.yaml", opencv_yaml(constants));
+    add("camera_info.yaml", camera_info_yaml(constants));
+    match kalibr_yaml(constants) {
+        Ok(text) => add("kalibr.yaml", text),
+        Err(reason) => made.left_out.push(format!("constants/kalibr.yaml: {reason}")),
+    }
+    match robot_of(design, parts) {
+        Some(robot) => {
+            made.files.push(("constants/sensor.urdf".into(), urdf(constants, &robot)));
+            made.files.push(("constants/sensor.xml".into(), mjcf(constants, &robot)));
+        }
+        None => made.left_out.push("constants/sensor.urdf: the platforms are not among the parts".into()),
+    }
+    made
+}
+
+/// The two bodies of a design, of the densities that it gives; springs, magnets, lights and wires are not counted.
+fn robot_of(design: &Design, parts: &[Part]) -> Option<Robot> {
+    let named = |name: &str| parts.iter().find(|part| part.name == name);
+    let (upper, lower) = (named("upper_platform")?, named("lower_platform")?);
+    let sections = design.sections();
+    let sheet = mass_of_sheet(design);
+    let dome = MassProperties::hemisphere(sections.dome.radius_mm, sections.elastomer.density_g_per_cm3);
+    let print = |part: &Part| mass_of_mesh(&part.mesh, sections.process.density_g_per_cm3);
+    let body = |part: &Part, mass: MassProperties| BodyPart {
+        name: part.name.clone(),
+        mesh: format!("../parts/{}.stl", part.name),
+        mass,
+    };
+    Some(Robot {
+        lower: body(lower, print(lower)),
+        upper: body(upper, print(upper).with(&sheet).with(&dome)),
+        mount_z_mm: sections.platforms.lower.underside_z_mm,
+    })
+}
+
+fn mass_of_sheet(design: &Design) -> MassProperties {
+    let thickness_mm = design.sheet_thickness_mm();
+    let [x, y] = design.sections().sheet.size_mm;
+    let center = DVec3::new(0.0, 0.0, -0.5 * thickness_mm);
+    MassProperties::cuboid(DVec3::new(x, y, thickness_mm), center, design.sections().sheet.density_g_per_cm3)
+}

@@ -1,0 +1,123 @@
+//! The constants in the forms that other programs read: OpenCV, ROS, Kalibr, URDF and MJCF.
+//!
+//! One writer a form; each sees only finished values. What a form cannot say is refused with the reason, never
+//! bent until it fits.
+
+mod files;
+mod kalibr;
+mod mass;
+mod mjcf;
+mod opencv;
+mod robot;
+mod ros;
+
+pub use files::{FormatFiles, format_files};
+pub use kalibr::kalibr_yaml;
+pub use mass::{MassProperties, mass_of_mesh};
+pub use mjcf::mjcf;
+pub use opencv::opencv_yaml;
+pub use robot::{BodyPart, Robot, urdf};
+pub use ros::camera_info_yaml;
+
+/// A number as all these forms read it: the shortest that reads back the same, always with a point, and with a
+/// sign in the exponent, without which YAML 1.1 takes it for a word.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 || (1e-5..1e15).contains(&size) {
+        let text = format!("{value}");
+        return if text.contains('.') { text } else { text + ".0" };
+    }
+    let text = format!("{value:e}");
+    let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let point = if digits.contains('.') { "" } else { ".0" };
+    let sign = if exponent.starts_with('-') { "" } else { "+" };
+    format!("{digits}{point}e{sign}{exponent}")
+}
+
+/// A list in YAML's flow style.
+fn list(values: impl IntoIterator<Item = f64>) -> String {
+    let parts: Vec<String> = values.into_iter().map(number).collect();
+    format!("[{}]", parts.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use glam::{DMat3, DVec3};
+
+    use super::*;
+    use crate::constants;
+    use domecast_design::layout::Layout;
+    use domecast_mesh::TriMesh;
+    use domecast_runtime::constants::Constants;
+
+    fn of(name: &str) -> Constants {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs").join(name);
+        let design = domecast_design::load(&path).unwrap();
+        constants::of(&design, &Layout::of_design(&design).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn numbers_read_back_the_same() {
+        for value in [0.0, -0.0, 1.0, 229.18, 1e-17, -3.25e300, 0.1, 1e22] {
+            assert_eq!(number(value).parse::<f64>().unwrap(), value);
+            assert!(number(value).contains('.') && !number(value).contains("e2"), "{}", number(value));
+        }
+    }
+
+    #[test]
+    fn kalibr_refuses_what_it_cannot_say() {
+        let reason = kalibr_yaml(&of("thumb24.json")).unwrap_err();
+        assert!(reason.contains("k3 = -0.01156"), "{reason}");
+        assert!(kalibr_yaml(&of("thumb24-fisheye.json")).unwrap().contains("equidistant"));
+        assert!(kalibr_yaml(&of("thumb24-pinhole.json")).unwrap().contains("distortion_model: none"));
+    }
+
+    #[test]
+    fn ros_names_the_model() {
+        assert!(camera_info_yaml(&of("thumb24.json")).contains("distortion_model: plumb_bob"));
+        assert!(camera_info_yaml(&of("thumb24-fisheye.json")).contains("distortion_model: equidistant"));
+        let mut eight = of("thumb24.json");
+        eight.camera.distortion.extend([0.1, 0.2, 0.3]);
+        assert!(camera_info_yaml(&eight).contains("rational_polynomial"));
+    }
+
+    // A box from twelve triangles against the closed form, off its own centre.
+    #[test]
+    fn the_mass_of_a_box() {
+        let size = DVec3::new(2.0, 3.0, 5.0);
+        let at = DVec3::new(7.0, -4.0, 1.0);
+        let corner = |i: u32| {
+            at + size
+                * DVec3::new(f64::from(i & 1) - 0.5, f64::from((i >> 1) & 1) - 0.5, f64::from(i >> 2) - 0.5)
+        };
+        let triangles = vec![
+            [0, 2, 1],
+            [1, 2, 3],
+            [4, 5, 6],
+            [5, 7, 6],
+            [0, 1, 4],
+            [1, 5, 4],
+            [2, 6, 3],
+            [3, 6, 7],
+            [0, 4, 2],
+            [2, 4, 6],
+            [1, 3, 5],
+            [3, 7, 5],
+        ];
+        let mesh = TriMesh { vertices_mm: (0..8).map(corner).collect(), triangles };
+        let found = mass_of_mesh(&mesh, 1.2);
+        let exact = MassProperties::cuboid(size, at, 1.2);
+        assert!((found.mass_kg / exact.mass_kg - 1.0).abs() < 1e-12);
+        assert!((found.center_m - exact.center_m).length() < 1e-15);
+        let miss = found.inertia_kg_m2 - exact.inertia_kg_m2;
+        assert!(miss.to_cols_array().iter().all(|v| v.abs() < 1e-12 * exact.inertia_kg_m2.x_axis.x));
+        // Two halves of a body make the whole.
+        let half = DVec3::new(1.0, 3.0, 5.0);
+        let side = |s: f64| MassProperties::cuboid(half, at + DVec3::X * s, 1.2);
+        let whole = side(0.5).with(&side(-0.5));
+        let miss: DMat3 = whole.inertia_kg_m2 - exact.inertia_kg_m2;
+        assert!(miss.to_cols_array().iter().all(|v| v.abs() < 1e-12 * exact.inertia_kg_m2.x_axis.x));
+    }
+}

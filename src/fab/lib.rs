@@ -1,0 +1,7 @@
+//! Everything that is needed to make a sensor: artwork, constants, report, and the build that writes them.
+
+pub mod artwork;
+pub mod build;
+pub mod compare;
+pub mod constants;
+pub mod report;

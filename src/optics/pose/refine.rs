@@ -1,0 +1,228 @@
+//! Levenberg-Marquardt over poses, and the two ways to get residuals.
+
+use glam::{DVec2, DVec3};
+use nalgebra::Matrix6;
+
+use super::disc::{DIRECTIONS, Marker, OUTLINE, centroid_offset};
+use super::view::{Placed, Sheet, Sight};
+use crate::numeric::{Rigid, rotation_from_vector, vector_from_rotation};
+use crate::refraction::{Limit, SensorOptics};
+
+const MOST_STEPS: u32 = 40;
+/// The step after which a pose counts as found, mm: it is then right to 1e-8 mm.
+const SETTLED_MM: f64 = 2e-6;
+
+/// Why residuals do not exist at a pose: which marker, which limit.
+pub(super) type Hidden = (u32, Limit);
+
+/// Sum of squared residuals (px^2), normal matrix (its lower half) and right side.
+pub(super) struct Normal {
+    pub chi2: f64,
+    matrix: [[f64; 6]; 6],
+    right: [f64; 6],
+}
+
+/// Residuals of sightings as a function of the pose.
+pub(super) trait Model {
+    /// At a pose; at the first look slow parts may be guessed. The second value says whether everything is exact.
+    fn at(&mut self, pose: &Rigid, first_look: bool) -> Result<(Normal, bool), Hidden>;
+}
+
+/// A refined pose.
+pub(super) struct Fit {
+    pub pose: Rigid,
+    pub chi2: f64,
+    pub normal: Matrix6<f64>,
+    pub steps: u32,
+    pub settled: bool,
+}
+
+impl Normal {
+    fn empty() -> Self {
+        Self { chi2: 0.0, matrix: [[0.0; 6]; 6], right: [0.0; 6] }
+    }
+
+    #[inline]
+    fn add(&mut self, row: [f64; 6], left: f64) {
+        self.chi2 += left * left;
+        for i in 0..6 {
+            self.right[i] += row[i] * left;
+            for j in 0..=i {
+                self.matrix[i][j] += row[i] * row[j];
+            }
+        }
+    }
+
+    fn whole(&self) -> Matrix6<f64> {
+        Matrix6::from_fn(|i, j| self.matrix[i.max(j)][i.min(j)])
+    }
+
+    /// The step of Levenberg and Marquardt: `(N + damping diag N) step = right`, by Cholesky's factors; `None` where
+    /// the matrix is not positive definite.
+    fn step(&self, damping: f64) -> Option<[f64; 6]> {
+        let mut l = self.matrix;
+        let mut x = self.right;
+        let mut per_diagonal = [0.0; 6];
+        for i in 0..6 {
+            for j in 0..i {
+                let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+                l[i][j] = (l[i][j] - sum) * per_diagonal[j];
+            }
+            let sum: f64 = (0..i).map(|k| l[i][k] * l[i][k]).sum();
+            let square = l[i][i] * (1.0 + damping) - sum;
+            // Rounding of the sum: below it the direction is open.
+            if square.is_nan() || square <= 1e-15 * l[i][i] {
+                return None;
+            }
+            per_diagonal[i] = 1.0 / square.sqrt();
+            let sum: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
+            x[i] = (x[i] - sum) * per_diagonal[i];
+        }
+        for i in (0..6).rev() {
+            let sum: f64 = (i + 1..6).map(|k| l[k][i] * x[k]).sum();
+            x[i] = (x[i] - sum) * per_diagonal[i];
+        }
+        Some(x)
+    }
+}
+
+/// Residuals through the whole of `optics`, for any lens.
+pub(super) struct Residuals<'a> {
+    pub optics: &'a SensorOptics,
+    pub seen: &'a [(Marker, DVec2)],
+}
+
+impl Model for Residuals<'_> {
+    fn at(&mut self, pose: &Rigid, _first_look: bool) -> Result<(Normal, bool), Hidden> {
+        let first = self.seen.first().map_or(0, |(m, _)| m.id);
+        let optics = self.optics.at_pose(pose).map_err(|_| (first, Limit::PupilInsideSheet))?;
+        let mut normal = Normal::empty();
+        for (marker, px) in self.seen {
+            let (centroid, motion) =
+                marker.centroid_with_motion(&optics).map_err(|limit| (marker.id, limit))?;
+            for axis in 0..2 {
+                normal.add(std::array::from_fn(|j| motion[(axis, j)]), (*px - centroid)[axis]);
+            }
+        }
+        Ok((normal, true))
+    }
+}
+
+/// Residuals in the plane that touches the observed pixel's ray, scaled to pixels by the lens's Jacobian there,
+/// plus an offset: what the exact centroid of the disc's image differs by. The offset changes slowly with the pose
+/// (hundredths of a pixel per mm): a guess does for the first look, every later one makes it anew, so that at the end
+/// the residuals are those of raw pixels.
+pub(super) struct Sharp<'a> {
+    sheet: &'a Sheet,
+    seen: &'a [(Marker, DVec2)],
+    sights: Vec<Sight>,
+    offsets: Vec<DVec2>,
+    /// Tangent over reach of each marker's last ray, 1/mm; zero before.
+    nears: Vec<f64>,
+}
+
+impl<'a> Sharp<'a> {
+    /// `offsets` are a first guess, px.
+    pub fn new(
+        sheet: &'a Sheet,
+        seen: &'a [(Marker, DVec2)],
+        sights: Vec<Sight>,
+        offsets: Vec<DVec2>,
+    ) -> Self {
+        Self { sheet, seen, sights, offsets, nears: vec![0.0; seen.len()] }
+    }
+
+    fn renew(&mut self, placed: &Placed) -> Result<(), Hidden> {
+        let parts = self.seen.iter().zip(&self.sights).zip(&mut self.offsets).zip(&self.nears);
+        for ((((marker, px), sight), offset), near) in parts {
+            let radius = 0.5 * marker.diameter_mm;
+            let steps: [DVec2; OUTLINE] = DIRECTIONS.map(|[cos, sin]| DVec2::new(radius * cos, radius * sin));
+            let found = self.sheet.pixels(placed, marker.position_mm, steps, sight, *near);
+            let (center, first_order, outline) = found.ok_or((marker.id, Limit::BeyondFieldOfView))?;
+            // The exact centroid less what the first order says of the centre.
+            *offset = center - *px - first_order;
+            if radius > 0.0 {
+                *offset += centroid_offset(center, &outline);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Model for Sharp<'_> {
+    fn at(&mut self, pose: &Rigid, first_look: bool) -> Result<(Normal, bool), Hidden> {
+        let first = self.seen.first().map_or(0, |(m, _)| m.id);
+        let placed = self.sheet.placed(pose).ok_or((first, Limit::PupilInsideSheet))?;
+        if first_look {
+            self.nears.fill(self.sheet.near_axis(&placed));
+        } else {
+            self.renew(&placed)?;
+        }
+        let mut normal = Normal::empty();
+        let parts = self.seen.iter().zip(&self.sights).zip(&self.offsets).zip(&mut self.nears);
+        for ((((marker, _), sight), offset), near) in parts {
+            let (from_sight, motion) = self
+                .sheet
+                .offset(&placed, marker.position_mm, sight, near)
+                .ok_or((marker.id, Limit::BeyondFieldOfView))?;
+            let left = -(from_sight + *offset);
+            for (axis, [v, w]) in motion.iter().enumerate() {
+                normal.add([v.x, v.y, v.z, w.x, w.y, w.z], left[axis]);
+            }
+        }
+        Ok((normal, !first_look))
+    }
+}
+
+/// Refines a pose; gives up early when after two steps (with a pose `known`: at once) the residual is beyond
+/// `far`, or when the pose closes in on the known one.
+pub(super) fn refine(
+    model: &mut impl Model,
+    start: Rigid,
+    far: f64,
+    known: Option<&Rigid>,
+) -> Result<Fit, Hidden> {
+    let mut pose = start;
+    let (mut now, mut exact) = model.at(&pose, true)?;
+    let (mut damping, mut steps, mut settled) = (0.0, 0, false);
+    while steps < MOST_STEPS && !settled {
+        // A second start is the mirror of a pose that fits: where both fit it starts near its end.
+        if (steps >= 2 || known.is_some()) && now.chi2 > far.max(1.0) {
+            break;
+        }
+        steps += 1;
+        let Some(step) = now.step(damping) else {
+            damping = f64::max(10.0 * damping, 1e-6);
+            continue;
+        };
+        let (v, w) = (DVec3::new(step[0], step[1], step[2]), DVec3::new(step[3], step[4], step[5]));
+        let next = Rigid::new(rotation_from_vector(w), v).compose(&pose);
+        if known.is_some_and(|known| near(known, &next)) {
+            break;
+        }
+        // A turn counts by what it moves at a lever of ten millimetres.
+        let moved = v.length().max(10.0 * w.length());
+        if exact && moved <= SETTLED_MM && damping == 0.0 {
+            // What is left after this step is some thousandths of it (an offset's own motion, and the curvature
+            // where noise leaves residuals): no need to look again.
+            (pose, settled) = (next, true);
+            break;
+        }
+        match model.at(&next, false) {
+            Ok((n, e)) if n.chi2 < now.chi2 || !exact => {
+                (pose, now, exact) = (next, n, e);
+                damping = if damping > 1e-9 { 0.1 * damping } else { 0.0 };
+            }
+            // At the floor of rounding no step goes down; that is where we want to be.
+            Ok((n, e)) if moved <= 1e-6 => (pose, now, exact, settled) = (next, n, e, true),
+            _ => damping = f64::max(10.0 * damping, 1e-4),
+        }
+    }
+    Ok(Fit { pose, chi2: now.chi2, normal: now.whole(), steps, settled })
+}
+
+/// A pose within a hundredth of a millimetre and a thousandth of a radian of a minimum leads to it.
+fn near(a: &Rigid, b: &Rigid) -> bool {
+    let between = a.compose(&b.inverse());
+    between.translation_mm.length() < 1e-2 && vector_from_rotation(&between.rotation).length() < 1e-3
+}

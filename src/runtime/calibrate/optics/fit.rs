@@ -1,0 +1,191 @@
+//! The fit: starts, damped steps, covariance, and the constants that come out.
+
+use glam::DVec3;
+
+use super::normal::{OwnBlock, Reduced};
+use super::problem::{Problem, camera_numbers};
+use super::types::{Kind, Observation, OpticsFit, OpticsFitError, Parameter};
+use crate::constants::{CalibrationPriors, Constants};
+use domecast_optics::SensorOptics;
+use domecast_optics::numeric::{Rigid, rotation_from_vector};
+use domecast_optics::pose::{PoseOptions, PoseSolver, Sighting};
+
+const MOST_STEPS: u32 = 60;
+
+/// Fits the sensor to the observations; the first `at_rest` frames (one at least) are without load.
+///
+/// # Errors
+/// See [`OpticsFitError`].
+pub fn fit(
+    constants: &Constants,
+    observations: &[Observation],
+    priors: &CalibrationPriors,
+    at_rest: usize,
+) -> Result<OpticsFit, OpticsFitError> {
+    let problem = Problem::new(constants, observations, priors, at_rest)?;
+    let mut poses = start_poses(&problem, priors)?;
+    let mut x = vec![0.0; problem.numbers()];
+    let hidden = || {
+        let first = observations.first();
+        OpticsFitError::NotVisible {
+            kind: first.map_or(Kind::White, |o| o.kind),
+            id: first.map_or(0, |o| o.id),
+        }
+    };
+    let mut damping = 1e-6;
+    let mut now = problem
+        .reduce(&x, &poses, priors, true, damping)
+        .ok_or_else(|| first_hidden(&problem, &x, &poses).unwrap_or_else(hidden))?;
+    let rms = |r: &Reduced| (r.squares / r.count.max(1) as f64).sqrt();
+    let before = rms(&now);
+    let (mut iterations, mut settled) = (0, false);
+    while iterations < MOST_STEPS && !settled {
+        iterations += 1;
+        let mut damped = now.matrix.clone();
+        for k in 0..problem.numbers() {
+            damped[(k, k)] *= 1.0 + damping;
+        }
+        let step = damped.cholesky().map(|c| c.solve(&now.right));
+        let Some(step) = step else {
+            damping *= 10.0;
+            continue;
+        };
+        let next_x: Vec<f64> = x.iter().zip(step.iter()).map(|(a, b)| a + b).collect();
+        let moved = |(pose, own): (&Rigid, &Option<OwnBlock>)| match own {
+            Some((inverse, coupling, right)) => {
+                let m = inverse * (right - coupling.transpose() * &step);
+                let motion = Rigid::new(
+                    rotation_from_vector(DVec3::new(m[3], m[4], m[5])),
+                    DVec3::new(m[0], m[1], m[2]),
+                );
+                motion.compose(pose)
+            }
+            None => *pose,
+        };
+        let next_poses: Vec<Rigid> = poses.iter().zip(&now.poses).map(moved).collect();
+        let tried = problem.reduce(&next_x, &next_poses, priors, true, damping * 0.1);
+        match tried {
+            Some(next) if next.cost <= now.cost * (1.0 + 1e-12) => {
+                settled = now.cost - next.cost <= 1e-7 * (1.0 + now.cost);
+                (x, poses, now) = (next_x, next_poses, next);
+                damping = (0.1 * damping).max(1e-12);
+            }
+            _ if damping < 1e8 => {
+                damping *= 10.0;
+                // The eliminated blocks carry the damping too.
+                if let Some(again) = problem.reduce(&x, &poses, priors, true, damping) {
+                    now = again;
+                }
+            }
+            _ => settled = true,
+        }
+    }
+    if !settled {
+        return Err(OpticsFitError::NotConverged { rms_px: rms(&now) });
+    }
+    let last = problem.reduce(&x, &poses, priors, true, 0.0).unwrap_or(now);
+    let covariance = last.matrix.clone().cholesky().map(|c| c.inverse());
+    let sd = |k: usize| covariance.as_ref().map_or(problem.priors[k], |c| c[(k, k)].max(0.0).sqrt());
+    let named = camera_numbers(problem.flat) + 2 * problem.whites.len();
+    let parameters = (0..named)
+        .map(|k| {
+            let (name, nominal) = problem.name(k, constants);
+            let (prior_sd, sd) = (problem.priors[k], sd(k));
+            Parameter { name, nominal, value: nominal + x[k], prior_sd, sd, observed: sd < 0.9 * prior_sd }
+        })
+        .collect();
+    let constants = measured(constants, &problem, &x)?;
+    let after = rms(&last);
+    let poses = problem.frames.iter().copied().zip(poses).collect();
+    Ok(OpticsFit {
+        constants,
+        parameters,
+        rms_px: [before, after],
+        iterations,
+        poses,
+        outliers: last.outliers,
+    })
+}
+
+/// The first mark that the nominal sensor does not see.
+fn first_hidden(problem: &Problem, x: &[f64], poses: &[Rigid]) -> Option<OpticsFitError> {
+    let rest = SensorOptics::new(&problem.spec(x)).ok()?;
+    for (seen, pose) in problem.seen.iter().zip(poses) {
+        let optics = rest.at_pose(pose).ok()?;
+        for mark in seen {
+            if optics.project(problem.place(x, mark)).is_err() {
+                return Some(OpticsFitError::NotVisible {
+                    kind: mark.observation.kind,
+                    id: mark.observation.id,
+                });
+            }
+        }
+    }
+    None
+}
+
+/// Each frame's pose with nominal numbers; the first is rest.
+fn start_poses(problem: &Problem, priors: &CalibrationPriors) -> Result<Vec<Rigid>, OpticsFitError> {
+    let optics = SensorOptics::new(&problem.nominal).map_err(|e| OpticsFitError::Constants(e.to_string()))?;
+    let fault =
+        |e: domecast_optics::pose::PoseError| OpticsFitError::Constants(format!("white markers: {e}"));
+    // What the tolerances move a marker's image by, roughly: its place over its distance, in focal lengths.
+    let away = (problem.nominal.sensor_from_camera.translation_mm.z).abs().max(1.0);
+    let focal = problem.nominal.lens.matrix[0][0].abs();
+    let slack =
+        focal * (priors.white_marker_mm + priors.pupil_mm.iter().fold(0.0_f64, |m, v| m.max(*v))) / away;
+    let noise_px = priors.white_centroid_px.hypot(3.0 * slack);
+    let solver =
+        PoseSolver::new(&optics, &problem.whites, PoseOptions::new(noise_px, 10.0 * away)).map_err(fault)?;
+    let mut poses = vec![Rigid::identity(); problem.at_rest.min(problem.frames.len())];
+    for (frame, seen) in problem.frames.iter().zip(&problem.seen).skip(problem.at_rest) {
+        let sightings: Vec<Sighting> = seen
+            .iter()
+            .filter(|mark| mark.observation.kind == Kind::White)
+            .map(|mark| Sighting {
+                id: problem.whites[mark.index].id,
+                centroid_px: mark.observation.centroid_px,
+            })
+            .collect();
+        if sightings.len() < 4 {
+            return Err(OpticsFitError::FewMarkers { frame: *frame });
+        }
+        // A frame whose markers fit badly still has a place near rest to start from.
+        poses.push(solver.solve(&sightings).map_or(Rigid::identity(), |found| found.pose));
+    }
+    Ok(poses)
+}
+
+/// The constants with what was fitted.
+fn measured(constants: &Constants, problem: &Problem, x: &[f64]) -> Result<Constants, OpticsFitError> {
+    let spec = problem.spec(x);
+    let optics = SensorOptics::new(&spec).map_err(|e| OpticsFitError::Constants(e.to_string()))?;
+    let mut made = constants.clone();
+    made.camera.camera_from_sensor = spec.sensor_from_camera.inverse().to_rows_4x4();
+    let first_is_air = made.optics.layers.first().is_some_and(|l| l.name == "air");
+    if first_is_air && let Some(air) = made.optics.layers.first_mut() {
+        air.thickness_mm = Some(optics.air_gap_mm());
+    }
+    for (layer, fitted) in made.optics.layers.iter_mut().skip(usize::from(first_is_air)).zip(&spec.layers) {
+        layer.thickness_mm = fitted.thickness_mm;
+        layer.index = fitted.index[1];
+        if layer.index_rgb.is_some() {
+            layer.index_rgb = Some(fitted.index);
+        }
+    }
+    for (index, marker) in made.white_markers.iter_mut().enumerate() {
+        let fitted = problem.white(x, index);
+        marker.position_mm = fitted.position_mm.to_array();
+        let hidden = |_| OpticsFitError::NotVisible { kind: Kind::White, id: marker.id };
+        marker.image_px = optics.project(fitted.position_mm).map_err(hidden)?.to_array();
+    }
+    for (index, dot) in made.black_dots.iter_mut().enumerate() {
+        let at = problem.black(x, index);
+        let hidden = |_| OpticsFitError::NotVisible { kind: Kind::Black, id: dot.id };
+        dot.surface_mm = at.to_array();
+        dot.normal = (at / at.length()).to_array();
+        dot.image_px = optics.project(at).map_err(hidden)?.to_array();
+    }
+    made.refit_plain_runtime();
+    Ok(made)
+}

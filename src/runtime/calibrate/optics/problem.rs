@@ -1,0 +1,189 @@
+//! The numbers that are fitted, and what each mark should look like for given ones.
+
+use glam::{DVec2, DVec3};
+
+use super::types::{Kind, Observation, OpticsFitError};
+use crate::constants::{CalibrationPriors, Constants};
+use domecast_optics::numeric::rotation_from_vector;
+use domecast_optics::pose::{Marker, outline_centroid_offset};
+use domecast_optics::{OpticsSpec, SensorOptics};
+
+/// What is fitted, apart from the poses. Numbers: pupil (3), camera rotation (3), thickness of each flat layer, index
+/// of each layer, x and y of each white marker, two steps along the dome of each dot; as departures from nominal.
+pub(super) struct Problem<'a> {
+    pub nominal: OpticsSpec,
+    pub whites: Vec<Marker>,
+    pub blacks: Vec<Black>,
+    pub priors: Vec<f64>,
+    pub frames: Vec<usize>,
+    pub seen: Vec<Vec<Seen<'a>>>,
+    pub flat: usize,
+    /// How many of the frames, from the first, are at rest.
+    pub at_rest: usize,
+}
+
+pub(super) struct Seen<'a> {
+    pub observation: &'a Observation,
+    /// Place of the mark in its list.
+    pub index: usize,
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Black {
+    pub at_mm: DVec3,
+    pub radius_mm: f64,
+    pub east: DVec3,
+    pub north: DVec3,
+}
+
+impl Black {
+    fn moved(&self, step: DVec2, dome_radius_mm: f64) -> DVec3 {
+        let there = self.at_mm + self.east * step.x + self.north * step.y;
+        there * (dome_radius_mm / there.length())
+    }
+}
+
+/// Camera and layers take the first numbers.
+pub(super) fn camera_numbers(flat: usize) -> usize {
+    6 + flat + flat + 1
+}
+
+impl<'a> Problem<'a> {
+    pub fn new(
+        constants: &Constants,
+        observations: &'a [Observation],
+        priors: &CalibrationPriors,
+        at_rest: usize,
+    ) -> Result<Self, OpticsFitError> {
+        let nominal = constants.optics_spec().map_err(OpticsFitError::Constants)?;
+        let flat = nominal.layers.len().saturating_sub(1);
+        let whites = constants.markers();
+        let black = |dot: &crate::constants::BlackDot| {
+            let at_mm = DVec3::from_array(dot.surface_mm);
+            let east = DVec3::new(-at_mm.y, at_mm.x, 0.0).try_normalize().unwrap_or(DVec3::X);
+            let north = at_mm.cross(east).normalize_or_zero();
+            Black { at_mm, radius_mm: 0.5 * dot.diameter_mm, east, north }
+        };
+        let blacks: Vec<Black> = constants.black_dots.iter().map(black).collect();
+        let mut sds = Vec::new();
+        sds.extend(priors.pupil_mm);
+        sds.extend(priors.camera_rotation_rad);
+        sds.extend(vec![priors.layer_thickness_mm; flat]);
+        sds.extend(vec![priors.index; flat + 1]);
+        sds.extend(vec![priors.white_marker_mm; 2 * whites.len()]);
+        sds.extend(vec![priors.black_dot_mm; 2 * blacks.len()]);
+        // A tolerance of zero holds a number to where it is.
+        let priors = sds.into_iter().map(|sd: f64| sd.max(1e-9)).collect();
+        let mut frames: Vec<usize> = observations.iter().map(|o| o.frame).collect();
+        frames.sort_unstable();
+        frames.dedup();
+        if frames.is_empty() {
+            return Err(OpticsFitError::Empty);
+        }
+        let mut seen: Vec<Vec<Seen>> = frames.iter().map(|_| Vec::new()).collect();
+        for observation in observations {
+            let index = match observation.kind {
+                Kind::White => constants.white_markers.iter().position(|m| m.id == observation.id),
+                Kind::Black => constants.black_dots.iter().position(|d| d.id == observation.id),
+            };
+            let Some(index) = index else {
+                return Err(OpticsFitError::UnknownMark { kind: observation.kind, id: observation.id });
+            };
+            if let Ok(frame) = frames.binary_search(&observation.frame) {
+                seen[frame].push(Seen { observation, index });
+            }
+        }
+        Ok(Self { nominal, whites, blacks, priors, frames, seen, flat, at_rest: at_rest.max(1) })
+    }
+
+    pub fn numbers(&self) -> usize {
+        self.priors.len()
+    }
+
+    pub fn spec(&self, x: &[f64]) -> OpticsSpec {
+        let mut spec = self.nominal.clone();
+        spec.sensor_from_camera.translation_mm += DVec3::new(x[0], x[1], x[2]);
+        let turn = rotation_from_vector(DVec3::new(x[3], x[4], x[5]));
+        spec.sensor_from_camera.rotation *= turn;
+        let flat = self.flat;
+        for (k, layer) in spec.layers.iter_mut().enumerate() {
+            if let Some(thickness) = layer.thickness_mm.as_mut() {
+                *thickness = (*thickness + x[6 + k]).max(0.0);
+            }
+            for index in &mut layer.index {
+                *index = (*index + x[6 + flat + k]).max(1.0);
+            }
+        }
+        spec
+    }
+
+    pub fn white(&self, x: &[f64], index: usize) -> Marker {
+        let at = camera_numbers(self.flat) + 2 * index;
+        let mut marker = self.whites[index];
+        marker.position_mm += DVec3::new(x[at], x[at + 1], 0.0);
+        marker
+    }
+
+    pub fn black_number(&self, index: usize) -> usize {
+        camera_numbers(self.flat) + 2 * self.whites.len() + 2 * index
+    }
+
+    pub fn black(&self, x: &[f64], index: usize) -> DVec3 {
+        let at = self.black_number(index);
+        self.blacks[index].moved(DVec2::new(x[at], x[at + 1]), self.nominal.dome_radius_mm)
+    }
+
+    pub fn place(&self, x: &[f64], seen: &Seen) -> DVec3 {
+        match seen.observation.kind {
+            Kind::White => self.white(x, seen.index).position_mm,
+            Kind::Black => self.black(x, seen.index),
+        }
+    }
+
+    /// Centroid of a mark less its centre's image.
+    pub fn offset(&self, x: &[f64], seen: &Seen, optics: &SensorOptics, center: DVec2) -> Option<DVec2> {
+        match seen.observation.kind {
+            Kind::White => self.white(x, seen.index).centroid_offset_px(optics, center).ok(),
+            Kind::Black => {
+                let dot = &self.blacks[seen.index];
+                let at = self.black(x, seen.index);
+                let radius = self.nominal.dome_radius_mm;
+                outline_centroid_offset(center, |cos, sin| {
+                    let there = at + (dot.east * cos + dot.north * sin) * dot.radius_mm;
+                    optics.project(there * (radius / there.length())).ok()
+                })
+            }
+        }
+    }
+
+    pub fn noise(&self, priors: &CalibrationPriors, kind: Kind) -> f64 {
+        match kind {
+            Kind::White => priors.white_centroid_px,
+            Kind::Black => priors.black_centroid_px,
+        }
+    }
+
+    pub fn name(&self, number: usize, constants: &Constants) -> (String, f64) {
+        let flat = self.flat;
+        let pupil = self.nominal.sensor_from_camera.translation_mm;
+        let axis = ["x", "y", "z"];
+        match number {
+            0..3 => (format!("pupil.{}", axis[number]), pupil[number]),
+            3..6 => (format!("camera_rotation.{}", axis[number - 3]), 0.0),
+            n if n < 6 + flat => {
+                let layer = &self.nominal.layers[n - 6];
+                (format!("{}.thickness", layer.name), layer.thickness_mm.unwrap_or(0.0))
+            }
+            n if n < camera_numbers(flat) => {
+                let layer = &self.nominal.layers[n - 6 - flat];
+                (format!("{}.index", layer.name), layer.index[1])
+            }
+            n => {
+                let k = n - camera_numbers(flat);
+                let id = constants.white_markers.get(k / 2).map_or(0, |m| m.id);
+                let nominal = self.whites.get(k / 2).map_or(0.0, |m| m.position_mm[k % 2]);
+                (format!("white_markers[{id}].{}", axis[k % 2]), nominal)
+            }
+        }
+    }
+}

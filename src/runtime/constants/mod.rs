@@ -1,0 +1,61 @@
+//! What the runtime needs to know of one sensor: the form of `constants.json`, and the sensor that it describes.
+
+mod law;
+mod loads;
+mod model;
+mod plain;
+mod plain_input;
+mod plain_pnp;
+mod refit;
+mod sensor;
+mod stiffness;
+
+pub use law::{MagnetLaw, SpringLaw, SpringLawEnds};
+pub use loads::{PosedLoad, loads_over};
+pub use model::{
+    BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants, Matrix4,
+    OpticsConstants, PlainRuntime, SpringConstants, StiffnessAt, VERSION, WhiteMarker,
+};
+pub use plain::{Bias, PlainFit};
+pub use plain_input::{PlainError, PlainInput};
+pub use plain_pnp::PlainRuntimeSolver;
+pub use stiffness::{matrix_of, rows, stiffness_between, wrench_by_table};
+
+/// Names of the six axes of a displacement.
+pub const POSE_AXES: [&str; 6] = ["tx", "ty", "tz", "rx", "ry", "rz"];
+/// Names of the six axes of a wrench.
+pub const WRENCH_AXES: [&str; 6] = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"];
+
+impl Constants {
+    /// The file's text.
+    pub fn to_json(&self) -> String {
+        // numbers, strings and lists only: nothing here can fail to be written
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// JSON schema of the file, for those who read it with other programs.
+    pub fn schema() -> String {
+        let schema = schemars::schema_for!(Constants);
+        let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// Reads the file's text.
+    ///
+    /// # Errors
+    /// A sentence that says what is wrong with it.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let constants: Self =
+            serde_json::from_str(text).map_err(|error| format!("is not a constants file: {error}"))?;
+        if constants.format != FORMAT || constants.version != VERSION {
+            return Err(format!(
+                "has format \"{}\" version {}; this release reads \"{FORMAT}\" version {VERSION}",
+                constants.format, constants.version
+            ));
+        }
+        Ok(constants)
+    }
+}

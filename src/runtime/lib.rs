@@ -1,0 +1,6 @@
+//! The runtime of a sensor: it knows the constants and no design.
+
+pub mod calibrate;
+pub mod constants;
+pub mod frames;
+pub mod track;

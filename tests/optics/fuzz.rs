@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use domecast::camera::{Lens, LensLimit};
+use domecast::camera::{Lens, LensLimit, Model};
 use domecast::numeric::SeededRandom;
 use domecast::optics::{Channel, Limit, SensorOptics};
 use glam::{DVec2, DVec3};
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::bounds::{EPS, Iterations, LAST, Seen, condition, pixel_ulps, ray_ulps, ulp};
 use super::dd::{Dd, dd};
 use super::random::{lens_spec, optics_spec};
-use super::reference::{self, Sensor};
+use super::reference;
 use super::reference_lens::{distance, field_angle, unit, v3};
 
 /// One random lens and stack with everything that can be asked of them.

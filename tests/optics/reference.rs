@@ -3,7 +3,7 @@
 use domecast::optics::OpticsSpec;
 
 use super::dd::{Dd, dd};
-use super::reference_lens::{Lens, V3, dot, field_angle, rising_root, unit, v3};
+use super::reference_lens::{Lens, V3, dot, field_angle, rising_root, v3};
 
 pub struct Sensor<'a> {
     pub lens: Lens<'a>,

@@ -8,12 +8,6 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
-use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
-
-use super::frame::Image8;
-
-/// Quality of the video's JPEGs: the PNG frames are the exact ones.
-const QUALITY: u8 = 92;
 /// Nominal size where the file ends: players of the first AVI form read no further than 2^31 bytes.
 const LARGEST_BYTES: u64 = 2_000_000_000;
 const HEADER_BYTES: usize = 224;
@@ -43,23 +37,11 @@ impl VideoWriter {
         Ok(Self { file, width, height, rate_hz, index: Vec::new(), written: 0, largest: 0 })
     }
 
-    /// Adds a frame. Past two gigabytes further frames are left out: the PNG frames hold them.
+    /// Adds a frame, coded as JPEG. Past two gigabytes further frames are left out: the PNG frames hold them.
     ///
     /// # Errors
-    /// What the system says; a picture of another size.
-    pub fn add(&mut self, image: &Image8) -> io::Result<()> {
-        let bad = |what: &str| io::Error::new(io::ErrorKind::InvalidInput, what.to_owned());
-        if image.width != self.width || image.height != self.height {
-            return Err(bad("the frames of a video have one size"));
-        }
-        let side = |n: usize| u16::try_from(n).map_err(|_| bad("a JPEG side has at most 65535 pixels"));
-        let mut jpeg = Vec::new();
-        let mut encoder = Encoder::new(&mut jpeg, QUALITY);
-        encoder.set_sampling_factor(SamplingFactor::F_1_1);
-        let color = if image.channels == 3 { ColorType::Rgb } else { ColorType::Luma };
-        encoder
-            .encode(&image.bytes, side(image.width)?, side(image.height)?, color)
-            .map_err(|error| io::Error::other(error.to_string()))?;
+    /// What the system says.
+    pub fn add(&mut self, jpeg: &[u8]) -> io::Result<()> {
         if self.written + jpeg.len() as u64 > LARGEST_BYTES {
             return Ok(());
         }
@@ -68,7 +50,7 @@ impl VideoWriter {
         self.index.push((4 + self.written as u32, size));
         self.file.write_all(b"00dc")?;
         self.file.write_all(&size.to_le_bytes())?;
-        self.file.write_all(&jpeg)?;
+        self.file.write_all(jpeg)?;
         if jpeg.len() % 2 == 1 {
             self.file.write_all(&[0])?;
         }

@@ -33,7 +33,7 @@
 //! ```
 //! use domecast::{design, glam::DVec2};
 //!
-//! let design = design::from_text(include_str!("../designs/thumb24.json"))?;
+//! let design = domecast::design::Design::from_str(include_str!("../designs/thumb24.json"))?;
 //! let seen = design.optics().trace(DVec2::new(400.0, 240.0)).expect("inside the lens's domain");
 //! let back = design.optics().project(seen.surface_mm).expect("it was just seen");
 //! assert!(back.distance(DVec2::new(400.0, 240.0)) < 1e-9);

@@ -13,7 +13,7 @@ fn run(arguments: &[&str]) -> Output {
 
 fn thumb24() -> Constants {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
-    let design = domecast::design::load(&path).expect("a design");
+    let design = domecast::design::Design::load(&path).expect("a design");
     constants::of(&design, &Layout::of_design(&design).expect("a layout")).expect("constants")
 }
 

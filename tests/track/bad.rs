@@ -90,7 +90,7 @@ fn a_white_marker_that_is_covered_is_told() {
 #[test]
 fn constants_of_another_camera_are_told() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24-pinhole.json");
-    let design = domecast::design::load(&path).unwrap();
+    let design = domecast::design::Design::load(&path).unwrap();
     let layout = domecast::layout::Layout::of_design(&design).unwrap();
     let other = domecast::constants::of(&design, &layout).unwrap();
     let mut longer = SENSOR.constants.clone();

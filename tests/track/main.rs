@@ -30,7 +30,7 @@ struct Sensor {
 
 static SENSOR: LazyLock<Sensor> = LazyLock::new(|| {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
-    let design = domecast::design::load(&path).expect("the design");
+    let design = Design::load(&path).expect("the design");
     let layout = Layout::of_design(&design).expect("its layout");
     let constants = domecast::constants::of(&design, &layout).expect("its constants");
     // As a runtime gets them.

@@ -22,7 +22,7 @@ pub fn run(
     quick: bool,
 ) -> Result<(), Failure> {
     let began = Instant::now();
-    let design = domecast_design::load(design_file)?;
+    let design = domecast_design::Design::load(design_file)?;
     let scene = scene_file
         .map(|path| {
             Scene::load(path).map_err(|error| match error {

@@ -50,7 +50,7 @@ fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
 fn once(output: &Output, design_file: &Path, folders: &Folders<'_>, watched: bool) -> Result<(), Failure> {
     let began = Instant::now();
     output.step("reading the design");
-    let design = domecast_design::load(design_file)?;
+    let design = domecast_design::Design::load(design_file)?;
     let measured = match folders.accuracy.map(|dir| Measured::read(dir, &design)).transpose() {
         // a design that is being changed has left its measurement behind; the rest is still wanted
         Err(error) if watched => {

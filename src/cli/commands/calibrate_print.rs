@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::ValueEnum;
 use serde_json::{Value, json};
@@ -36,7 +37,7 @@ pub fn run(
     marks: Option<Marks>,
 ) -> Result<(), Failure> {
     output.step("reading");
-    let design = domecast_design::load(design_file)?;
+    let design = Design::load(design_file)?;
     let text = read_text(measured)?;
     let printed = marks.map(|marks| match marks {
         Marks::Target => Printed::Target,
@@ -46,7 +47,7 @@ pub fn run(
     let found = calibrate(&design, &text, printed).map_err(|error| fault(error, measured, design_file))?;
     let new_text = with_map(&design, &found)?;
     // The new design must stand on its own before it is written.
-    let new_design = domecast_design::from_text(&new_text).map_err(|error| error.in_file(design_file))?;
+    let new_design = Design::from_str(&new_text).map_err(|error| error.in_file(design_file))?;
     let out = out.map_or_else(|| beside(design_file), Path::to_path_buf);
     write_whole(&out, new_text.as_bytes())?;
     output.steps_done();

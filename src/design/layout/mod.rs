@@ -130,6 +130,16 @@ impl From<LayoutError> for DesignError {
     }
 }
 
+impl Design {
+    /// The dots of the design.
+    ///
+    /// # Errors
+    /// As for [`Layout::new`].
+    pub fn layout(&self) -> Result<Layout, LayoutError> {
+        Layout::of_design(self)
+    }
+}
+
 impl Layout {
     /// Lays out the dots of a design.
     ///

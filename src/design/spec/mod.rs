@@ -34,23 +34,25 @@ pub use source::{parse as parse_json, read_text};
 /// The fields that tracing and projecting need; nothing else in the file matters to them.
 const OPTICS_FIELDS: [&str; 4] = ["name", "camera", "optics", "dome"];
 
-/// Reads and resolves a whole design.
-///
-/// # Errors
-/// The first fault of the file: see [`DesignError`].
-pub fn load(path: &Path) -> Result<Design, DesignError> {
-    let text = read_text(path)?;
-    from_text(&text).map_err(|error| error.in_file(path))
+impl Design {
+    /// Reads and resolves a whole design file.
+    ///
+    /// # Errors
+    /// The first fault of the file: see [`DesignError`].
+    pub fn load(path: &Path) -> Result<Self, DesignError> {
+        read_text(path)?.parse().map_err(|error: DesignError| error.in_file(path))
+    }
 }
 
-/// Resolves a design from its text.
-///
-/// # Errors
-/// The first fault of the text: see [`DesignError`].
-pub fn from_text(text: &str) -> Result<Design, DesignError> {
-    let value = parse_json(text)?;
-    check_version(&value)?;
-    resolve::resolve(from_value(&value)?, text)
+impl std::str::FromStr for Design {
+    type Err = DesignError;
+
+    /// Resolves a design from its text.
+    fn from_str(text: &str) -> Result<Self, DesignError> {
+        let value = parse_json(text)?;
+        check_version(&value)?;
+        resolve::resolve(from_value(&value)?, text)
+    }
 }
 
 /// Reads only the camera, the layers and the dome of a design; other fields may say anything.

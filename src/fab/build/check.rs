@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::str::FromStr;
 
 use glam::{DVec2, DVec3};
 
@@ -113,7 +114,7 @@ fn load_design(dir: &Path, manifest: &Manifest) -> Result<Design, String> {
     if sha256_hex(text.as_bytes()) != manifest.design.sha256 {
         return Err("is not the design that the manifest names (its hash differs)".into());
     }
-    let design = domecast_design::from_text(&text).map_err(|error| error.to_string())?;
+    let design = Design::from_str(&text).map_err(|error| error.to_string())?;
     if design.name() == manifest.design.name {
         Ok(design)
     } else {

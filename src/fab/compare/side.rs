@@ -34,7 +34,7 @@ impl Side {
         if path.is_dir() {
             return Ok(Self::of_build(path)?);
         }
-        let design = domecast_design::load(path)?;
+        let design = domecast_design::Design::load(path)?;
         let made = build::build(&design, step).map_err(|error| match error {
             BuildError::Design(error) => error.in_file(path).into(),
             ours @ BuildError::Ours(_) => ours,

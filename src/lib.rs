@@ -54,6 +54,16 @@ pub use domecast_runtime::{calibrate, frames, track};
 pub use domecast_sim as sim;
 pub use domecast_springs as springs;
 
+pub use constants::Constants;
+pub use design::Design;
+pub use error::Error;
+pub use layout::Layout;
+pub use numeric::Rigid as Pose;
+pub use sim::Scene;
+pub use springs::Wrench;
+pub use track::Tracker;
+
+mod error;
 pub mod guide;
 
 /// What the runtime needs to know of one sensor, how it follows from a design, and the files that carry it.

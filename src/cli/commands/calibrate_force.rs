@@ -1,6 +1,7 @@
 //! `domecast calibrate-force MEASURED.csv CONSTANTS`
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use glam::{DVec2, DVec3};
 use serde_json::json;
@@ -24,7 +25,8 @@ pub(super) fn input_fault(path: &Path, problem: impl Into<String>, allowed: &str
 
 pub(super) fn read_constants(path: &Path) -> Result<Constants, Failure> {
     let text = read_text(path)?;
-    Constants::parse(&text).map_err(|error| input_fault(path, error, "a constants.json of this release"))
+    Constants::from_str(&text)
+        .map_err(|error| input_fault(path, error.to_string(), "a constants.json of this release"))
 }
 
 /// Where measured constants go when nobody says: beside the nominal ones.

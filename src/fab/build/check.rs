@@ -70,7 +70,8 @@ pub fn check(dir: &Path, step: &mut dyn FnMut(&str)) -> Result<CheckReport, Desi
         design.as_ref().map(|_| "resolves, its hash agrees".to_owned()).map_err(Clone::clone),
     );
     step("checking the dots");
-    let constants = read(dir, "constants/constants.json").and_then(|text| Constants::parse(&text));
+    let constants = read(dir, "constants/constants.json")
+        .and_then(|text| Constants::from_str(&text).map_err(|error| error.to_string()));
     match (&design, &constants) {
         (Ok(design), Ok(constants)) => check_constants(&mut report, dir, design, constants),
         (_, Err(problem)) => {

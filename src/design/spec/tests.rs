@@ -1,7 +1,7 @@
 //! The check of design texts, in memory; what a person sees is in `tests/cli_bad_input.rs`.
 
-use std::str::FromStr;
 use super::*;
+use std::str::FromStr;
 
 const THUMB24: &str = include_str!("../../../designs/thumb24.json");
 

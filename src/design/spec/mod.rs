@@ -5,15 +5,16 @@
 //! checked and derived values are computed once. What later modules see is valid by construction;
 //! they never check again, and they never see a default that the file does not state.
 
+mod design;
 mod error;
 mod explain;
+mod lints;
 mod resolve;
 mod rules;
 mod schema;
 pub mod sections;
 pub mod settings;
 mod source;
-mod suspicions;
 #[cfg(test)]
 mod tests;
 
@@ -24,9 +25,9 @@ use serde_json::Value;
 
 use domecast_optics::SensorOptics;
 
+pub use design::{Design, DesignWarning};
 pub use error::DesignError;
 pub use explain::{Explained, explain};
-pub use resolve::{Design, DesignWarning};
 pub use schema::{design_schema, schema_of};
 pub use sections::DesignFile;
 pub use source::{parse as parse_json, read_text};

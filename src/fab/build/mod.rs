@@ -133,7 +133,7 @@ pub fn build_with(
     step: &mut dyn FnMut(&str),
 ) -> Result<Build, BuildError> {
     make(design, measured, step).map_err(|error| match error {
-        BuildError::Design(error) => design.beside_suspicions(with_value(design, *error)).into(),
+        BuildError::Design(error) => design.with_lints(with_value(design, *error)).into(),
         ours @ BuildError::Ours(_) => ours,
     })
 }

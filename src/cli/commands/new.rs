@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::output::{Failure, Output};
-use domecast_design;
 use domecast_design::DesignError;
 
 /// The paper's sensor: every field is there, each with its reason.

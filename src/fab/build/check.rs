@@ -7,11 +7,10 @@ use std::str::FromStr;
 use glam::{DVec2, DVec3};
 
 use super::manifest::{DESIGN_NAME, MANIFEST_NAME, Manifest, PartRecord, sha256_hex};
-use super::tree::list_files;
 use crate::artwork;
-use domecast_design;
 use domecast_design::layout::Layout;
 use domecast_design::{Design, DesignError};
+use domecast_files::list_files;
 use domecast_mesh::{inspect, read_stl};
 use domecast_runtime::constants::Constants;
 
@@ -124,8 +123,8 @@ fn load_design(dir: &Path, manifest: &Manifest) -> Result<Design, String> {
 }
 
 fn check_constants(report: &mut CheckReport, dir: &Path, design: &Design, constants: &Constants) {
-    let layout = match super::lay_out(design) {
-        Ok((_, layout)) => layout,
+    let layout = match Layout::of_design(design) {
+        Ok(layout) => layout,
         Err(error) => {
             report.add("layout", Err(error.to_string()));
             return;

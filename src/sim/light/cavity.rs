@@ -75,8 +75,7 @@ impl Cavities {
 
     /// The hollows that reach into a box: all that rays inside it may meet.
     pub fn near(&self, low_mm: DVec3, high_mm: DVec3) -> NearHollows<'_> {
-        let reaches =
-            |hollow: &&Hollow| (low_mm.cmple(hollow.high_mm) & high_mm.cmpge(hollow.low_mm)).all();
+        let reaches = |hollow: &&Hollow| (low_mm.cmple(hollow.high_mm) & high_mm.cmpge(hollow.low_mm)).all();
         NearHollows(self.hollows.iter().filter(reaches).collect())
     }
 }

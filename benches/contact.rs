@@ -15,7 +15,7 @@ const FORCE_N: f64 = 3.0;
 
 fn dome() -> Option<(Elastomer, Suspension)> {
     let path = format!("{}/designs/thumb24.json", env!("CARGO_MANIFEST_DIR"));
-    let design = domecast::design::load(path.as_ref()).ok()?;
+    let design = domecast::design::Design::load(path.as_ref()).ok()?;
     Some((domecast::sim::elastomer_of(&design), suspension_of(&design).ok()?))
 }
 

@@ -1,4 +1,5 @@
 use std::path::Path;
+use std::str::FromStr;
 
 use glam::DVec2;
 use proptest::prelude::*;
@@ -219,7 +220,7 @@ fn bound_coils_are_said_and_the_rest_runs() {
     let text = domecast_design::read_text(&folder.join("thumb24.json")).unwrap();
     let mut value = domecast_design::parse_json(&text).unwrap();
     value["springs"]["active_coils"] = serde_json::json!(4);
-    let design = domecast_design::from_text(&value.to_string()).unwrap();
+    let design = domecast_design::Design::from_str(&value.to_string()).unwrap();
     let file = serde_json::json!({
         "version": 1, "name": "t", "design": "four-coils.json",
         "frames": { "count": 4, "rate_hz": 1, "images": false }, "tolerance": { "px": 0.1, "grey": 1 },

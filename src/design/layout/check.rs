@@ -2,10 +2,10 @@
 
 use glam::{DVec2, DVec3};
 
-use super::Hit;
 use super::dot::{Carrier, Dot, plate_outline};
 use super::lost::{LostDot, Reason, Zone};
 use super::outline::Outline;
+use super::passes::Hit;
 use super::spec::LayoutSpec;
 use super::zones::{self, ImageZone};
 

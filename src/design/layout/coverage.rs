@@ -6,10 +6,10 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Layout;
 use super::dot::{Carrier, Dot};
 use super::frame::EvenFrame;
 use super::lost::Reason;
+use super::plan::Layout;
 use super::region::dome_point;
 use super::spec::LayoutSpec;
 use super::window::Window;

@@ -6,9 +6,10 @@ use glam::{DVec2, DVec3};
 
 use super::boundary::Boundary;
 use super::dot::{Carrier, DotSize};
+use super::error::LayoutError;
 use super::frame::EvenFrame;
+use super::region;
 use super::spec::LayoutSpec;
-use super::{LayoutError, region};
 use crate::spec::sections::{OnLost, PatternCentre, PatternKind};
 use domecast_optics::Limit;
 

@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 
-use super::Layout;
+use super::plan::Layout;
 use super::spec::LayoutSpec;
 use domecast_optics::SensorOptics;
 

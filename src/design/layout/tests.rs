@@ -1,4 +1,5 @@
 use glam::{DMat3, DVec2, DVec3};
+use std::str::FromStr;
 
 use super::frame::Undistorted;
 use super::*;
@@ -497,7 +498,7 @@ fn a_load_that_hides_dots_says_which_and_why() {
 
 #[test]
 fn no_window_hides_a_dot_at_a_position_that_it_is_made_for() {
-    let design = crate::spec::from_text(include_str!("../../../designs/thumb24.json")).unwrap();
+    let design = crate::Design::from_str(include_str!("../../../designs/thumb24.json")).unwrap();
     let spec = LayoutSpec::of_design(&design).unwrap();
     let layout = Layout::new(&spec).unwrap();
     let at = |pose: Rigid| spec.optics.at_pose(&pose).unwrap();

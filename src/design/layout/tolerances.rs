@@ -4,8 +4,8 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Layout;
 use super::evenness::{evenness_of, in_plane};
+use super::plan::Layout;
 use super::spec::LayoutSpec;
 use crate::spec::sections::TolerancesSection;
 use domecast_optics::numeric::Rigid;

@@ -3,8 +3,8 @@
 use glam::DVec2;
 use serde_json::json;
 
+use super::design::Design;
 use super::error::DesignError;
-use super::resolve::Design;
 use super::sections::{CameraSection, LayerSection, OpticsSection, SpringEnds};
 
 /// Sums of written decimals (10.1 + 15.9) may miss the written limit by rounding; a nanometre is far

@@ -7,7 +7,6 @@
 use glam::{DMat3, DVec3};
 
 use super::error::DesignError;
-use super::resolve::Design;
 use super::sections::{AccuracySection, DesignFile, TolerancesSection};
 use domecast_optics::numeric::Rigid;
 use domecast_optics::{OpticsSpec, SensorOptics};
@@ -315,11 +314,4 @@ pub fn off_by_tolerances(optics: &SensorOptics, t: &TolerancesSection) -> Vec<Of
         off("indices", "tolerances.index", layers.clone().filter_map(denser).collect()),
         off("sheet's thickness", "tolerances.layer_thickness_mm", layers.filter_map(thicker).collect()),
     ]
-}
-
-impl Design {
-    /// The settings that trade time for exactness, given or chosen.
-    pub fn settings(&self) -> &Settings {
-        &self.settings
-    }
 }

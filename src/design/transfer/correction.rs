@@ -4,8 +4,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::nominal::Nominal;
-use super::{ANGLE_EPSILON_RAD, Polar, TransferError, TransferLimit, UnitPlate};
+use super::limit::{TransferError, TransferLimit};
+use super::nominal::{ANGLE_EPSILON_RAD, Nominal};
+use super::polar::{Polar, UnitPlate};
 
 /// A fitted correction to a nominal map. With s = sin(phi), azimuth theta, dome radius R:
 ///

@@ -469,7 +469,7 @@ fn numbers_for_lights_that_are_not_there_are_refused() {
     let mut file = text;
     file.light.leds.as_mut().unwrap().each = vec![1.0, 1.0];
     let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
-    let design = domecast_design::load(&folder.join("thumb24.json")).unwrap();
+    let design = domecast_design::Design::load(&folder.join("thumb24.json")).unwrap();
     let scene = crate::Scene::new(file, &folder, design).unwrap();
     let error = setup::sources(&scene, &ALL).unwrap_err().to_string();
     assert!(error.contains("light.leds.each"), "{error}");
@@ -541,7 +541,7 @@ fn scene_of_power(power: f64) -> crate::Scene {
     let mut file = scene("").file().clone();
     file.light.leds.as_mut().unwrap().power = power;
     let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
-    let design = domecast_design::load(&folder.join("thumb24.json")).unwrap();
+    let design = domecast_design::Design::load(&folder.join("thumb24.json")).unwrap();
     crate::Scene::new(file, &folder, design).unwrap()
 }
 

@@ -8,10 +8,13 @@
 
 use glam::DVec2;
 
-use super::solve::{Model, Problem};
-use super::{BEYOND_RAD, FitError, MOST_OUTLIERS, quantile};
+use super::error::FitError;
+use super::sample::Sample;
+use super::solve::{BEYOND_RAD, Model, Problem};
 use crate::transfer::{Nominal, TransferMap, UnitPlate};
 
+/// Share of outliers above which the measurement itself is in doubt.
+pub(super) const MOST_OUTLIERS: f64 = 0.3;
 /// A sample is an outlier beyond this multiple of the scatter. Of 1000 good samples in two dimensions, 0.04
 /// lie further out.
 const OUTLIER_SIGMAS: f64 = 4.5;
@@ -119,9 +122,8 @@ impl Problem<'_> {
             let on_plate = self.samples[i].plate_mm - self.samples[j].plate_mm;
             let turn = DVec2::new(apart.dot(on_plate), apart.perp_dot(on_plate)) / apart.length_squared();
             let shift = self.samples[i].plate_mm - turn.rotate(nominal_places[i]);
-            let off = |(place, sample): (&DVec2, &super::Sample)| {
-                (turn.rotate(*place) + shift).distance(sample.plate_mm)
-            };
+            let off =
+                |(place, sample): (&DVec2, &Sample)| (turn.rotate(*place) + shift).distance(sample.plate_mm);
             let lengths: Vec<f64> = nominal_places.iter().zip(self.samples).map(off).collect();
             let score = quantile(&lengths, 1.0 - MOST_OUTLIERS);
             if score < best.0 {
@@ -149,4 +151,11 @@ fn scatter(mut lengths: Vec<f64>, parameters: usize) -> f64 {
     lengths.sort_by(f64::total_cmp);
     let spoken = lengths.get(parameters / 2..).filter(|rest| !rest.is_empty()).unwrap_or(&lengths);
     quantile(spoken, 0.5) / MEDIAN_LENGTH
+}
+
+/// The value below which this share of the values lies.
+pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get((sorted.len() as f64 * share) as usize).or(sorted.last()).copied().unwrap_or(0.0)
 }

@@ -2,9 +2,36 @@
 
 use glam::DVec2;
 
+use super::sample::{MeasuredIn, Sample};
 use super::solve::{LEAST_SLOPE, Model, Problem};
-use super::{Fit, MeasuredIn, Sample};
-use crate::transfer::{Correction, Polar};
+use crate::transfer::{Correction, Nominal, Polar};
+
+/// A fitted map and how well it fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// The nominal map on which the correction rests.
+    pub nominal: Nominal,
+    /// The correction.
+    pub correction: Correction,
+    /// Root mean square of the residuals of the samples used, per axis, mm along the dome.
+    pub residual_rms_mm: f64,
+    /// Largest residual of the samples used, mm along the dome.
+    pub residual_max_mm: f64,
+    /// Scatter of one mark from print to print, per axis, mm along the dome; `None` if no mark was measured twice.
+    pub scatter_mm: Option<f64>,
+    /// Part of the scatter that whole prints share: standard deviation of the prints' mean shifts, mm
+    /// along the dome.
+    pub print_shift_mm: Option<f64>,
+    /// Root mean square that the map itself misses, per axis, mm along the dome: the residual beyond the scatter; `None`
+    /// without several prints.
+    pub lack_of_fit_mm: Option<f64>,
+    /// Indices of the samples that were left out as outliers, ascending.
+    pub rejected: Vec<usize>,
+    /// Number of free numbers of the model.
+    pub parameters: usize,
+    /// Polar angle of the outermost sample used, rad; beyond it the map is carried on by its formula.
+    pub measured_to_rad: f64,
+}
 
 impl Problem<'_> {
     /// The fit, with residuals and scatter in mm along the dome.

@@ -1,9 +1,12 @@
 //! Weighted least squares: the correction to a nominal map that leaves the least residuals.
 
+use std::f64::consts::FRAC_PI_2;
+
 use glam::DVec2;
 use nalgebra::{DMatrix, DVector};
 
-use super::{BEYOND_RAD, FURTHEST_RAD, FitError, MeasuredIn, Sample};
+use super::error::FitError;
+use super::sample::{MeasuredIn, Sample};
 use crate::transfer::{Correction, Nominal, Polar, UnitPlate};
 
 /// Bound on the steps; the model is linear in all but the rotation, and three to five are taken.
@@ -13,6 +16,11 @@ const MOST_STEPS: u32 = 12;
 const RING_GAP: f64 = 0.08;
 /// Least slope by which a plate residual is carried to the dome, so that the rim does not weigh endlessly.
 pub(super) const LEAST_SLOPE: f64 = 0.1;
+
+/// How far past the outermost sample the map is carried: half a mark and a little, rad.
+pub(super) const BEYOND_RAD: f64 = 0.06;
+/// Furthest that any measured map reaches, rad: at the rim itself a print cannot be measured from above.
+pub(super) const FURTHEST_RAD: f64 = FRAC_PI_2 - 0.03;
 
 /// Which numbers of the model are free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,28 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::Hit;
+use glam::DMat3;
+
+/// One hit of the pad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// Angle between the dome's axis and the stroke, rad.
+    pub tilt_rad: f64,
+    /// Azimuth towards which the stroke's contact moves from the pole, rad from +x.
+    pub azimuth_rad: f64,
+    /// Turns a direction of the sensor frame into the hit's frame, whose +z is the stroke reversed. Zero tilt
+    /// is the identity; else the meridian towards the hit stays where it is.
+    pub hit_from_sensor: DMat3,
+}
+
+impl Hit {
+    /// The hit whose pad comes down along the normal at this polar angle and azimuth.
+    pub fn new(tilt_rad: f64, azimuth_rad: f64) -> Self {
+        let turn = DMat3::from_rotation_z(azimuth_rad);
+        let hit_from_sensor = turn * DMat3::from_rotation_y(-tilt_rad) * turn.transpose();
+        Self { tilt_rad, azimuth_rad, hit_from_sensor }
+    }
+}
 
 /// Most sectors: more films than any shop would print.
 const MOST_SECTORS: u32 = 12;

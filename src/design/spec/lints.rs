@@ -1,11 +1,11 @@
-//! The likeliest mistakes of someone who writes a design for the first time, told by name.
+//! Lints: the likeliest mistakes of someone who writes a design for the first time.
 //!
-//! None of them is certain, so none is an error by itself: a design that works keeps its suspicions as warnings, and a
-//! design that fails has them beside the fault, because the fault that shows is often not where the mistake is.
+//! None of them is certain, so none is an error by itself: a design that works keeps its lints as warnings, and a
+//! design that fails shows them beside the error, because the error is often not where the mistake is.
 
 use std::f64::consts::PI;
 
-use super::resolve::{DesignWarning, sensor_from_camera};
+use super::design::{DesignWarning, sensor_from_camera};
 use super::sections::{DesignFile, ModelName};
 use domecast_optics::SensorOptics;
 
@@ -16,12 +16,12 @@ const LEAST_OF_VIEW: f64 = 0.8;
 /// A part of the sensor this many times smaller or larger than its neighbour is in another unit.
 const OTHER_UNIT: f64 = 50.0;
 
-fn suspicion(field: &str, message: String) -> DesignWarning {
+fn lint(field: &str, message: String) -> DesignWarning {
     DesignWarning { field: field.into(), message }
 }
 
 /// What looks like a mistake. `optics` is `None` where they could not be made.
-pub(super) fn suspicions(file: &DesignFile, optics: Option<&SensorOptics>) -> Vec<DesignWarning> {
+pub(super) fn lints(file: &DesignFile, optics: Option<&SensorOptics>) -> Vec<DesignWarning> {
     let mut found = Vec::new();
     found.extend(units(file));
     found.extend(radians(file));
@@ -77,14 +77,14 @@ fn units(file: &DesignFile) -> Vec<DesignWarning> {
         } else {
             continue;
         };
-        found.push(suspicion(
+        found.push(lint(
             field,
             format!("a wrong unit? it is {ratio:.2e} times {beside}; all lengths are millimetres: {unit}"),
         ));
     }
     let [[fx, ..], ..] = file.camera.matrix;
     if fx < 0.03 * f64::from(file.camera.width) {
-        found.push(suspicion(
+        found.push(lint(
             "camera.matrix",
             format!("a wrong unit? fx is {fx}; focal lengths of the matrix are pixels, not millimetres"),
         ));
@@ -106,7 +106,7 @@ fn radians(file: &DesignFile) -> Vec<DesignWarning> {
         .into_iter()
         .filter(|(_, angle)| (0.0..=PI).contains(angle) && *angle > 0.0)
         .map(|(field, angle)| {
-            suspicion(
+            lint(
                 field,
                 format!(
                     "radians for degrees? it is {angle}, and {angle} rad would be {:.1} degrees",
@@ -124,7 +124,7 @@ fn frame(file: &DesignFile) -> Option<DesignWarning> {
     let off = |c: f64, size: f64| (c - 0.5 * (size - 1.0)).abs() / size;
     let (stands, lies) = (off(cx, width).max(off(cy, height)), off(cx, height).max(off(cy, width)));
     (stands > 0.12 && lies < 0.5 * stands).then(|| {
-        suspicion(
+        lint(
             "camera.width",
             format!(
                 "width and height swapped? the principal point ({cx}, {cy}) lies near the middle of a frame of {height} x \
@@ -142,7 +142,7 @@ fn tangential(file: &DesignFile) -> Option<DesignWarning> {
     let [_, _, p1, p2, k3, ..] = *file.camera.distortion.as_slice() else { return None };
     let largest = p1.abs().max(p2.abs());
     (largest > LARGEST_TANGENTIAL && largest > k3.abs()).then(|| {
-        suspicion(
+        lint(
             "camera.distortion",
             format!(
                 "the coefficients in another order? p1 = {p1} and p2 = {p2} are large for a tangential part, beside k3 = \
@@ -170,7 +170,7 @@ fn other_model(file: &DesignFile, optics: &SensorOptics) -> Option<DesignWarning
         .map(|ray| ray.z.clamp(-1.0, 1.0).acos().to_degrees())
         .fold(0.0, f64::max);
     (seen_deg > 0.0 && seen_deg < LEAST_OF_VIEW * half_deg).then(|| {
-        suspicion(
+        lint(
             "camera.model",
             format!(
                 "fisheye coefficients under another model's name? the frame's corners see only {seen_deg:.1} degrees from the \
@@ -185,7 +185,7 @@ fn other_model(file: &DesignFile, optics: &SensorOptics) -> Option<DesignWarning
 fn looks_away(file: &DesignFile) -> Option<DesignWarning> {
     let axis = sensor_from_camera(&file.camera).vector(glam::DVec3::Z);
     (axis.z <= 0.0).then(|| {
-        suspicion(
+        lint(
             "camera.rotation_deg",
             "the camera looks away from the dome? with zero rotation it looks up, along the sensor's +z"
                 .to_owned(),
@@ -206,5 +206,5 @@ fn count(file: &DesignFile) -> Option<DesignWarning> {
         (ModelName::Pinhole, 1..) => "a pinhole has no coefficients: brown_conrady or kannala_brandt?",
         _ => return None,
     };
-    Some(suspicion("camera.model", message.to_owned()))
+    Some(lint("camera.model", message.to_owned()))
 }

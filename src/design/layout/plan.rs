@@ -1,4 +1,4 @@
-//! The steps from pattern to dots, in order.
+//! The dots of a design, and the steps from pattern to dots, in order.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -7,13 +7,17 @@ use super::boundary::Boundary;
 use super::check::check_dot;
 use super::dot::{Carrier, Dot, DotSize};
 use super::edge::{center, edge};
+use super::error::LayoutError;
 use super::frame::EvenFrame;
 use super::lost::{LostDot, Rule};
 use super::neighbors::neighbors;
+use super::passes::{self, Hit};
 use super::pattern::{Pattern, PatternError};
 use super::spec::LayoutSpec;
-use super::{Hit, Layout, LayoutError, gaps, hits, zones};
+use super::{gaps, zones};
+use crate::spec::Design;
 use crate::spec::sections::{Hits, OnLost, PatternKind};
+use crate::transfer::TransferMap;
 
 /// Delaunay edges up to this multiple of the nearest distance count as neighbours: below the diagonal of a
 /// square lattice (1.414), well above its side.
@@ -21,7 +25,59 @@ const LATTICE_NEIGHBORS: f64 = 1.2;
 /// The same for patterns whose spacing varies.
 const UNEVEN_NEIGHBORS: f64 = 1.6;
 
-pub(super) fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
+/// The dots of a design.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// The dots; the index is the id.
+    pub dots: Vec<Dot>,
+    /// The dots of the pattern that are left out, with their reasons.
+    pub lost: Vec<LostDot>,
+    /// The pad's hits.
+    pub hits: Vec<Hit>,
+    /// Distance of neighbours in the even frame, px; solved if the design gives a number of dots.
+    pub pitch_px: f64,
+    /// Size of the dots.
+    pub size: DotSize,
+    /// Centre of the pattern in the even frame, px.
+    pub center_px: DVec2,
+    /// Edge of the pattern in the even frame, around its centre.
+    pub edge: Boundary,
+    /// The pad's map, the same for each hit.
+    pub transfer: TransferMap,
+    /// What a person should know, in words.
+    pub warnings: Vec<String>,
+}
+
+impl Design {
+    /// The dots of the design.
+    ///
+    /// # Errors
+    /// As for [`Layout::new`].
+    pub fn layout(&self) -> Result<Layout, LayoutError> {
+        Layout::of_design(self)
+    }
+}
+
+impl Layout {
+    /// Lays out the dots of a design.
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub fn of_design(design: &Design) -> Result<Self, LayoutError> {
+        Self::new(&LayoutSpec::of_design(design)?)
+    }
+
+    /// Lays out the dots.
+    ///
+    /// # Errors
+    /// The pattern has no place, its dots are larger than its pitch, or a dot that the design requires cannot
+    /// be seen or printed.
+    pub fn new(spec: &LayoutSpec) -> Result<Self, LayoutError> {
+        lay_out(spec)
+    }
+}
+
+fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
     let size = spec.size()?;
     let transfer = spec.transfer()?;
     let frame = EvenFrame::new(spec.optics.lens(), spec.pattern.even_in, spec.undistorted);
@@ -108,7 +164,7 @@ fn plan_hits(spec: &LayoutSpec, carrier: &Carrier<'_>, center_px: DVec2, places:
         .filter_map(polar_and_own)
         .reduce(|| (0.0, 0.0), |a, b| (a.0.max(b.0), a.1.max(b.1)));
     let reach_rad = spec.print.wrap_limit_deg.to_radians() - own_rad;
-    hits::split(polar_rad, reach_rad, spec.print.max_tilt_deg.to_radians())
+    passes::split(polar_rad, reach_rad, spec.print.max_tilt_deg.to_radians())
 }
 
 fn places(spec: &LayoutSpec, edge: &Boundary) -> Result<(f64, Vec<DVec2>), LayoutError> {

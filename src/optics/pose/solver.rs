@@ -6,7 +6,7 @@ use nalgebra::Vector6;
 use super::disc::Marker;
 use super::estimate::{PoseEstimate, PoseOptions, Sighting};
 use super::fault::PoseError;
-use super::refine::{Residuals, Sharp, refine};
+use super::refine::{Fit, Residuals, Sharp, refine};
 use super::start::{planar_poses, widest_four};
 use super::view::Sheet;
 use crate::numeric::{Rigid, vector_from_rotation};
@@ -205,7 +205,19 @@ impl PoseSolver {
                 return Err(PoseError::NoViewFits { id, limit });
             }
         };
-        let count = 2.0 * seen.len() as f64;
+        self.accept(best, other, 2 * seen.len(), allowed)
+    }
+
+    /// The estimate of the best fit to `count` numbers, if its residual is within `allowed` (px^2) and the platform
+    /// can reach the pose; with the other fit where noise cannot tell the two apart.
+    fn accept(
+        &self,
+        best: Fit,
+        other: Option<Fit>,
+        count: usize,
+        allowed: f64,
+    ) -> Result<PoseEstimate, PoseError> {
+        let count = count as f64;
         let rms_px = (best.chi2 / count).sqrt();
         if best.chi2 > allowed {
             return Err(PoseError::DoesNotFit { rms_px, allowed_px: (allowed / count).sqrt() });

@@ -1,6 +1,6 @@
 //! Flat layers between the pupil and a height, and the ray through them.
 
-use super::Limit;
+use super::limit::Limit;
 
 /// Newton steps of the climb to a point. Observed in millions of random stacks:
 /// at most 14; each step past the first few doubles the digits.

@@ -13,8 +13,9 @@
 
 use glam::{DVec2, DVec3};
 
+use super::limit::Limit;
+use super::sensor::SensorOptics;
 use super::stack::{Path, Plate};
-use super::{Limit, SensorOptics};
 
 /// A thin tube of light.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -152,10 +152,10 @@ impl SensorOptics {
         let shift_slope = self.lens.pupil_shift_mm(angle).1;
         let follow = by_pupil * self.sensor_from_camera.rotation.z_axis * shift_slope;
         let feedback = 1.0 - gradient.dot(follow);
-        let whole = DMat3::IDENTITY + outer(follow, gradient) * (1.0 / feedback);
+        let feedback_matrix = DMat3::IDENTITY + outer(follow, gradient) * (1.0 / feedback);
 
         let pixel_by_direction = times(&pixel_by_ray, camera_from_sensor);
-        let pixel_by_point = times(&pixel_by_direction, whole * by_point);
+        let pixel_by_point = times(&pixel_by_direction, feedback_matrix * by_point);
 
         // Moving the platform by (v, w) in the rest frame moves the camera by
         // the opposite, seen from the sensor: pupil and axes.
@@ -166,7 +166,7 @@ impl SensorOptics {
         // The field angle changes by the turn of the axes as well.
         let pupil_by_turn = turn * cross_matrix(rest_pupil);
         let seen_by_turn = turn * cross_matrix(turn.transpose() * direction) * -1.0;
-        let by_shift = whole * by_pupil * turn * -1.0;
+        let by_shift = feedback_matrix * by_pupil * turn * -1.0;
         let by_turn = by_pupil * pupil_by_turn;
         // d_seen = d_free + follow dangle, dangle = g . (d_free + turn part) / feedback.
         let turned = by_turn + seen_by_turn;

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::limit::Limit;
 use super::sensor::SensorOptics;
-use super::stack::{MAX_CLIMB_STEPS, Path, Plate};
+use super::stack::{LayerPath, MAX_CLIMB_STEPS, Plate};
 use crate::camera::Lens;
 use crate::numeric::batch::fill;
 use crate::numeric::{LengthMismatch, MAX_ITERATIONS, RootError, bracketed_newton};
@@ -147,14 +147,14 @@ impl SensorOptics {
     }
 
     /// The layers between a pupil and a point.
-    pub(super) fn path(&self, point: DVec3, pupil: DVec3) -> Result<Path<'_>, Limit> {
+    pub(super) fn path(&self, point: DVec3, pupil: DVec3) -> Result<LayerPath<'_>, Limit> {
         if point.z <= pupil.z {
             return Err(Limit::BehindCamera);
         }
-        Ok(Path {
+        Ok(LayerPath {
             air_mm: self.bottom_mm.min(point.z) - pupil.z,
             plates: &self.plates,
-            spared_mm: (-point.z).clamp(0.0, -self.bottom_mm),
+            skipped_mm: (-point.z).clamp(0.0, -self.bottom_mm),
             fill: Plate { thickness_mm: point.z.max(0.0), ..self.fill },
         })
     }

@@ -102,8 +102,8 @@ impl SensorOptics {
         }
     }
 
-    /// [`Self::intersect_dome`]; a ray that comes up beside the dome's base is followed back to the sphere below, and said to be
-    /// so.
+    /// [`Self::intersect_dome`]; a ray that comes up beside the dome's base is followed back to the sphere below, and
+    /// the second value is then true.
     #[inline]
     fn intersect_sphere(&self, ray: DVec3, field_angle_rad: f64) -> Result<(RayHit, bool), Limit> {
         let direction = self.sensor_from_camera.vector(ray);

@@ -7,14 +7,14 @@ use crate::camera::Lens;
 use crate::numeric::Rigid;
 use crate::refraction::{Limit, SensorOptics};
 
-/// Newton steps of the climb; each squares the error.
-const MOST_CLIMB_STEPS: u32 = 40;
+/// Newton steps; each squares the error.
+const MAX_CLIMB_STEPS: u32 = 40;
 /// Newton steps for neighbours of a disc that is wide for its distance.
 const WIDE_CLIMB_STEPS: u32 = 8;
 
 /// The sensor as the pose solver sees it.
 #[derive(Debug, Clone)]
-pub(super) struct Sheet {
+pub(super) struct SheetView {
     lens: Lens,
     /// Index squared, index squared less one, thickness (mm) of each layer between air and dome.
     plates: Vec<[f64; 3]>,
@@ -24,7 +24,7 @@ pub(super) struct Sheet {
 
 /// A ray in air to a point of the sheet's top.
 #[derive(Debug, Clone, Copy)]
-struct AirRay {
+struct SheetRay {
     /// Tangent of the angle over the reach, 1/mm.
     tangent_per_mm: f64,
     /// Derivative of the tangent by the reach and by the air's thickness, 1/mm.
@@ -34,7 +34,7 @@ struct AirRay {
 
 /// A platform pose, from the sheet's side.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Placed {
+pub(super) struct PlacedSheet {
     rotation: DMat3,
     camera_from_sensor: DMat3,
     pupil: DVec3,
@@ -43,19 +43,19 @@ pub(super) struct Placed {
 
 /// A direction that a pixel sees, and how pixels change with the direction there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sight {
+pub(super) struct ObservedRay {
     ray: DVec3,
     rows: [DVec3; 2],
 }
 
-impl Sight {
+impl ObservedRay {
     /// The unit direction.
     pub fn ray(&self) -> DVec3 {
         self.ray
     }
 }
 
-impl Sheet {
+impl SheetView {
     /// `None` where the shortcut does not hold: a lens whose pupil wanders.
     pub fn new(optics: &SensorOptics) -> Option<Self> {
         if !optics.lens().is_central() {
@@ -80,32 +80,32 @@ impl Sheet {
     }
 
     /// The camera as seen from a platform at this pose; `None` where it would be in the sheet.
-    pub fn placed(&self, pose: &Rigid) -> Option<Placed> {
+    pub fn placed(&self, pose: &Rigid) -> Option<PlacedSheet> {
         let inverse = pose.rotation.transpose();
         let pupil = inverse * (self.rest_from_camera.translation_mm - pose.translation_mm);
         let air_mm = self.bottom_mm - pupil.z;
         let camera_from_sensor = self.rest_from_camera.rotation.transpose() * pose.rotation;
-        (air_mm > 0.0).then_some(Placed { rotation: pose.rotation, camera_from_sensor, pupil, air_mm })
+        (air_mm > 0.0).then_some(PlacedSheet { rotation: pose.rotation, camera_from_sensor, pupil, air_mm })
     }
 
     /// Tangent over reach near the axis, 1/mm: the first guess.
-    pub fn near_axis(&self, placed: &Placed) -> f64 {
+    pub fn paraxial_tangent_per_mm(&self, placed: &PlacedSheet) -> f64 {
         1.0 / (placed.air_mm + self.plates.iter().map(|[n2, _, d]| d / n2.sqrt()).sum::<f64>())
     }
 
     /// The direction that a pixel sees, with the pixel's derivative by it.
-    pub fn sight(&self, pixel: DVec2) -> Result<Sight, Limit> {
+    pub fn observed_ray(&self, pixel: DVec2) -> Result<ObservedRay, Limit> {
         let ray = self.lens.unproject(pixel)?;
         let (_, m) = self.lens.project_with_jacobian(ray)?;
         let row = |i: usize| DVec3::new(m[(i, 0)], m[(i, 1)], m[(i, 2)]);
-        Ok(Sight { ray, rows: [row(0), row(1)] })
+        Ok(ObservedRay { ray, rows: [row(0), row(1)] })
     }
 
     /// X(t) = air t + sum d t / sqrt(n^2 + (n^2 - 1) t^2) = reach, by Newton: X rises and is concave, so from
     /// anywhere the first step lands at or below the answer, and the others climb to it.
-    fn air_ray(&self, air_mm: f64, reach_mm: f64, start: f64) -> Option<AirRay> {
+    fn air_ray(&self, air_mm: f64, reach_mm: f64, start: f64) -> Option<SheetRay> {
         let mut t = start;
-        for _ in 0..MOST_CLIMB_STEPS {
+        for _ in 0..MAX_CLIMB_STEPS {
             let t2 = t * t;
             let (mut by_t, mut slope) = (air_mm, air_mm);
             for [n2, excess, d] in &self.plates {
@@ -122,14 +122,18 @@ impl Sheet {
             if step * step <= 1e-15 * t || reach_mm == 0.0 {
                 // On the axis the two meet: t / reach -> dt / dreach.
                 let per_mm = if reach_mm > 0.0 { t / reach_mm } else { per_slope };
-                return Some(AirRay { tangent_per_mm: per_mm, by_reach: per_slope, by_air: -t * per_slope });
+                return Some(SheetRay {
+                    tangent_per_mm: per_mm,
+                    by_reach: per_slope,
+                    by_air: -t * per_slope,
+                });
             }
         }
         None
     }
 
     /// Second and third derivative of the tangent by the reach, at a tangent: from those of X.
-    fn bends(&self, tangent: f64, by_reach: f64) -> [f64; 2] {
+    fn higher_derivatives(&self, tangent: f64, by_reach: f64) -> [f64; 2] {
         let (mut second, mut third) = (0.0, 0.0);
         for [n2, excess, d] in &self.plates {
             let inverse = 1.0 / (n2 + excess * tangent * tangent);
@@ -142,17 +146,17 @@ impl Sheet {
     }
 
     /// Exact pixels of a point on the sheet's top and of its neighbours there, at the given steps from it, and
-    /// how far the point's pixel lies from the sighted one to first order, px. `near` is a guess of the tangent
+    /// how far the point's pixel lies from the observed one to first order, px. `near` is a guess of the tangent
     /// over the reach, 1/mm.
     ///
     /// The neighbours' rays start from the point's own by Taylor's series and take the same number of Newton steps
     /// each, side by side: the series is right to the fourth power of step over distance, and each step squares that.
     pub fn pixels<const N: usize>(
         &self,
-        placed: &Placed,
+        placed: &PlacedSheet,
         point: DVec3,
         steps: [DVec2; N],
-        sight: &Sight,
+        observed: &ObservedRay,
         near: f64,
     ) -> Option<(DVec2, DVec2, [DVec2; N])> {
         let sideways = DVec2::new(point.x - placed.pupil.x, point.y - placed.pupil.y);
@@ -163,10 +167,10 @@ impl Sheet {
         };
         let ray = in_camera(sideways, air.tangent_per_mm);
         let center = self.lens.project(ray).ok()?;
-        let depth = ray.dot(sight.ray);
-        let first_order = DVec2::from_array(sight.rows.map(|row| row.dot(ray) / depth));
+        let depth = ray.dot(observed.ray);
+        let first_order = DVec2::from_array(observed.rows.map(|row| row.dot(ray) / depth));
         let tangent = reach * air.tangent_per_mm;
-        let [second, third] = self.bends(tangent, air.by_reach);
+        let [second, third] = self.higher_derivatives(tangent, air.by_reach);
         let there = steps.map(|step| sideways + step);
         let far = there.map(DVec2::length);
         let mut tangents = far.map(|far| {
@@ -202,14 +206,14 @@ impl Sheet {
         Some((center, first_order, around))
     }
 
-    /// Where a point appears from the sighted pixel, px to first order in that distance, and its derivative by
+    /// Where a point appears from the observed pixel, px to first order in that distance, and its derivative by
     /// a motion of the platform (v, w) after the pose, two rows of six. `near` is a guess of
     /// the tangent over the reach, 1/mm, and is replaced by the answer.
     pub fn offset(
         &self,
-        placed: &Placed,
+        placed: &PlacedSheet,
         point: DVec3,
-        sight: &Sight,
+        observed: &ObservedRay,
         near: &mut f64,
     ) -> Option<(DVec2, [[DVec3; 2]; 2])> {
         let sideways = DVec2::new(point.x - placed.pupil.x, point.y - placed.pupil.y);
@@ -219,12 +223,12 @@ impl Sheet {
         let tangent = sideways * air.tangent_per_mm;
         let direction = DVec3::new(tangent.x, tangent.y, 1.0);
         let in_camera = placed.camera_from_sensor * direction;
-        let depth = in_camera.dot(sight.ray);
-        // Behind the plane that touches the sight the first order says nothing.
+        let depth = in_camera.dot(observed.ray);
+        // Behind the plane that touches the observed ray the first order does not hold.
         if depth <= 0.1 * in_camera.length() {
             return None;
         }
-        let pixels = sight.rows.map(|row| row.dot(in_camera) / depth);
+        let pixels = observed.rows.map(|row| row.dot(in_camera) / depth);
         let along = if reach > 0.0 { sideways / reach } else { DVec2::ZERO };
         let (around, mix) = (air.tangent_per_mm, air.by_reach - air.tangent_per_mm);
         let seen = placed.rotation * direction;
@@ -232,7 +236,7 @@ impl Sheet {
         let to_sensor = placed.camera_from_sensor.transpose();
         let motion = std::array::from_fn(|i| {
             // Derivative of the pixel by the direction, sensor axes.
-            let q = to_sensor * ((sight.rows[i] - sight.ray * pixels[i]) / depth);
+            let q = to_sensor * ((observed.rows[i] - observed.ray * pixels[i]) / depth);
             let q_flat = DVec2::new(q.x, q.y);
             let radial = q_flat.dot(along);
             // The direction by the pupil's place, transposed onto q.

@@ -68,7 +68,7 @@ pub enum PoseError {
 }
 
 impl PoseError {
-    /// The name that files and programs carry.
+    /// The name in files.
     pub fn as_str(&self) -> &'static str {
         match self {
             Self::NotFinite { .. } => "not_finite",
@@ -108,7 +108,7 @@ impl std::fmt::Display for PoseError {
                 turn_rad.to_degrees()
             ),
             Self::NotConverged { rms_px } => {
-                write!(f, "the refinement did not settle; {rms_px:.3} px rms were left")
+                write!(f, "the refinement did not converge; {rms_px:.3} px rms are left")
             }
         }
     }

@@ -67,18 +67,6 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
                 applies: true,
             }
         }
-        Level::NeoHookean { element_mm } => {
-            let h = element_mm.clamp(0.05 * radius, radius);
-            let n = nodes(h);
-            let unknowns = 3.0 * 10.0 * (radius / h).powi(3);
-            Estimate {
-                displacement_mm: (0.1 + sharp) * h.min(4.0 * depth),
-                force_part: 0.1 + 0.1 * h / radius.min(h + depth),
-                work: 10.0 * (unknowns.powi(2) + 3.0 * n * unknowns.powf(4.0 / 3.0)),
-                setup_work: 100.0 * unknowns,
-                applies: true,
-            }
-        }
     }
 }
 

@@ -5,7 +5,6 @@ use glam::DVec3;
 use super::fem::SurfaceField;
 use super::geometric::{Placed, pushed_out};
 use super::hertz::Patch;
-use super::neo::BrickField;
 use super::state::Extent;
 
 /// A displacement field over the dome.
@@ -19,8 +18,6 @@ pub(super) enum Field {
     Sunk(Sunk),
     /// The finite elements' own.
     Elastic(SurfaceField),
-    /// The bricks' own.
-    Bricks(BrickField),
 }
 
 /// See [`super::geometric`].
@@ -68,7 +65,6 @@ impl Field {
             Self::PushedOut(field) => field.at(at_mm),
             Self::Sunk(field) => field.at(at_mm),
             Self::Elastic(field) => field.at(at_mm),
-            Self::Bricks(field) => field.at(at_mm),
         }
     }
 
@@ -81,7 +77,6 @@ impl Field {
             }
             Self::Sunk(field) => field.extent(),
             Self::Elastic(field) => field.extent(),
-            Self::Bricks(field) => field.extent(),
         }
     }
 }

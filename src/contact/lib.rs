@@ -1,11 +1,10 @@
-//! An object against the dome: pressure, friction, displacement of the membrane, in four levels.
+//! An object against the dome: pressure, friction, displacement of the membrane, in three levels.
 //!
 //! | level | what it is | where it ends |
 //! |---|---|---|
 //! | [`Level::Geometric`] | what lies inside the object is pushed out of it; force of an elastic foundation | any shape; nothing outside the object moves |
 //! | [`Level::ClosedForm`] | Hertz' ellipse, Sneddon's cone, Mindlin's friction, with the bonded base's correction | smooth faces and apices, contacts well inside the face and the dome |
 //! | [`Level::Linear`] | linear elasticity of the whole dome bonded to the sheet, unilateral contact with Coulomb friction on the object's true surface; where that is finer than the elements, on its faces as they come down | small strain; walls of half an element and more |
-//! | [`Level::NeoHookean`] | the same body at large strain | elements that collapse |
 //!
 //! Everything is in the *sensor* frame: origin at the centre of the dome's base, +z through the pole; lengths mm,
 //! forces N, moduli and pressures MPa. A contact wrench is what the object puts on the dome, about the base's
@@ -23,11 +22,9 @@ mod hertz;
 mod linear;
 mod local;
 mod mesh_distance;
-mod neo;
 mod on_pole;
 mod press;
 mod solid;
-mod sparse;
 mod state;
 mod sweeps;
 mod tangential;
@@ -64,11 +61,6 @@ pub enum Level {
         /// Length of an element on the dome's surface, mm.
         element_mm: f64,
     },
-    /// Neo-Hookean finite elements.
-    NeoHookean {
-        /// Length of an element on the dome's surface, mm.
-        element_mm: f64,
-    },
 }
 
 impl Level {
@@ -78,18 +70,12 @@ impl Level {
         Self::Linear { element_mm: 0.05 * elastomer.dome_radius_mm }
     }
 
-    /// The reference at the element size that a minute allows: R/8.
-    pub fn default_reference(elastomer: &Elastomer) -> Self {
-        Self::NeoHookean { element_mm: 0.125 * elastomer.dome_radius_mm }
-    }
-
     /// Its name in tables and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Geometric => "geometric",
             Self::ClosedForm => "closed_form",
             Self::Linear { .. } => "linear",
-            Self::NeoHookean { .. } => "neo_hookean",
         }
     }
 }
@@ -110,20 +96,6 @@ fn elements_of(elastomer: &Elastomer, element_mm: f64) -> Result<usize, ContactE
     Ok(elements)
 }
 
-/// Cells along an eighth of a great circle for a length.
-fn half_cells_of(elastomer: &Elastomer, element_mm: f64) -> Result<usize, ContactError> {
-    let element_mm = error::positive("level.element_mm", element_mm)?;
-    let arc_mm = std::f64::consts::FRAC_PI_4 * elastomer.dome_radius_mm;
-    let cells = (arc_mm / element_mm - 1e-6).ceil().max(2.0);
-    if cells > MOST_HALF_CELLS as f64 {
-        return Err(ContactError::TooFine { element_mm, least_mm: arc_mm / MOST_HALF_CELLS as f64 });
-    }
-    Ok(cells as usize)
-}
-
-/// Cells along an eighth of a great circle that time allows: the factors grow with the fourth power.
-const MOST_HALF_CELLS: usize = 12;
-
 /// Elements along the meridian that memory allows: the tables grow with their cube.
 const MOST_ELEMENTS: usize = 64;
 
@@ -140,7 +112,6 @@ pub struct Contact {
 enum Prepared {
     Nothing,
     Compliance(Arc<Compliance>),
-    Bricks(Arc<neo::Body>),
 }
 
 impl Contact {
@@ -156,10 +127,6 @@ impl Contact {
             Level::Linear { element_mm } => {
                 let elements = elements_of(&elastomer, element_mm)?;
                 Prepared::Compliance(Arc::new(Compliance::new(&elastomer, elements)?))
-            }
-            Level::NeoHookean { element_mm } => {
-                let half = half_cells_of(&elastomer, element_mm)?;
-                Prepared::Bricks(Arc::new(neo::Body::new(&elastomer, half)?))
             }
         };
         Ok(Self { elastomer, level, prepared })
@@ -197,9 +164,6 @@ impl Contact {
         self.checked(indenter, sensor_from_object, || match &self.prepared {
             Prepared::Compliance(compliance) => {
                 linear::linear(elastomer, compliance, indenter, sensor_from_object, before)
-            }
-            Prepared::Bricks(body) => {
-                neo::neo_hookean(elastomer, body, indenter, sensor_from_object, before, false)
             }
             Prepared::Nothing if self.level == Level::Geometric => {
                 local::geometric(elastomer, indenter, sensor_from_object, history)

@@ -53,6 +53,21 @@ impl<'a> Solver<'a> {
         settled_mm: f64,
         whole: bool,
     ) -> Result<ContactState, ContactError> {
+        let solved = self.solve_at(sensor_from_object, settled_mm, whole);
+        if solved.is_err() {
+            // Nodes that were chosen halfway have no compliance: the next pose starts anew.
+            self.looked = None;
+            self.touch.candidates.clear();
+        }
+        solved
+    }
+
+    fn solve_at(
+        &mut self,
+        sensor_from_object: &Rigid,
+        settled_mm: f64,
+        whole: bool,
+    ) -> Result<ContactState, ContactError> {
         self.touch.placed.move_to(*sensor_from_object);
         let mut state = ContactState::free(sensor_from_object);
         let near = self.is_near(sensor_from_object);
@@ -74,7 +89,7 @@ impl<'a> Solver<'a> {
         if near && self.touch.candidates.iter().all(|c| c.force_n == DVec3::ZERO) {
             // Lost, or met elsewhere.
             self.looked = None;
-            return self.solve(sensor_from_object, settled_mm, whole);
+            return self.solve_at(sensor_from_object, settled_mm, whole);
         }
         if !whole {
             // A trial's forces are all that its balance looks at: no field.

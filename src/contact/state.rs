@@ -13,8 +13,7 @@ pub enum Status {
     Free,
     /// Solved to its tolerance.
     Solved,
-    /// The bound on iterations was reached, or no step gained any more; the state is the last one, its residuals say how
-    /// far it is off.
+    /// The bound on iterations was reached; the state is the last one, its residuals say how far it is off.
     BoundReached,
     /// The level's formulas do not cover this contact; the state is that of the geometric level.
     NotApplicable(&'static str),
@@ -84,9 +83,6 @@ pub struct ContactState {
     pub penetration_mm: f64,
     /// What the last iteration changed, mm.
     pub residual_mm: f64,
-    /// The largest force by which a free node of bricks is out of balance, N; `None` where the level has none to balance,
-    /// or no step could be taken.
-    pub imbalance_n: Option<f64>,
     /// Iterations of the outer loop.
     pub iterations: u32,
     /// Counted work, multiplications.
@@ -106,7 +102,6 @@ impl ContactState {
             peak_pressure_mpa: 0.0,
             penetration_mm: 0.0,
             residual_mm: 0.0,
-            imbalance_n: None,
             iterations: 0,
             work: 0.0,
             field: Field::Still,

@@ -1,4 +1,4 @@
-//! Candidates, their planes, pressures and friction: the part of a solve that every elastic level shares.
+//! Candidates, their planes, pressures and friction: the part of a solve that the dome and its section on the pole share.
 //!
 //! Every candidate node sees the object as the plane that touches it where the node is now; pressures and friction
 //! follow from sweeps over the nodes on these planes ([`super::sweeps`]), and the planes are laid anew until nothing
@@ -60,8 +60,6 @@ pub(super) struct Candidate {
     hat_mm: [DVec3; 4],
     /// Its displacement (with the object's, see `sharing`), its force, sensor frame.
     pub u_mm: DVec3,
-    /// Its displacement without forces on any candidate.
-    pub offset_mm: DVec3,
     pub force_n: DVec3,
     /// The plane that it may not pass: outward normal of the object, signed distance of the resting node.
     pub normal: DVec3,
@@ -178,7 +176,6 @@ impl Candidate {
             spread_mm,
             hat_mm: hat_places(at_mm, spread_mm),
             u_mm: DVec3::ZERO,
-            offset_mm: DVec3::ZERO,
             // The old force turns with the object.
             force_n: memory.map_or(DVec3::ZERO, |memory| way.moved.vector(memory.force_n)),
             normal: DVec3::Z,
@@ -259,7 +256,7 @@ impl<'a> Touch<'a> {
         self.work += (width * width) as f64;
         let mut moved = 0.0_f64;
         for (rows, candidate) in self.blocks.chunks_exact(3 * width.max(1)).zip(&mut self.candidates) {
-            let u = displacement(rows, &forces) + candidate.offset_mm;
+            let u = displacement(rows, &forces);
             moved = moved.max(u.distance(candidate.u_mm));
             candidate.u_mm = u;
         }
@@ -322,11 +319,7 @@ impl<'a> Touch<'a> {
         let nodes: Vec<Node> = self
             .candidates
             .iter()
-            .map(|c| Node {
-                normal: c.normal,
-                rest_gap_mm: c.rest_gap_mm + c.normal.dot(c.offset_mm),
-                carried_mm: c.carried_mm - c.offset_mm,
-            })
+            .map(|c| Node { normal: c.normal, rest_gap_mm: c.rest_gap_mm, carried_mm: c.carried_mm })
             .collect();
         let ended =
             sweeps(&self.blocks, &nodes, self.elastomer.friction, &mut forces, wanted_mm, MOST_SWEEPS);

@@ -8,7 +8,8 @@ use faer::{Mat, Side};
 
 use super::element::{DOFS, stiffness};
 use super::mesh::Meridian;
-use crate::{ContactError, Elastomer};
+use crate::elastomer::Elastomer;
+use crate::error::ContactError;
 
 /// The swept dome: a mesh, and the pattern and values of K0, K1, K2.
 #[derive(Debug)]

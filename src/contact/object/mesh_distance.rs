@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::DVec3;
 
-use super::error::ContactError;
-use super::solid::Distance;
+use super::distance::Distance;
+use crate::error::ContactError;
 use domecast_mesh::{BoxTree, Cornered, TriMesh, inspect};
 
 /// A mesh prepared for distances.

@@ -4,18 +4,10 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::error::{ContactError, positive};
+use super::distance::Distance;
 use super::mesh_distance::MeshDistance;
+use crate::error::{ContactError, positive};
 use domecast_mesh::TriMesh;
-
-/// Distance to a solid's surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Distance {
-    /// Signed distance, negative inside, mm.
-    pub value_mm: f64,
-    /// Its gradient, of length 1: outwards. On the medial axis, where there is none, one of its limits.
-    pub outward: DVec3,
-}
 
 /// A solid object, checked when it was made; cheap to clone.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,7 +114,7 @@ impl Solid {
     }
 
     /// Whether it is a ball.
-    pub(super) fn is_ball(&self) -> bool {
+    pub(crate) fn is_ball(&self) -> bool {
         matches!(self.0, Form::Sphere { .. })
     }
 

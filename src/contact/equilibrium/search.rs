@@ -7,9 +7,13 @@
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector};
 
-use super::linear::Solver;
-use super::press::{PressStatus, Pressed};
-use super::{Contact, ContactError, ContactState, Indenter, Prepared};
+use super::approach::touch_mm;
+use super::pressed::{PressStatus, Pressed};
+use crate::contact::{Contact, Prepared};
+use crate::elastomer::Indenter;
+use crate::error::ContactError;
+use crate::linear::Solver;
+use crate::state::ContactState;
 use domecast_optics::numeric::{Rigid, cross_matrix};
 use domecast_springs::{Displacement, MechanicsError, Suspension, Wrench};
 
@@ -209,8 +213,13 @@ impl Task<'_> {
                     search.x.rows_mut(0, 6).fill(0.0);
                     if let Some((way, _)) = self.force {
                         let rest = Rigid::identity();
-                        let touch_mm =
-                            self.contact.touch_mm(self.indenter, &rest, &self.rest_from_object, way)?;
+                        let touch_mm = touch_mm(
+                            self.contact.elastomer().dome_radius_mm,
+                            self.indenter,
+                            &rest,
+                            &self.rest_from_object,
+                            way,
+                        )?;
                         search.x[6] = touch_mm + (search.x[6] - touch_mm) * 0.3;
                     }
                     search.count += 1;

@@ -1,43 +1,13 @@
-//! Displacement of the dome's surface, by level.
+//! The closed form's field: Hertz' displacement of a half-space, carried to the dome.
 
 use glam::DVec3;
 
-use super::fem::SurfaceField;
-use super::geometric::{Placed, pushed_out};
-use super::hertz::Patch;
-use super::neo::BrickField;
-use super::state::Extent;
-
-/// A displacement field over the dome.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Field {
-    /// Nothing moves.
-    Still,
-    /// The geometric rule.
-    PushedOut(PushedOut),
-    /// Hertz' field, carried to the dome.
-    Sunk(Sunk),
-    /// The finite elements' own.
-    Elastic(SurfaceField),
-    /// The bricks' own.
-    Bricks(BrickField),
-}
-
-/// See [`super::geometric`].
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct PushedOut {
-    pub placed: Placed,
-    pub dome_radius_mm: f64,
-    pub axis: DVec3,
-    pub angle_rad: f64,
-    /// Sideways drag of the touched region.
-    pub shift_mm: DVec3,
-    pub turn_rad: f64,
-}
+use crate::half_space::Patch;
+use crate::outcome::Extent;
 
 /// Hertz' displacement with the finite body's correction.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Sunk {
+pub(crate) struct Sunk {
     pub patch: Patch,
     /// Contact normal of the dome (outwards), the patch's axes.
     pub normal: DVec3,
@@ -53,51 +23,8 @@ pub(super) struct Sunk {
     pub turn_rad: f64,
 }
 
-impl Field {
-    /// Makes ready for many points.
-    pub fn prepare(&self, points: usize) {
-        if let Self::Elastic(field) = self {
-            field.prepare(points);
-        }
-    }
-
-    /// The displacement of a point of the dome.
-    pub fn at(&self, at_mm: DVec3) -> DVec3 {
-        match self {
-            Self::Still => DVec3::ZERO,
-            Self::PushedOut(field) => field.at(at_mm),
-            Self::Sunk(field) => field.at(at_mm),
-            Self::Elastic(field) => field.at(at_mm),
-            Self::Bricks(field) => field.at(at_mm),
-        }
-    }
-
-    /// Where it differs from zero.
-    pub fn extent(&self) -> Extent {
-        match self {
-            Self::Still => Extent { direction: DVec3::Z, angle_rad: 0.0, beyond_mm: 0.0 },
-            Self::PushedOut(field) => {
-                Extent { direction: field.axis, angle_rad: field.angle_rad, beyond_mm: 0.0 }
-            }
-            Self::Sunk(field) => field.extent(),
-            Self::Elastic(field) => field.extent(),
-            Self::Bricks(field) => field.extent(),
-        }
-    }
-}
-
-impl PushedOut {
-    fn at(&self, at_mm: DVec3) -> DVec3 {
-        let push = pushed_out(&self.placed, self.dome_radius_mm, at_mm);
-        if push == DVec3::ZERO {
-            return push;
-        }
-        push + self.shift_mm + (self.axis * self.turn_rad).cross(at_mm - self.axis * self.axis.dot(at_mm))
-    }
-}
-
 impl Sunk {
-    fn at(&self, at_mm: DVec3) -> DVec3 {
+    pub fn at(&self, at_mm: DVec3) -> DVec3 {
         let (x, y) = (at_mm.dot(self.first), at_mm.dot(self.second));
         let cosine = (at_mm.dot(self.normal) / self.dome_radius_mm).clamp(-1.0, 1.0);
         // Chord lengths from the contact keep their bearing: the half-space's plane, wrapped on the dome.
@@ -117,7 +44,7 @@ impl Sunk {
         u
     }
 
-    fn extent(&self) -> Extent {
+    pub fn extent(&self) -> Extent {
         // At right angles from the contact what is left of the sink is bounded by its half-space value there.
         let far = std::f64::consts::FRAC_PI_2;
         let reach = self.dome_radius_mm * std::f64::consts::SQRT_2;

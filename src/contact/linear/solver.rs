@@ -5,23 +5,39 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::elastomer::{Elastomer, Indenter};
-use super::error::ContactError;
-use super::fem::{Compliance, GridNode, Parts, SurfaceField};
-use super::field::Field;
-use super::finer::{Faces, fine};
-use super::geometric::{Placed, deepest, deepest_from};
-use super::local::DEEPEST;
-use super::state::{ContactState, Status};
-use super::touch::{Candidate, PENETRATION, Rounds, Spot, Touch, Way, check_seen};
+use super::candidate::{Candidate, Spot, Way};
+use super::faces::{Faces, fine};
+use super::rounds::{PENETRATION, Rounds, Touch};
+use crate::elastomer::{Elastomer, Indenter};
+use crate::error::ContactError;
+use crate::fem::{Compliance, GridNode, Parts, SurfaceField};
+use crate::field::Field;
+use crate::level::DEEPEST;
+use crate::object::{Placed, deepest, deepest_from};
+use crate::outcome::Status;
+use crate::state::ContactState;
 use domecast_optics::numeric::Rigid;
 
 /// Looks for nodes that no plane held back.
 const MOST_LOOKS: u32 = 8;
 
+/// Part of the nodes' distance by which an object that touches nothing may reach into the dome.
+const LEAST_SEEN: f64 = 0.5;
+
+/// Where no node bears a force, the object must not reach far into the dome between the nodes.
+fn check_seen(placed: &Placed, deepest_mm: DVec3, spacing_mm: f64) -> Result<(), ContactError> {
+    let radius = deepest_mm.length();
+    match placed.walk_out(deepest_mm, -deepest_mm / radius, radius) {
+        Some((depth_mm, _)) if depth_mm > LEAST_SEEN * spacing_mm => {
+            Err(ContactError::Unseen { depth_mm, spacing_mm })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// One frame of the linear level, for one pose or for the many poses of a balance: nodes, their compliance and their
 /// forces stay from pose to pose.
-pub(super) struct Solver<'a> {
+pub(crate) struct Solver<'a> {
     elastomer: &'a Elastomer,
     compliance: &'a Arc<Compliance>,
     before: Option<&'a ContactState>,
@@ -53,6 +69,21 @@ impl<'a> Solver<'a> {
         settled_mm: f64,
         whole: bool,
     ) -> Result<ContactState, ContactError> {
+        let solved = self.solve_at(sensor_from_object, settled_mm, whole);
+        if solved.is_err() {
+            // Nodes that were chosen halfway have no compliance: the next pose starts anew.
+            self.looked = None;
+            self.touch.candidates.clear();
+        }
+        solved
+    }
+
+    fn solve_at(
+        &mut self,
+        sensor_from_object: &Rigid,
+        settled_mm: f64,
+        whole: bool,
+    ) -> Result<ContactState, ContactError> {
         self.touch.placed.move_to(*sensor_from_object);
         let mut state = ContactState::free(sensor_from_object);
         let near = self.is_near(sensor_from_object);
@@ -74,7 +105,7 @@ impl<'a> Solver<'a> {
         if near && self.touch.candidates.iter().all(|c| c.force_n == DVec3::ZERO) {
             // Lost, or met elsewhere.
             self.looked = None;
-            return self.solve(sensor_from_object, settled_mm, whole);
+            return self.solve_at(sensor_from_object, settled_mm, whole);
         }
         if !whole {
             // A trial's forces are all that its balance looks at: no field.
@@ -346,7 +377,7 @@ impl<'a> Solver<'a> {
 }
 
 /// One frame of the linear level.
-pub(super) fn linear(
+pub(crate) fn linear(
     elastomer: &Elastomer,
     compliance: &Arc<Compliance>,
     indenter: &Indenter,

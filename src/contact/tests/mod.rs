@@ -1,12 +1,16 @@
 //! Contact against closed forms and itself.
 
+mod faces;
+
 use glam::DVec3;
 
-use super::*;
+use crate::contact::Prepared;
+use crate::*;
 use domecast_mesh::TriMesh;
+use domecast_optics::numeric::Rigid;
 use domecast_springs::{EndType, Spring, SpringSpec, Suspension, SuspensionSpec};
 
-pub(super) fn silicone() -> Elastomer {
+fn silicone() -> Elastomer {
     Elastomer { dome_radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, friction: 0.6 }
 }
 
@@ -93,7 +97,7 @@ fn hertz_holds_between_force_radius_and_pressure() {
 /// A linear solve without the sheet, which a large ball beside the pole would meet.
 fn solved_anywhere(contact: &Contact, indenter: &Indenter, pose: &Rigid) -> ContactState {
     let Prepared::Compliance(compliance) = &contact.prepared else { panic!("a linear level") };
-    let state = linear::linear(&contact.elastomer, compliance, indenter, pose, None).unwrap();
+    let state = linear::linear(contact.elastomer(), compliance, indenter, pose, None).unwrap();
     assert_eq!(state.status, Status::Solved);
     state
 }
@@ -108,8 +112,8 @@ fn forces_and_fields_of_the_local_levels_stay_within_their_estimates() {
                     let (object, pose) = (ball(radius), ball_at(radius, polar, depth));
                     let exact = solved_anywhere(&contact, &object, &pose);
                     for (level, found) in [
-                        (Level::Geometric, local::geometric(&elastomer, &object, &pose, None).unwrap()),
-                        (Level::ClosedForm, local::closed_form(&elastomer, &object, &pose, None).unwrap()),
+                        (Level::Geometric, levels::geometric(&elastomer, &object, &pose, None).unwrap()),
+                        (Level::ClosedForm, levels::closed_form(&elastomer, &object, &pose, None).unwrap()),
                     ] {
                         let bound = estimate(level, &elastomer, &object, depth);
                         let off = dome_points(300)
@@ -329,7 +333,7 @@ fn unusable_tasks_have_named_errors() {
 }
 
 /// A box of twelve triangles.
-pub(super) fn box_mesh(size: DVec3) -> TriMesh {
+fn box_mesh(size: DVec3) -> TriMesh {
     let corner = |i: u32| {
         let sign = |bit: u32| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
         DVec3::new(sign(0), sign(1), sign(2)) * size
@@ -411,18 +415,18 @@ fn no_point_moves_to_nowhere() {
 #[test]
 fn closed_forms_meet_each_other() {
     let (modulus, depth) = (0.7, 0.4);
-    let round = hertz::ellipse(depth, [0.1, 0.1], modulus).unwrap();
-    let nearly = hertz::ellipse(depth, [0.1, 0.1001], modulus).unwrap();
+    let round = half_space::ellipse(depth, [0.1, 0.1], modulus).unwrap();
+    let nearly = half_space::ellipse(depth, [0.1, 0.1001], modulus).unwrap();
     assert!((round.a_mm - (depth / 0.2_f64).sqrt()).abs() < 1e-12, "a^2 = R d");
     assert!((round.force_n - 4.0 / 3.0 * modulus * 0.2 * round.a_mm.powi(3)).abs() < 1e-12);
     assert!((nearly.force_n / round.force_n - 1.0).abs() < 1e-3);
-    let cone = hertz::cone(depth, 0.2, 0.0, modulus);
+    let cone = half_space::cone(depth, 0.2, 0.0, modulus);
     assert!((cone.force_n - round.force_n).abs() < 1e-12 && (cone.a_mm - round.a_mm).abs() < 1e-12);
     for patch in [
         round,
         nearly,
-        hertz::ellipse(depth, [0.05, 0.9], modulus).unwrap(),
-        hertz::cone(depth, 0.2, 0.3, modulus),
+        half_space::ellipse(depth, [0.05, 0.9], modulus).unwrap(),
+        half_space::cone(depth, 0.2, 0.3, modulus),
     ] {
         // The sink is smooth across the edge, and a force's far field far away.
         for (x, y) in [(patch.a_mm, 0.0), (0.0, patch.b_mm)] {

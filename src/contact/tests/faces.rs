@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
-use super::tests::{box_mesh, silicone};
-use super::*;
+use super::{box_mesh, silicone};
+use crate::*;
+use domecast_optics::numeric::Rigid;
 
 fn smooth(element_mm: f64) -> Contact {
     let elastomer = Elastomer { friction: 0.0, ..silicone() };

@@ -8,14 +8,12 @@
 
 use glam::{DMat3, DVec3};
 
-use super::geometric::frame_of;
-
 /// How much of its own best step a node takes: between 0 and 2 the sweeps converge, most quickly a little below 1,
 /// where a node leaves room for the neighbours that its hat overlaps (measured).
 const RELAXATION: f64 = 0.9;
 
 /// What a node must not pass, and where it would be carried; all without forces on any node.
-pub(super) struct Node {
+pub(crate) struct Node {
     /// The plane's outward normal, and the distance from it.
     pub normal: DVec3,
     pub rest_gap_mm: f64,
@@ -25,7 +23,7 @@ pub(super) struct Node {
 
 /// How the sweeps ended.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Settled {
+pub(crate) struct Settled {
     pub sweeps: u32,
     /// The most that the last sweep over all nodes moved one by its own force, mm.
     pub change_mm: f64,
@@ -47,7 +45,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// A node's displacement: its three rows of the compliance times all forces.
-pub(super) fn displacement(rows: &[f64], forces: &[f64]) -> DVec3 {
+pub(crate) fn displacement(rows: &[f64], forces: &[f64]) -> DVec3 {
     let width = forces.len();
     DVec3::new(
         dot(&rows[..width], forces),
@@ -66,7 +64,7 @@ struct Own {
 fn own(rows: &[f64], width: usize, at: usize, normal: DVec3) -> Own {
     let column = |k: usize| DVec3::new(rows[at + k], rows[width + at + k], rows[2 * width + at + k]);
     let block = DMat3::from_cols(column(0), column(1), column(2));
-    let (u, v) = frame_of(normal);
+    let (u, v) = normal.any_orthonormal_pair();
     let (uu, vv, uv) = (u.dot(block * u), v.dot(block * v), u.dot(block * v));
     let along = 0.5 * (uu + vv) + (0.25 * (uu - vv) * (uu - vv) + uv * uv).sqrt();
     Own { block, normal: normal.dot(block * normal), along }
@@ -80,7 +78,7 @@ const SWEEPS_OF_FEW: u32 = 12;
 ///
 /// Most nodes bear no force for long: between two sweeps over all, only those that do are looked at, with the part of
 /// the compliance that couples them.
-pub(super) fn sweeps(
+pub(crate) fn sweeps(
     blocks: &[f64],
     nodes: &[Node],
     friction: f64,

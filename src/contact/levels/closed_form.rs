@@ -1,124 +1,21 @@
-//! The two levels without equations to solve: geometric and closed form.
+//! The closed form: Hertz' ellipse or Sneddon's cone with the bonded base's correction, and Mindlin's friction.
 
 use glam::DVec3;
 
-use super::elastomer::{Elastomer, Indenter};
-use super::error::ContactError;
-use super::field::{Field, PushedOut, Sunk};
-use super::finite_body::held;
-use super::geometric::{FOUNDATION, Overlap, Placed, deepest, nodes_of, overlap};
-use super::hertz::{Feature, Patch, axes, cone, ellipse, feature_at};
-use super::state::{ContactState, History, Status, TouchedNode};
-use super::tangential::{Disc, Drag, drag};
+use super::drag::share_out;
+use super::geometric::geometric;
+use crate::elastomer::{Elastomer, Indenter};
+use crate::error::ContactError;
+use crate::field::{Field, Sunk};
+use crate::half_space::{Disc, Patch, axes, cone, drag, ellipse, held};
+use crate::level::DEEPEST;
+use crate::object::{Feature, Placed, deepest, feature_at};
+use crate::outcome::{History, Status, TouchedNode};
+use crate::state::ContactState;
 use domecast_optics::numeric::{Rigid, bracketed_newton};
-use domecast_springs::Wrench;
-
-/// Deepest push-out that is modelled, as a part of the radius: beyond, an object would near the sheet.
-pub(super) const DEEPEST: f64 = 0.8;
-
-/// The geometric level's state.
-pub(super) fn geometric(
-    elastomer: &Elastomer,
-    indenter: &Indenter,
-    sensor_from_object: &Rigid,
-    before: Option<&History>,
-) -> Result<ContactState, ContactError> {
-    let radius = elastomer.dome_radius_mm;
-    let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
-    let found = overlap(&placed, radius);
-    let depth_mm = -found.distance_mm;
-    if depth_mm > DEEPEST * radius || !found.all_out {
-        return Err(ContactError::TooDeep { depth_mm, limit_mm: DEEPEST * radius });
-    }
-    let mut state = ContactState::free(sensor_from_object);
-    state.work = 30.0 * found.queries as f64;
-    if found.samples.is_empty() {
-        return Ok(state);
-    }
-    let sharing = 1.0 + indenter.yield_ratio(elastomer);
-    let modulus = elastomer.plane_strain_mpa() / sharing;
-    let radius_mm = (found.area_mm2 / std::f64::consts::PI).sqrt();
-    // Half-space foundation first; the finite body then stiffens it by what its base holds back.
-    let soft: f64 = normal_force(&found, FOUNDATION * modulus / radius_mm);
-    let polar = (found.deepest_mm.z / radius).clamp(-1.0, 1.0).acos();
-    let back = held(elastomer, polar) / (elastomer.plane_strain_mpa() * radius);
-    let stiffening = stiffen(soft, depth_mm, back);
-    state.nodes = nodes_of(&found, FOUNDATION * modulus / radius_mm * stiffening);
-    state.contact_radius_mm = radius_mm;
-    state.peak_pressure_mpa = state.nodes.iter().map(|n| n.pressure_mpa).fold(0.0, f64::max);
-    let normal = found.deepest_mm / radius;
-    let pushed = state.nodes.iter().map(|n| -n.force_n.dot(normal)).sum::<f64>().max(0.0);
-    let disc = Disc { at_mm: found.deepest_mm, normal, radius_mm, force_n: pushed, sharing };
-    let drag = drag(elastomer, &disc, sensor_from_object, before);
-    finish(&mut state, &disc, &drag);
-    state.field = Field::PushedOut(PushedOut {
-        placed,
-        dome_radius_mm: radius,
-        axis: normal,
-        angle_rad: (found.angle_rad * 1.1).min(std::f64::consts::PI),
-        shift_mm: drag.shift_mm,
-        turn_rad: drag.turn_rad,
-    });
-    Ok(state)
-}
-
-fn normal_force(found: &Overlap, k_mpa_per_mm: f64) -> f64 {
-    let normal = found.deepest_mm.normalize_or_zero();
-    found.samples.iter().map(|(_, area, way, outward)| k_mpa_per_mm * way * area * -outward.dot(normal)).sum()
-}
-
-/// Factor on a half-space's force F0 at a depth d when the base holds back c F: F = F0 ((d + c F) / d)^(3/2), a
-/// ball's law, solved by bisection-safe Newton steps from the half-space's force.
-fn stiffen(force_n: f64, depth_mm: f64, back_mm_per_n: f64) -> f64 {
-    let lever = back_mm_per_n * force_n / depth_mm;
-    let law = |x: f64| {
-        let base = (1.0 + lever * x).max(0.0);
-        (x - base.powf(1.5), 1.0 - 1.5 * lever * base.sqrt())
-    };
-    // Beyond the first stationary point the law has run away from the small-contact theory.
-    let most = if lever > 0.0 { ((1.5 * lever).powi(-2) - 1.0) / lever } else { 2.0 };
-    if most.is_nan() || most <= 1.0 {
-        return 1.5;
-    }
-    bracketed_newton(law, 0.0, most.min(4.0), 1.0).map_or(1.5, |root| root.value.clamp(0.2, 4.0))
-}
-
-/// Sums the nodes and the drag into a wrench, shares the drag among the nodes by their pressure.
-fn finish(state: &mut ContactState, disc: &Disc, drag: &Drag) {
-    let pressed: f64 = state.nodes.iter().map(|n| n.pressure_mpa * n.area_mm2).sum();
-    let twist: f64 = state
-        .nodes
-        .iter()
-        .map(|n| n.pressure_mpa * n.area_mm2 * (n.at_mm - disc.at_mm).cross(disc.normal).length_squared())
-        .sum();
-    for node in &mut state.nodes {
-        let load = node.pressure_mpa * node.area_mm2;
-        if pressed > 0.0 {
-            node.force_n += drag.force_n * (load / pressed);
-        }
-        if twist > 0.0 {
-            let arm = node.at_mm - disc.at_mm;
-            node.force_n += disc.normal.cross(arm) * (drag.torsion_nmm * load / twist);
-        }
-        node.sticks = drag.sticks;
-    }
-    state.wrench = sum(&state.nodes);
-    state.status = Status::Solved;
-    state.iterations = 1;
-    state.history.tangential_n = drag.force_n;
-    state.history.torsion_nmm = drag.torsion_nmm;
-}
-
-/// Forces of the nodes about the base's centre.
-pub(super) fn sum(nodes: &[TouchedNode]) -> Wrench {
-    nodes.iter().fold(Wrench::default(), |sum, node| Wrench {
-        force_n: sum.force_n + node.force_n,
-        moment_nmm: sum.moment_nmm + node.at_mm.cross(node.force_n),
-    })
-}
 
 /// The closed form's state; where it has none, the geometric level's with the reason in its status.
-pub(super) fn closed_form(
+pub(crate) fn closed_form(
     elastomer: &Elastomer,
     indenter: &Indenter,
     sensor_from_object: &Rigid,
@@ -194,7 +91,7 @@ pub(super) fn closed_form(
     let radius_mm = state.contact_radius_mm;
     let disc = Disc { at_mm, normal, radius_mm, force_n: patch.force_n, sharing };
     let drag = drag(elastomer, &disc, sensor_from_object, before);
-    finish(&mut state, &disc, &drag);
+    share_out(&mut state, &disc, &drag);
     state.field = Field::Sunk(Sunk {
         patch,
         normal,

@@ -6,13 +6,13 @@
 
 use glam::DVec3;
 
-use super::elastomer::Elastomer;
-use super::state::History;
+use crate::elastomer::Elastomer;
+use crate::outcome::History;
 use domecast_optics::numeric::{Rigid, vector_from_rotation};
 
 /// What friction does to the dome.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Drag {
+pub(crate) struct Drag {
     /// Sideways force on the dome, sensor frame, N.
     pub force_n: DVec3,
     /// Moment about the normal, N*mm.
@@ -25,7 +25,7 @@ pub(super) struct Drag {
 }
 
 /// Contact of one disc: where, how large, how hard pressed.
-pub(super) struct Disc {
+pub(crate) struct Disc {
     pub at_mm: DVec3,
     pub normal: DVec3,
     pub radius_mm: f64,
@@ -35,7 +35,7 @@ pub(super) struct Disc {
 }
 
 /// Moves the springs by what the object moved since the last state, and lets them slip.
-pub(super) fn drag(elastomer: &Elastomer, disc: &Disc, now: &Rigid, before: Option<&History>) -> Drag {
+pub(crate) fn drag(elastomer: &Elastomer, disc: &Disc, now: &Rigid, before: Option<&History>) -> Drag {
     let shear = elastomer.shear_mpa() / disc.sharing;
     let sideways = 8.0 * disc.radius_mm * shear / (2.0 - elastomer.poisson);
     let torsional = 16.0 / 3.0 * shear * disc.radius_mm.powi(3);

@@ -2,54 +2,23 @@
 //!
 //! The unknowns are the platform's displacement and, where a force is asked for, the object's way along its
 //! approach; the equations say that the springs carry the contact's wrench, and that its force is the one asked
-//! for ([`super::trials`]).
+//! for ([`search`]).
+
+mod approach;
+mod pressed;
+mod search;
 
 use glam::DVec3;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
-use super::geometric::{Placed, deepest, deepest_from};
-use super::trials::Task;
-use super::{Contact, ContactError, ContactState, Indenter};
+use crate::contact::Contact;
+use crate::elastomer::Indenter;
+use crate::error::{ContactError, positive};
+use approach::touch_mm;
 use domecast_optics::numeric::Rigid;
-use domecast_springs::{Displacement, Suspension, Wrench};
-
-/// How a balance ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum PressStatus {
-    /// Balanced, every spring within its travel.
-    Balanced,
-    /// Balanced, but this spring (by number) is pressed beyond its coils: the true platform stops there.
-    SpringsBind {
-        /// Number of the spring, from 0.
-        spring: usize,
-    },
-    /// The bound on iterations, or the end of the springs' law, was reached with this residual, N.
-    NotBalanced {
-        /// Residual, N (moments counted over the springs' reach).
-        residual_n: f64,
-    },
-}
-
-/// An object pressed on the sprung dome.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Pressed {
-    /// Where the platform is.
-    pub rest_from_platform: Rigid,
-    /// Where the object is.
-    pub rest_from_object: Rigid,
-    /// The contact, in the moved sensor frame.
-    pub state: ContactState,
-    /// What the contact puts on the platform: rest frame, about [`Suspension::at_mm`].
-    pub wrench: Wrench,
-    /// What the balance is off, N (moments counted over the springs' reach).
-    pub residual_n: f64,
-    /// Contact solves.
-    pub iterations: u32,
-    /// How the balance ended.
-    pub status: PressStatus,
-    /// Derivative of the residual, as the search knew it at last: a start for the next frame's.
-    pub(super) learnt: Option<DMatrix<f64>>,
-}
+use domecast_springs::{Displacement, Suspension};
+pub use pressed::{PressStatus, Pressed};
+use search::Task;
 
 /// The platform's displacement of the frame before, as a start.
 fn start(suspension: &Suspension, before: Option<&Pressed>, unknowns: usize) -> DVector<f64> {
@@ -63,8 +32,6 @@ fn start(suspension: &Suspension, before: Option<&Pressed>, unknowns: usize) -> 
     x
 }
 
-/// An object counts as met when it is this near, as a part of the radius: closer than a search along its edges comes.
-const MET: f64 = 1e-4;
 /// A load missed by more than this part of it is tried in steps.
 const FAR_OFF: f64 = 1e-3;
 
@@ -110,7 +77,7 @@ impl Contact {
         let way = approach
             .try_normalize()
             .ok_or_else(|| ContactError::BadPose(format!("{approach} is no direction of approach")))?;
-        let force_n = super::error::positive("force_n", force_n)?;
+        let force_n = positive("force_n", force_n)?;
         rest_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
         let mut task = Task {
             contact: self,
@@ -128,7 +95,7 @@ impl Contact {
                 (pressed.rest_from_object.translation_mm - rest_from_object.translation_mm).dot(way)
             }
             _ => {
-                self.touch_mm(indenter, &platform, rest_from_object, way)?
+                touch_mm(self.elastomer().dome_radius_mm, indenter, &platform, rest_from_object, way)?
                     + self.first_depth_mm(indenter, force_n)
             }
         };
@@ -152,42 +119,6 @@ impl Contact {
         }
         best.iterations += iterations;
         Ok(best)
-    }
-
-    /// How far the object goes along a way until it touches the dome at a platform's pose.
-    pub(super) fn touch_mm(
-        &self,
-        indenter: &Indenter,
-        platform: &Rigid,
-        rest_from_object: &Rigid,
-        way: DVec3,
-    ) -> Result<f64, ContactError> {
-        let radius = self.elastomer().dome_radius_mm;
-        let (mut gone, mut near_mm) = (0.0, None);
-        // The distance is a safe step forwards; from inside, its depth is one backwards.
-        for _ in 0..64 {
-            let mut object = *rest_from_object;
-            object.translation_mm += way * gone;
-            let placed = Placed::new(indenter.solid.clone(), platform.inverse().compose(&object));
-            let (at_mm, distance_mm, _) = match near_mm {
-                // From one step to the next the nearest place hardly moves; what it is taken for is checked at last.
-                Some(near_mm) => deepest_from(&placed, radius, near_mm),
-                None => deepest(&placed, radius),
-            };
-            gone += distance_mm;
-            if distance_mm.abs() < MET * radius {
-                if near_mm.is_none() {
-                    return Ok(gone);
-                }
-                near_mm = None;
-                continue;
-            }
-            near_mm = Some(at_mm);
-            if gone.abs() > 1e3 * radius {
-                break;
-            }
-        }
-        Err(ContactError::BadPose(format!("the object does not meet the dome along {way}")))
     }
 
     /// Hertz' depth for the force of a ball of the object's size: a start, no result.

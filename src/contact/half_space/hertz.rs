@@ -7,91 +7,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
 
-use super::geometric::{Placed, frame_of};
-use super::solid::Form;
 use domecast_optics::numeric::bracketed_newton;
-
-/// What of the object touches.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Feature {
-    /// A smooth place: curvatures (1/mm) along `first` and across it, and the room that the feature has round the
-    /// place, mm.
-    Smooth { along: f64, across: f64, first: DVec3, room_mm: f64 },
-    /// The apex of a cone with this slope (height over radius) and that much room (mm, along the radius).
-    Apex { slope: f64, room_mm: f64 },
-}
-
-/// The feature of an object nearest to a place (sensor frame), or why it has no closed form.
-pub(super) fn feature_at(placed: &Placed, at_mm: DVec3) -> Result<Feature, &'static str> {
-    let p = placed.object_from_sensor().point(at_mm);
-    let direction = |v: DVec3| placed.sensor_from_object().vector(v);
-    let radial = p.truncate().length();
-    let away = if radial > 0.0 { (p.truncate() / radial).extend(0.0) } else { DVec3::X };
-    let flat =
-        |room_mm: f64| Feature::Smooth { along: 0.0, across: 0.0, first: direction(DVec3::X), room_mm };
-    match &placed.solid.0 {
-        Form::Sphere { radius_mm } => Ok(Feature::Smooth {
-            along: 1.0 / radius_mm,
-            across: 1.0 / radius_mm,
-            first: direction(DVec3::X),
-            room_mm: *radius_mm,
-        }),
-        Form::Cylinder { radius_mm, half_mm } => {
-            let (side, end) = (radial - radius_mm, p.z.abs() - half_mm);
-            if side > 0.0 && end > 0.0 {
-                Err("the rim of a cylinder touches: an edge has no closed form")
-            } else if side > end {
-                Ok(Feature::Smooth {
-                    along: 0.0,
-                    across: 1.0 / radius_mm,
-                    first: direction(DVec3::Z),
-                    room_mm: (half_mm - p.z.abs()).min(*radius_mm),
-                })
-            } else {
-                Ok(flat(radius_mm - radial))
-            }
-        }
-        Form::Cuboid { half_mm } => {
-            let mut excess = (p.abs() - *half_mm).to_array();
-            excess.sort_by(f64::total_cmp);
-            if excess[1] > 0.0 {
-                Err("an edge of a box touches: it has no closed form")
-            } else {
-                Ok(flat(-excess[1]))
-            }
-        }
-        Form::Cone { radius_mm, height_mm } => {
-            let length = radius_mm.hypot(*height_mm);
-            let (sine, cosine) = (radius_mm / length, height_mm / length);
-            let along_side = radial * sine + p.z * cosine;
-            // The dome's normal and the cone's axis must agree where the apex stands in the dome.
-            let tilt = direction(DVec3::Z).dot(at_mm.normalize_or_zero()).clamp(-1.0, 1.0).acos();
-            if radial <= 0.05 * radius_mm && tilt < 0.05 {
-                Ok(Feature::Apex { slope: height_mm / radius_mm, room_mm: *radius_mm })
-            } else if p.z >= *height_mm {
-                if radial < *radius_mm {
-                    Ok(flat(radius_mm - radial))
-                } else {
-                    Err("the rim of a cone touches")
-                }
-            } else if along_side > 0.0 && along_side < length {
-                Ok(Feature::Smooth {
-                    along: 0.0,
-                    across: cosine / (along_side * sine),
-                    first: direction((away * sine).with_z(cosine)),
-                    room_mm: along_side.min(length - along_side).min(along_side * sine),
-                })
-            } else {
-                Err("the apex of a tilted cone touches: it has no closed form")
-            }
-        }
-        Form::Mesh(_) => Err("a mesh has no closed form"),
-    }
-}
 
 /// Complete elliptic integrals K and E of the modulus k, by the arithmetic-geometric mean (M. Abramowitz,
 /// I. Stegun, 17.6).
-pub(super) fn elliptic(k: f64) -> (f64, f64) {
+pub(crate) fn elliptic(k: f64) -> (f64, f64) {
     let (mut a, mut b, mut power) = (1.0_f64, ((1.0 - k) * (1.0 + k)).sqrt(), 0.5);
     let mut sum = 0.5 * k * k;
     for _ in 0..40 {
@@ -109,7 +29,7 @@ pub(super) fn elliptic(k: f64) -> (f64, f64) {
 
 /// A touched ellipse, or a circle under a cone, of the half-space theory.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Patch {
+pub(crate) struct Patch {
     /// Half axes, mm: along `first`, and across.
     pub a_mm: f64,
     pub b_mm: f64,
@@ -124,7 +44,7 @@ pub(super) struct Patch {
 }
 
 /// Hertz' ellipse for an approach, gap = A x^2 + B y^2 with A <= B; `None` for curvatures without contact.
-pub(super) fn ellipse(depth_mm: f64, gap: [f64; 2], modulus_mpa: f64) -> Option<Patch> {
+pub(crate) fn ellipse(depth_mm: f64, gap: [f64; 2], modulus_mpa: f64) -> Option<Patch> {
     let [low, high] = gap;
     if !(low > 0.0 && high >= low && depth_mm > 0.0 && (high / low).is_finite()) {
         return None;
@@ -159,7 +79,7 @@ pub(super) fn ellipse(depth_mm: f64, gap: [f64; 2], modulus_mpa: f64) -> Option<
 
 /// A ball-and-cone profile, gap = r^2 / (2 R) + slope r: Sneddon's solution is linear in the profile, so that
 /// depth = a^2/R + pi/2 slope a and F = E* (4 a^3 / (3 R) + pi/2 slope a^2).
-pub(super) fn cone(depth_mm: f64, curvature: f64, slope: f64, modulus_mpa: f64) -> Patch {
+pub(crate) fn cone(depth_mm: f64, curvature: f64, slope: f64, modulus_mpa: f64) -> Patch {
     let linear = FRAC_PI_2 * slope;
     // Positive root of curvature a^2 + linear a = depth, without cancellation.
     let a = 2.0 * depth_mm / (linear + (linear * linear + 4.0 * curvature * depth_mm).sqrt());
@@ -260,8 +180,8 @@ impl Patch {
 
 /// The axes of the patch: `first` and `second` in the tangent plane at the contact, the first along the smaller
 /// relative curvature.
-pub(super) fn axes(normal: DVec3, first: DVec3) -> (DVec3, DVec3) {
-    let (any, _) = frame_of(normal);
+pub(crate) fn axes(normal: DVec3, first: DVec3) -> (DVec3, DVec3) {
+    let (any, _) = normal.any_orthonormal_pair();
     let u = (first - normal * first.dot(normal)).normalize_or(any);
     (u, normal.cross(u))
 }

@@ -4,7 +4,7 @@
 //! node is now. Neither does for a wall thinner than the nodes' distance, or beside an edge: the wall is met by some
 //! nodes and missed by others, and its nearest face is a flank. Where that is so, the object is taken as the faces that
 //! a look along its way into the dome shows, each place keeps the face that has come over it, and places between the
-//! nodes take part ([`super::fem::Places`]). The task is then convex: it has one answer, which follows the pose smoothly.
+//! nodes take part ([`crate::fem::Compliance::places`]). The task is then convex: it has one answer, which follows the pose smoothly.
 //! Flanks steeper than [`FACING`] do not push. Forces are those of the surface that the nodes carry: a pressure is a force
 //! over a node's area, and less than that of an edge.
 
@@ -12,9 +12,9 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::fem::Compliance;
-use super::geometric::Placed;
-use super::touch::{Face, hat_places};
+use super::candidate::{Face, hat_places};
+use crate::fem::Compliance;
+use crate::object::Placed;
 
 /// A place between the nodes takes part where the object reaches deeper than the nodes tell by more than this part of
 /// their distance. A ball does so where its radius is below 1.25 of them.
@@ -28,7 +28,7 @@ const AHEAD: f64 = 0.75;
 const FACING: f64 = 0.3;
 
 /// What takes part where an object is finer than the nodes: nodes and places by number, each with its face.
-pub(super) type Faces = BTreeMap<usize, Face>;
+pub(crate) type Faces = BTreeMap<usize, Face>;
 
 /// A face over a place: a point of it, its outward normal, and the place's signed distance.
 #[derive(Clone, Copy)]
@@ -39,7 +39,7 @@ struct Over {
 }
 
 /// The faces of an object over the dome, if it is finer than the nodes there; and the distances asked for.
-pub(super) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, f64) {
+pub(crate) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, f64) {
     let (grid, places) = (&compliance.grid, &compliance.places);
     let spacing_mm = grid.radius_mm * std::f64::consts::FRAC_PI_2 / grid.elements as f64;
     if placed.ball().is_some_and(|(_, radius_mm)| radius_mm > ROUND * spacing_mm) {

@@ -168,11 +168,10 @@ fn page_warnings(page: &Path) -> String {
     page[start..].split("</section>").next().expect("its text").to_owned()
 }
 
-/// What is wrong with the answer to a case; empty if nothing is.
-fn faults(topic: &Topic, case: &Case, raw: Option<&Path>) -> Vec<String> {
-    let folder = tempfile::tempdir().expect("a folder");
+/// Lays out a case's files in a folder; returns the input's name.
+fn lay_out(topic: &Topic, case: &Case, raw: Option<&Path>, folder: &Path) -> String {
     for (name, value) in topic.files.iter().chain(&case.files) {
-        let path = folder.path().join(name);
+        let path = folder.join(name);
         if value.is_null() {
             fs::create_dir_all(&path).expect("made");
         } else {
@@ -180,21 +179,26 @@ fn faults(topic: &Topic, case: &Case, raw: Option<&Path>) -> Vec<String> {
             fs::write(&path, bytes_of(value)).expect("written");
         }
     }
+    let Some(name) = &topic.input else { return String::new() };
     let ending = raw.and_then(Path::extension).unwrap_or_default().to_string_lossy();
-    let input = topic.input.as_ref().map(|name| name.replace('*', &ending));
-    if let Some(name) = &input {
-        let base = match &topic.base {
-            Some(Value::String(path)) => fs::read(with_places(path)).expect("the base can be read"),
-            Some(json) => bytes_of_json(json),
-            None => Vec::new(),
-        };
-        let bytes = raw.map_or_else(|| changed(&base, case), |path| fs::read(path).expect("it can be read"));
-        fs::write(folder.path().join(name), bytes).expect("written");
-    }
+    let name = name.replace('*', &ending);
+    let base = match &topic.base {
+        Some(Value::String(path)) => fs::read(with_places(path)).expect("the base can be read"),
+        Some(json) => bytes_of_json(json),
+        None => Vec::new(),
+    };
+    let bytes = raw.map_or_else(|| changed(&base, case), |path| fs::read(path).expect("it can be read"));
+    fs::write(folder.join(&name), bytes).expect("written");
+    name
+}
+
+/// What is wrong with the answer to a case; empty if nothing is.
+fn faults(topic: &Topic, case: &Case, raw: Option<&Path>) -> Vec<String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let input = lay_out(topic, case, raw, folder.path());
     let before = contents(folder.path());
 
     let run = case.run.as_ref().or(topic.run.as_ref()).expect("the topic or the case says what to run");
-    let input = input.unwrap_or_default();
     let run: Vec<String> =
         run.iter().map(|argument| with_places(&argument.replace("{input}", &input))).collect();
     let arguments: Vec<&str> = run.iter().map(String::as_str).collect();

@@ -192,6 +192,38 @@ fn lay_out(topic: &Topic, case: &Case, raw: Option<&Path>, folder: &Path) -> Str
     name
 }
 
+/// What is wrong with standard output.
+fn faults_of_output(case: &Case, printed: &str) -> Vec<String> {
+    let mut faults = Vec::new();
+    for part in &case.prints {
+        if !printed.contains(&with_places(part)) {
+            faults.push(format!("standard output lacks \"{part}\""));
+        }
+    }
+    let mut compare = |json: &str, values: &Map<String, Value>| {
+        let json: Value = serde_json::from_str(json).unwrap_or_default();
+        for (pointer, value) in values {
+            match json.pointer(pointer) {
+                Some(found) if found == value => {}
+                Some(found) => faults.push(format!("{pointer} is {found}, not {value}")),
+                None => faults.push(format!("{pointer} is missing, and should be {value}")),
+            }
+        }
+    };
+    if !case.json.is_empty() {
+        compare(printed, &case.json);
+    }
+    if let Some(lines) = &case.json_lines {
+        for (line, values) in printed.lines().zip(lines) {
+            compare(line, values);
+        }
+        if printed.lines().count() != lines.len() {
+            faults.push(format!("not {} lines on standard output", lines.len()));
+        }
+    }
+    faults
+}
+
 /// What is wrong with the answer to a case; empty if nothing is.
 fn faults(topic: &Topic, case: &Case, raw: Option<&Path>) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
@@ -207,38 +239,14 @@ fn faults(topic: &Topic, case: &Case, raw: Option<&Path>) -> Vec<String> {
     let printed = String::from_utf8(output.stdout).expect("UTF-8");
 
     let mut faults = Vec::new();
-    let mut expect = |holds: bool, fault: String| {
-        if !holds {
-            faults.push(fault);
-        }
-    };
+    let mut expect = |holds: bool, fault: String| faults.extend((!holds).then_some(fault));
     let exit = case.exit.unwrap_or(topic.exit);
     expect(output.status.code() == Some(exit), format!("exit code {:?}, not {exit}", output.status.code()));
     for part in case.says.iter().chain(topic.says.iter().filter(|_| exit == topic.exit)) {
         expect(message.contains(&with_places(part)), format!("the message does not say \"{part}\""));
     }
-    for part in &case.prints {
-        expect(printed.contains(&with_places(part)), format!("standard output lacks \"{part}\""));
-    }
-    let mut expect_values = |json: &str, values: &Map<String, Value>| {
-        let json: Value = serde_json::from_str(json).unwrap_or_default();
-        for (pointer, value) in values {
-            let found = json.pointer(pointer).cloned().unwrap_or_default();
-            expect(found == *value, format!("{pointer} is {found}, not {value}"));
-        }
-    };
-    if !case.json.is_empty() {
-        expect_values(&printed, &case.json);
-    }
-    if let Some(lines) = &case.json_lines {
-        for (line, values) in printed.lines().zip(lines) {
-            expect_values(line, values);
-        }
-        expect(
-            printed.lines().count() == lines.len(),
-            format!("not {} lines on standard output", lines.len()),
-        );
-    }
+    faults.extend(faults_of_output(case, &printed));
+    let mut expect = |holds: bool, fault: String| faults.extend((!holds).then_some(fault));
     if exit == 1 && run.iter().any(|argument| argument == "--json") {
         expect(message.is_empty(), "with --json, something stands on standard error".to_owned());
         let json: Value = serde_json::from_str(&printed).unwrap_or_default();

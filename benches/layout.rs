@@ -5,6 +5,7 @@
 //! proportion to the dots. Then criterion's medians of laying out and of writing.
 
 use std::hint::black_box;
+use std::str::FromStr;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -41,7 +42,7 @@ fn design_with(count: u32, scale: f64, kind: &str) -> design::Design {
     pattern["dot_diameter_px"] = json!(pitch_px / 3.0);
     value["print"]["min_dot_mm"] = json!(0.001);
     value["print"]["min_gap_mm"] = json!(0.001);
-    design::from_text(&value.to_string()).expect("a design")
+    domecast::design::Design::from_str(&value.to_string()).expect("a design")
 }
 
 /// The largest memory that the process has held since it was last asked, MB; nothing where Linux does not tell.

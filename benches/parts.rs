@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("parts: cargo bench --bench parts -- DESIGN FOLDER");
         return Ok(());
     };
-    let design = domecast::design::load(Path::new(&design)).map_err(|error| error.to_string())?;
+    let design = domecast::design::Design::load(Path::new(&design)).map_err(|error| error.to_string())?;
     let measures = Measures::of(&design)?;
     let parts = build(&measures, &[Hit::new(0.0, 0.0)])?;
     let assembly = Assembly::of(&measures, &parts)?;

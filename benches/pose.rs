@@ -11,7 +11,7 @@ use glam::DVec3;
 fn poses(c: &mut Criterion) {
     for name in ["thumb24", "thumb24-fisheye"] {
         let path = format!("{}/designs/{name}.json", env!("CARGO_MANIFEST_DIR"));
-        let Ok(design) = domecast::design::load(path.as_ref()) else { continue };
+        let Ok(design) = domecast::design::Design::load(path.as_ref()) else { continue };
         let markers = markers_of(&design);
         let Ok(solver) = PoseSolver::new(design.optics(), &markers, PoseOptions::new(0.1, 5.0)) else {
             continue;

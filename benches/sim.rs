@@ -3,6 +3,7 @@
 //! (`effects`, `slopes`).
 
 use std::path::Path;
+use std::str::FromStr;
 use std::sync::LazyLock;
 use std::time::Instant;
 
@@ -24,7 +25,7 @@ fn design_with(change: impl Fn(&mut Value)) -> Option<Design> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
     let mut value = design::parse_json(&design::read_text(&path).ok()?).ok()?;
     change(&mut value);
-    match design::from_text(&value.to_string()) {
+    match Design::from_str(&value.to_string()) {
         Ok(design) => Some(design),
         Err(error) => {
             println!("design: {error}");

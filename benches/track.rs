@@ -13,7 +13,7 @@ use glam::DVec3;
 
 fn frames(criterion: &mut Criterion) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
-    let design = domecast::design::load(&path).expect("the design");
+    let design = domecast::design::Design::load(&path).expect("the design");
     let layout = domecast::layout::Layout::of_design(&design).expect("its layout");
     let constants = domecast::constants::of(&design, &layout).expect("its constants");
     let optics = constants.sensor().expect("its optics");

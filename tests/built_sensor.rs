@@ -17,7 +17,7 @@ use domecast::springs::Displacement;
 
 fn nominal() -> Constants {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
-    let design = domecast::design::load(&path).unwrap();
+    let design = domecast::design::Design::load(&path).unwrap();
     let layout = Layout::of_design(&design).unwrap();
     constants::of(&design, &layout).unwrap()
 }

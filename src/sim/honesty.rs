@@ -2,6 +2,7 @@
 
 use domecast_optics::numeric::SeededRandom;
 use std::path::Path;
+use std::str::FromStr;
 
 use serde_json::{Value, json};
 
@@ -27,7 +28,7 @@ fn small_design(change: &dyn Fn(&mut Value)) -> Design {
     value["pattern"]["pitch_px"] = json!(10);
     value["pattern"]["dot_diameter_px"] = json!(4);
     change(&mut value);
-    domecast_design::from_text(&value.to_string()).unwrap_or_else(|error| panic!("{error}"))
+    Design::from_str(&value.to_string()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Designs that call for more or less: lenses, a moving pupil, colours, nearly equal inrandoms.

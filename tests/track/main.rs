@@ -9,6 +9,7 @@ mod sequences;
 mod simulated;
 
 use std::path::Path;
+use std::str::FromStr;
 use std::sync::LazyLock;
 
 use domecast::constants::{Constants, MarkerSight};
@@ -30,11 +31,11 @@ struct Sensor {
 
 static SENSOR: LazyLock<Sensor> = LazyLock::new(|| {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("designs/thumb24.json");
-    let design = domecast::design::load(&path).expect("the design");
+    let design = Design::load(&path).expect("the design");
     let layout = Layout::of_design(&design).expect("its layout");
     let constants = domecast::constants::of(&design, &layout).expect("its constants");
     // As a runtime gets them.
-    let constants = Constants::parse(&constants.to_json()).expect("its own file");
+    let constants = Constants::from_str(&constants.to_json()).expect("its own file");
     let optics = constants.sensor().expect("its optics");
     Sensor { design, constants, optics }
 });

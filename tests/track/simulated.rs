@@ -199,7 +199,7 @@ fn touch(seed: u64) -> Value {
 /// Every frame of a touch with every effect that there is.
 fn drawn_with_everything(file: &Value) -> Vec<Drawn> {
     let file: SceneFile = domecast::design::from_value(file).expect("a scene's fields");
-    let design = domecast::design::load(&scenes().join("../thumb24.json")).expect("the design");
+    let design = domecast::design::Design::load(&scenes().join("../thumb24.json")).expect("the design");
     let scene = Scene::new(file, &scenes(), design).expect("a scene");
     let plan = Plan::everything(&scene).expect("a plan");
     let renderer = Renderer::new(&scene, &plan).expect("its effects");

@@ -3,12 +3,13 @@ mod random_designs;
 
 use super::ladder::sizes;
 use super::*;
+use std::str::FromStr;
 
 fn design_from(change: impl FnOnce(&mut serde_json::Value)) -> Result<Design, DesignError> {
     let mut value: serde_json::Value =
         serde_json::from_str(include_str!("../../../designs/thumb24.json")).unwrap();
     change(&mut value);
-    domecast_design::from_text(&value.to_string())
+    domecast_design::Design::from_str(&value.to_string())
 }
 
 fn timing(median_s: f64) -> Timing {
@@ -128,7 +129,7 @@ fn long_ladders_of_the_twins_fall_at_their_orders() {
 
 /// `left_out` dials are not of this design.
 fn ladders_of(name: &str, text: &str, left_out: usize) {
-    let design = domecast_design::from_text(text).unwrap();
+    let design = domecast_design::Design::from_str(text).unwrap();
     let mut steps = Vec::new();
     let measured = measure(&design, None, true, &mut |done, _| steps.push(done)).unwrap();
     assert_eq!(steps, (0..STEPS).collect::<Vec<_>>(), "{name}");
@@ -200,7 +201,11 @@ fn settings_are_chosen_where_the_file_leaves_them_open() {
     assert_eq!(settings.outline_tolerance_mm.value, 0.002);
     assert_eq!(settings.chord_tolerance_mm.value, 0.02);
     assert!(settings.samples.chosen && settings.samples.value.is_power_of_two());
-    assert!(settings.lines().iter().all(|line| line.contains("2 times over")), "{:?}", settings.lines());
+    assert!(
+        settings.lines().iter().all(|line| line.contains("safety factor of 2")),
+        "{:?}",
+        settings.lines()
+    );
     // what the file gives stands, whatever is asked
     let explicit = design_from(|d| d["mesh"]["chord_tolerance_mm"] = 0.3.into()).unwrap();
     assert_eq!(explicit.settings().chord_tolerance_mm.value, 0.3);
@@ -268,7 +273,7 @@ fn long_chosen_settings_keep_what_is_asked_over_the_sweep_of_the_parts() {
         }
         d["pattern"]["unseen"] = "drop".into();
         d["pattern"]["unprintable"] = "drop".into();
-        let Ok(design) = domecast_design::from_text(&d.to_string()) else { continue };
+        let Ok(design) = domecast_design::Design::from_str(&d.to_string()) else { continue };
         done += usize::from(keeps_what_is_asked(&design, asked, 32));
         // not of those that a real printer's limits mostly refuse
         if index % 6 != 1 {

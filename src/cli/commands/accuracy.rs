@@ -8,7 +8,6 @@ use serde_json::json;
 use super::output::{Failure, Output};
 use crate::accuracy;
 use crate::accuracy::AccuracyError;
-use domecast_design;
 use domecast_design::DesignError;
 use domecast_fab::build::{DESIGN_NAME, DesignRecord, MANIFEST_NAME, Manifest, Tree, sha256_hex};
 use domecast_sim::{Scene, SimError};
@@ -22,7 +21,7 @@ pub fn run(
     quick: bool,
 ) -> Result<(), Failure> {
     let began = Instant::now();
-    let design = domecast_design::load(design_file)?;
+    let design = domecast_design::Design::load(design_file)?;
     let scene = scene_file
         .map(|path| {
             Scene::load(path).map_err(|error| match error {
@@ -50,7 +49,7 @@ pub fn run(
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
     let record =
         DesignRecord { name: design.name().to_owned(), sha256: sha256_hex(design.text().as_bytes()) };
-    let manifest = Manifest::new(record, Vec::new(), Vec::new(), &tree);
+    let manifest = Manifest::new(record, Vec::new(), Vec::new(), tree.files());
     let text =
         serde_json::to_string_pretty(&manifest).map_err(|error| Failure::Internal(error.to_string()))?;
     tree.add(MANIFEST_NAME, text.into_bytes());
@@ -59,7 +58,7 @@ pub fn run(
         Path::to_path_buf,
     );
     output.step("writing");
-    tree.write(&out).map_err(Failure::Write)?;
+    tree.write(&out)?;
     output.steps_done();
     for ladder in &measured.ladders {
         let rung = |index: Option<usize>| index.and_then(|index| ladder.rungs.get(index));
@@ -67,7 +66,7 @@ pub fn run(
             format!(
                 "{} leaves {} {} at {:.3e} s a {}",
                 rung.label,
-                domecast_fab::report::sparse(rung.max_error),
+                domecast_fab::numbers::significant(rung.max_error),
                 ladder.unit,
                 rung.per_item_s,
                 ladder.item
@@ -77,7 +76,7 @@ pub fn run(
         if let (Some(asked), Some(enough)) = (ladder.asked, rung(ladder.meets)) {
             output.say(&format!(
                 "  {} {} asked: {} is enough",
-                domecast_fab::report::sparse(asked),
+                domecast_fab::numbers::significant(asked),
                 ladder.unit,
                 enough.label
             ))?;
@@ -87,9 +86,9 @@ pub fn run(
         output.say(&format!(
             "{}: {} {} ({} worked out)",
             budget.title,
-            domecast_fab::report::sparse(budget.total),
+            domecast_fab::numbers::significant(budget.total),
             budget.unit,
-            domecast_fab::report::sparse(budget.computed)
+            domecast_fab::numbers::significant(budget.computed)
         ))?;
     }
     output.say(&format!(

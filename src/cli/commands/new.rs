@@ -2,11 +2,11 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use serde_json::json;
 
 use super::output::{Failure, Output};
-use domecast_design;
 use domecast_design::DesignError;
 
 /// The paper's sensor: every field is there, each with its reason.
@@ -22,12 +22,12 @@ pub fn run(output: &Output, name: &str, from: Option<&Path>, out: Option<&Path>)
         Some(path) => domecast_design::read_text(path)?,
     };
     // a start that does not hold would be blamed on the new design
-    let start = domecast_design::from_text(&text).map_err(|error| match from {
+    let start = domecast_design::Design::from_str(&text).map_err(|error| match from {
         Some(path) => error.in_file(path),
         None => error,
     })?;
     let fresh = renamed(&text, start.name(), name);
-    domecast_design::from_text(&fresh)?;
+    domecast_design::Design::from_str(&fresh)?;
     let path = out.map_or_else(
         || {
             let folder = if Path::new("designs").is_dir() { "designs" } else { "" };

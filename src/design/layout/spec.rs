@@ -2,8 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::LayoutError;
 use super::dot::DotSize;
+use super::error::LayoutError;
 use super::frame::Undistorted;
 use crate::spec::Design;
 use crate::spec::sections::{PatternSection, PrintSection, TransferMapName};

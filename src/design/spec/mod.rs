@@ -5,15 +5,16 @@
 //! checked and derived values are computed once. What later modules see is valid by construction;
 //! they never check again, and they never see a default that the file does not state.
 
+mod design;
 mod error;
 mod explain;
+mod lints;
 mod resolve;
 mod rules;
 mod schema;
 pub mod sections;
 pub mod settings;
 mod source;
-mod suspicions;
 #[cfg(test)]
 mod tests;
 
@@ -24,9 +25,9 @@ use serde_json::Value;
 
 use domecast_optics::SensorOptics;
 
+pub use design::{Design, DesignWarning};
 pub use error::DesignError;
 pub use explain::{Explained, explain};
-pub use resolve::{Design, DesignWarning};
 pub use schema::{design_schema, schema_of};
 pub use sections::DesignFile;
 pub use source::{parse as parse_json, read_text};
@@ -34,23 +35,25 @@ pub use source::{parse as parse_json, read_text};
 /// The fields that tracing and projecting need; nothing else in the file matters to them.
 const OPTICS_FIELDS: [&str; 4] = ["name", "camera", "optics", "dome"];
 
-/// Reads and resolves a whole design.
-///
-/// # Errors
-/// The first fault of the file: see [`DesignError`].
-pub fn load(path: &Path) -> Result<Design, DesignError> {
-    let text = read_text(path)?;
-    from_text(&text).map_err(|error| error.in_file(path))
+impl Design {
+    /// Reads and resolves a whole design file.
+    ///
+    /// # Errors
+    /// The first fault of the file: see [`DesignError`].
+    pub fn load(path: &Path) -> Result<Self, DesignError> {
+        read_text(path)?.parse().map_err(|error: DesignError| error.in_file(path))
+    }
 }
 
-/// Resolves a design from its text.
-///
-/// # Errors
-/// The first fault of the text: see [`DesignError`].
-pub fn from_text(text: &str) -> Result<Design, DesignError> {
-    let value = parse_json(text)?;
-    check_version(&value)?;
-    resolve::resolve(from_value(&value)?, text)
+impl std::str::FromStr for Design {
+    type Err = DesignError;
+
+    /// Resolves a design from its text.
+    fn from_str(text: &str) -> Result<Self, DesignError> {
+        let value = parse_json(text)?;
+        check_version(&value)?;
+        resolve::resolve(from_value(&value)?, text)
+    }
 }
 
 /// Reads only the camera, the layers and the dome of a design; other fields may say anything.
@@ -95,7 +98,7 @@ fn check_version(value: &Value) -> Result<(), DesignError> {
             "this release does not read that version of the design file",
             "1",
         )
-        .with_help("write the design anew from a current example, such as designs/thumb24.json")),
+        .with_help("start from a current example, such as designs/thumb24.json")),
         _ => Ok(()),
     }
 }

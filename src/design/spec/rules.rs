@@ -3,15 +3,15 @@
 use glam::DVec2;
 use serde_json::json;
 
+use super::design::Design;
 use super::error::DesignError;
-use super::resolve::Design;
 use super::sections::{CameraSection, LayerSection, OpticsSection, SpringEnds};
 
 /// Sums of written decimals (10.1 + 15.9) may miss the written limit by rounding; a nanometre is far
 /// below anything that can be made.
 const ROUNDING_MM: f64 = 1e-6;
 
-/// Checks all of them; the first that does not hold is the answer.
+/// Checks all of them; the error is the first that does not hold.
 pub(super) fn check(design: &Design) -> Result<(), DesignError> {
     sizes(design)?;
     dome_on_platform(design)?;

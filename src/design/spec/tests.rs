@@ -1,12 +1,13 @@
 //! The check of design texts, in memory; what a person sees is in `tests/cli_bad_input.rs`.
 
 use super::*;
+use std::str::FromStr;
 
 const THUMB24: &str = include_str!("../../../designs/thumb24.json");
 
 #[test]
 fn thumb24_resolves() {
-    let design = from_text(THUMB24).unwrap_or_else(|error| panic!("{error}"));
+    let design = Design::from_str(THUMB24).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(design.name(), "thumb24");
     let [low, high] = design.bounds_mm();
     assert!(((high - low) - glam::DVec3::new(24.0, 24.0, 26.0)).length() < 1e-9);
@@ -38,7 +39,7 @@ fn other_sections_do_not_matter_to_the_optics() {
 #[test]
 fn rotation_is_rz_ry_rx() {
     let turned = THUMB24.replace("\"rotation_deg\": [0, 0, 0]", "\"rotation_deg\": [1, 2, 3]");
-    let design = from_text(&turned).unwrap_or_else(|error| panic!("{error}"));
+    let design = Design::from_str(&turned).unwrap_or_else(|error| panic!("{error}"));
     let [a, b, c] = [1.0_f64, 2.0, 3.0].map(f64::to_radians);
     // the third column of Rz(c) Ry(b) Rx(a), multiplied out by hand
     let axis = glam::DVec3::new(

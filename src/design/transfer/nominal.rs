@@ -4,7 +4,8 @@ use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 use glam::{DVec2, DVec3};
 
-use super::ANGLE_EPSILON_RAD;
+/// Slack for angles that rounding pushes past the rim, rad.
+pub(super) const ANGLE_EPSILON_RAD: f64 = 1e-12;
 
 /// Below this angle (rad) ratios over sin(phi) come from their series: the first term left out is below 1e-17.
 const SMALL_ANGLE_RAD: f64 = 1e-4;

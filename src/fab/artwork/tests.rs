@@ -1,4 +1,5 @@
 use glam::DVec2;
+use std::str::FromStr;
 use svg::parser::Event;
 
 use super::*;
@@ -6,7 +7,7 @@ use domecast_design;
 use domecast_design::layout::Layout;
 
 fn thumb24() -> (LayoutSpec, Layout, FilmLabel) {
-    let design = domecast_design::from_text(include_str!("../../../designs/thumb24.json")).unwrap();
+    let design = domecast_design::Design::from_str(include_str!("../../../designs/thumb24.json")).unwrap();
     let spec = LayoutSpec::of_design(&design).unwrap();
     let layout = Layout::new(&spec).unwrap();
     let label = FilmLabel { design: design.name().into(), hash: "0123456789abcdef".repeat(4) };

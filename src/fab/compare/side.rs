@@ -6,7 +6,6 @@ use serde_json::Value;
 
 use crate::build;
 use crate::build::{BuildError, DESIGN_NAME, MANIFEST_NAME};
-use domecast_design;
 use domecast_design::DesignError;
 
 const CONSTANTS: &str = "constants/constants.json";
@@ -34,7 +33,7 @@ impl Side {
         if path.is_dir() {
             return Ok(Self::of_build(path)?);
         }
-        let design = domecast_design::load(path)?;
+        let design = domecast_design::Design::load(path)?;
         let made = build::build(&design, step).map_err(|error| match error {
             BuildError::Design(error) => error.in_file(path).into(),
             ours @ BuildError::Ours(_) => ours,

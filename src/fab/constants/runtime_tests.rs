@@ -8,7 +8,7 @@ use domecast_optics::numeric::{Rigid, SeededRandom};
 
 fn thumb(name: &str) -> Design {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs").join(name);
-    domecast_design::load(&path).unwrap()
+    domecast_design::Design::load(&path).unwrap()
 }
 
 fn springs(design: &Design) -> DesignSprings {

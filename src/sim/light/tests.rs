@@ -351,7 +351,7 @@ fn ways_of(optics: &SensorOptics, source: Emitter) -> Ways {
 #[test]
 fn the_table_of_direct_light_matches_closed_forms_to_a_thousandth() {
     let optics = sensor(&[1.0], 1.0);
-    let parts = FieldParts { falloff: true, albedo: None, moved: true, tolerance: 5e-4 };
+    let parts = FieldParts { falloff: true, albedo: None, moved: true };
     // A point on the sphere: even light.
     let at = DVec3::new(6.0, 0.0, -8.0);
     let ways = ways_of(&optics, emitter(at, -at, 1e-4, 1.0));
@@ -469,7 +469,7 @@ fn numbers_for_lights_that_are_not_there_are_refused() {
     let mut file = text;
     file.light.leds.as_mut().unwrap().each = vec![1.0, 1.0];
     let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
-    let design = domecast_design::load(&folder.join("thumb24.json")).unwrap();
+    let design = domecast_design::Design::load(&folder.join("thumb24.json")).unwrap();
     let scene = crate::Scene::new(file, &folder, design).unwrap();
     let error = setup::sources(&scene, &ALL).unwrap_err().to_string();
     assert!(error.contains("light.leds.each"), "{error}");
@@ -541,7 +541,7 @@ fn scene_of_power(power: f64) -> crate::Scene {
     let mut file = scene("").file().clone();
     file.light.leds.as_mut().unwrap().power = power;
     let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
-    let design = domecast_design::load(&folder.join("thumb24.json")).unwrap();
+    let design = domecast_design::Design::load(&folder.join("thumb24.json")).unwrap();
     crate::Scene::new(file, &folder, design).unwrap()
 }
 

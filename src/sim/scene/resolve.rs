@@ -31,7 +31,7 @@ pub(super) fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
     let value = domecast_design::parse_json(text)?;
     let file: SceneFile = domecast_design::from_value(&value)?;
     let path = folder.join(&file.design);
-    let design = domecast_design::load(&path)?;
+    let design = Design::load(&path)?;
     resolve(file, folder, design)
 }
 
@@ -67,7 +67,7 @@ pub(super) fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<
         markers,
         motion,
         objects,
-        looked_at: OnceLock::new(),
+        kept: OnceLock::new(),
     })
 }
 

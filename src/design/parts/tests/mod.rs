@@ -6,6 +6,7 @@ mod sweep;
 mod walls;
 
 use std::path::Path;
+use std::str::FromStr;
 
 use glam::DVec3;
 
@@ -14,7 +15,7 @@ use crate::spec::Design;
 use domecast_mesh::{Fit, Piece, RayTarget, Shape, Solid};
 
 fn thumb24() -> Design {
-    crate::spec::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json"))).unwrap()
+    Design::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json"))).unwrap()
 }
 
 fn hits() -> Vec<Hit> {
@@ -30,7 +31,7 @@ fn every_design_gives_sound_parts() {
     for entry in std::fs::read_dir("designs").unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "json") {
-            let parts = build(&Measures::of(&crate::spec::load(&path).unwrap()).unwrap(), &hits()).unwrap();
+            let parts = build(&Measures::of(&Design::load(&path).unwrap()).unwrap(), &hits()).unwrap();
             assert!(parts.len() >= 4);
             for part in &parts {
                 let found = part.inspect();
@@ -50,7 +51,7 @@ fn files_are_the_same_bytes_on_any_number_of_threads() {
     .unwrap();
     design["mesh"]["chord_tolerance_mm"] = 0.05.into();
     design["mesh"]["optical_chord_tolerance_mm"] = 0.05.into();
-    let design = crate::spec::from_text(&design.to_string()).unwrap();
+    let design = Design::from_str(&design.to_string()).unwrap();
     let bytes = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {

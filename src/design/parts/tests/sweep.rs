@@ -1,6 +1,7 @@
 //! Random designs: parts that pass, or a refusal that names a field.
 
 use serde_json::{Value, json};
+use std::str::FromStr;
 
 use super::random_designs::{random_designs, scale_grip, scale_lengths};
 use super::*;
@@ -9,7 +10,7 @@ fn sweep(count: usize) -> (usize, Vec<String>) {
     let (mut sound, mut refused) = (0, Vec::new());
     for (index, design) in random_designs(count).enumerate() {
         let text = design.to_string();
-        let design = match crate::spec::from_text(&text) {
+        let design = match crate::Design::from_str(&text) {
             Ok(design) => design,
             Err(error) => {
                 assert!(!error.field.is_empty(), "{error}");
@@ -130,7 +131,7 @@ fn parts_of_a_millimetre_and_of_two_hundred_are_sound() {
         // The same number of triangles at every size.
         d["mesh"]["chord_tolerance_mm"] = json!((0.03 * scale).max(1e-3));
         d["mesh"]["optical_chord_tolerance_mm"] = json!((0.03 * scale).max(1e-3));
-        let design = crate::spec::from_text(&d.to_string()).unwrap();
+        let design = crate::Design::from_str(&d.to_string()).unwrap();
         let m = Measures::of(&design).unwrap();
         for part in build(&m, &hits()).unwrap() {
             part.check().unwrap();

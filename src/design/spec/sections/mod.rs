@@ -14,6 +14,7 @@ mod platforms;
 mod print;
 mod springs;
 mod tolerances;
+mod why;
 
 use std::collections::BTreeMap;
 
@@ -42,16 +43,7 @@ pub use springs::{
     WireSection,
 };
 pub use tolerances::TolerancesSection;
-
-/// The reason for what a section says: one sentence for the whole, or one for each field.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Why {
-    /// For the section as a whole.
-    Whole(String),
-    /// By the field's name.
-    ByField(BTreeMap<String, String>),
-}
+pub use why::Why;
 
 /// A dome-shaped camera tactile sensor, complete: everything that domecast makes comes from this file.
 ///

@@ -2,19 +2,52 @@
 
 use glam::DVec2;
 
-use super::solve::{LEAST_SLOPE, Model, Problem};
-use super::{Fit, MeasuredIn, Sample};
-use crate::transfer::{Correction, Polar};
+use super::sample::{MeasuredIn, Sample};
+use super::solve::{FitModel, FitProblem, MIN_SLOPE};
+use crate::transfer::{Correction, Nominal, Polar};
 
-impl Problem<'_> {
+/// A fitted map and how well it fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// The nominal map on which the correction rests.
+    pub nominal: Nominal,
+    /// The correction.
+    pub correction: Correction,
+    /// Root mean square of the residuals of the samples used, per axis, mm along the dome.
+    pub residual_rms_mm: f64,
+    /// Largest residual of the samples used, mm along the dome.
+    pub residual_max_mm: f64,
+    /// Scatter of one mark from print to print, per axis, mm along the dome; `None` if no mark was measured twice.
+    pub scatter_mm: Option<f64>,
+    /// Part of the scatter that whole prints share: standard deviation of the prints' mean shifts, mm
+    /// along the dome.
+    pub print_shift_mm: Option<f64>,
+    /// Root mean square that the map itself misses, per axis, mm along the dome: the residual beyond the scatter; `None`
+    /// without several prints.
+    pub lack_of_fit_mm: Option<f64>,
+    /// Indices of the samples that were left out as outliers, ascending.
+    pub rejected: Vec<usize>,
+    /// Number of free numbers of the model.
+    pub parameters: usize,
+    /// Polar angle of the outermost sample used, rad; beyond it the map is extrapolated.
+    pub measured_to_rad: f64,
+}
+
+impl FitProblem<'_> {
     /// The fit, with residuals and scatter in mm along the dome.
-    pub fn report(&self, model: Model, correction: Correction, used: &[bool], rejected: Vec<usize>) -> Fit {
+    pub fn report(
+        &self,
+        model: FitModel,
+        correction: Correction,
+        used: &[bool],
+        rejected: Vec<usize>,
+    ) -> Fit {
         let residuals: Vec<DVec2> = self
             .residuals(model.nominal, &correction)
             .zip(&self.polar)
             .map(|(residual, at)| match self.measured_in {
                 MeasuredIn::Dome => residual,
-                MeasuredIn::View => DVec2::new(residual.x / at.cos_polar.max(LEAST_SLOPE), residual.y),
+                MeasuredIn::View => DVec2::new(residual.x / at.cos_polar.max(MIN_SLOPE), residual.y),
             })
             .collect();
         let kept = || residuals.iter().zip(self.samples).zip(used).filter(|(_, u)| **u).map(|(pair, _)| pair);

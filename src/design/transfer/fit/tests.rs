@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use domecast_optics::numeric::SeededRandom;
 
 use super::*;
+use crate::transfer::{Correction, Nominal, TransferMap};
 
 const RADIUS_MM: f64 = 10.0;
 

@@ -54,7 +54,7 @@ mod tests {
 
     fn of(name: &str) -> Constants {
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs").join(name);
-        let design = domecast_design::load(&path).unwrap();
+        let design = domecast_design::Design::load(&path).unwrap();
         constants::of(&design, &Layout::of_design(&design).unwrap()).unwrap()
     }
 

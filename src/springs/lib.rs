@@ -11,7 +11,6 @@ mod law;
 mod limits;
 mod load;
 mod magnet;
-mod spec;
 mod spring;
 mod state;
 mod suspension;
@@ -24,8 +23,7 @@ pub use envelope::{
 pub use limits::{Check, Limit, Limits, LoadCase, Stop, StopShape, checks_at, sort_worst_first, try_load};
 pub use load::Wrench;
 pub use magnet::MagnetPair;
-pub use spec::{EndType, SpecError, SpringSpec};
-pub use spring::Spring;
+pub use spring::{EndType, SpecError, Spring, SpringSpec};
 pub use state::{Displacement, Equilibrium, MechanicsError, SpringState};
 pub use suspension::{MOST_SPRINGS, Suspension, SuspensionSpec};
 

@@ -5,8 +5,7 @@ use glam::DVec3;
 
 use super::load::Wrench;
 use super::magnet::MagnetPair;
-use super::spec::SpecError;
-use super::spring::Spring;
+use super::spring::{SpecError, Spring};
 use super::state::Displacement;
 
 /// What a suspension is made of; the sensor frame at rest, mm.

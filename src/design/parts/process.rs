@@ -1,6 +1,6 @@
 //! Lengths that the process limits: holes, pins, gaps, and the printer's room.
 
-use super::checks::infeasible;
+use super::error::infeasible;
 use super::measures::Measures;
 use super::{Part, PartError};
 

@@ -1,10 +1,9 @@
 //! The upper platform: it carries sheet, dome and LEDs, and moves with them.
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DVec3};
 
-use super::measures::{Measures, polar};
+use super::measures::Measures;
 use super::{Blueprint, Feature, PartError};
-use crate::spec::sections::LedsSection;
 use domecast_mesh::{Fit, Profile, Shape};
 
 /// The light channel is wider than the pit by this share on each side: their
@@ -185,17 +184,4 @@ fn rim_notch(
     );
     let turn = DAffine3::from_rotation_z(m.leds.list.get(i)?.azimuth_deg.to_radians());
     Some(Feature::new("rim notch", "leds.center_radius_mm", box_out).numbered(i).placed(turn))
-}
-
-/// Pose of LED `i`: origin at the centre of its emitting face, x across the
-/// board, y up the board, z out of the emitting face.
-pub(super) fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
-    let azimuth_deg = leds.list.get(i).map_or(0.0, |led| led.azimuth_deg);
-    let (sin, cos) = leds.tilt_deg.to_radians().sin_cos();
-    let outward = polar(1.0, azimuth_deg).extend(0.0);
-    // The board leans outwards with its top, so that the face looks up.
-    let y = DVec3::Z * sin + outward * cos;
-    let z = -outward * sin + DVec3::Z * cos;
-    let center = (outward * leds.center_radius_mm).with_z(leds.center_z_mm);
-    DAffine3 { matrix3: DMat3::from_cols(y.cross(z), y, z), translation: center }
 }

@@ -5,8 +5,7 @@
 
 use std::f64::consts::PI;
 
-use domecast::camera::Model;
-use domecast::camera::{Lens, LensLimit};
+use domecast::camera::{Lens, LensLimit, Model};
 use domecast::numeric::SeededRandom;
 use domecast::optics::{Channel, Limit, SensorOptics};
 use glam::{DVec2, DVec3};

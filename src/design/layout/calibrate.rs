@@ -1,4 +1,24 @@
 //! From a measured print to a better map: which mark stands where on the plate, and the fit.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::LayoutSpec;
+//! use domecast_design::layout::calibrate::{Printed, calibrate};
+//! use domecast_design::layout::target::print_target;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! // a print of the test target that landed where the design expects it
+//! let spec = LayoutSpec::of_design(&design)?;
+//! let mut table = "id,x_mm,y_mm\n".to_owned();
+//! for mark in print_target(&spec.transfer()?, &spec.print) {
+//!     table += &format!("{},{},{}\n", mark.id, mark.surface_mm.x, mark.surface_mm.y);
+//! }
+//! let calibration = calibrate(&design, &table, Some(Printed::Target))?;
+//! assert!(calibration.error_after_mm < 1e-6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DVec2, DVec3};
 

@@ -1,4 +1,18 @@
 //! How much of the dome the camera covers, at rest and under load, and which dots it loses on the way.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::coverage::coverage;
+//! use domecast_design::layout::{Layout, LayoutSpec};
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let spec = LayoutSpec::of_design(&Design::load(THUMB24.as_ref())?)?;
+//! let layout = Layout::new(&spec)?;
+//! let at_rest = coverage(&spec, &layout, &spec.optics, None);
+//! assert!(at_rest.in_sight > 0.9 && at_rest.unseen_dots.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

@@ -1,4 +1,15 @@
 //! One dot: where it is in the image, on the dome and on the plate, and its outlines.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let layout = Design::load(THUMB24.as_ref())?.layout()?;
+//! let dot = &layout.dots[0];
+//! assert!((dot.plate_outline.centroid() - dot.plate_mm).length() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::f64::consts::{PI, TAU};
 

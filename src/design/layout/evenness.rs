@@ -1,5 +1,17 @@
 //! How even a pattern is: in the image, on the dome, on the plate; and what would be seen of it if the layout had been
 //! made by the pinhole alone.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::evenness::by_design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let layout = Design::load(THUMB24.as_ref())?.layout()?;
+//! let evenness = by_design(&layout).ok_or("no dot has a neighbour")?;
+//! assert!(evenness.image_px.nearest.variation < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DVec2, DVec3};
 use serde::Serialize;

@@ -1,4 +1,20 @@
 //! The frame in which a pattern is even: the raw image or the runtime's undistorted one.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::glam::DVec3;
+//! use domecast_design::layout::frame::Undistorted;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! let matrix = design.undistorted_matrix();
+//! let frame = Undistorted::new(&matrix).ok_or("the matrix has no inverse")?;
+//! // the camera's axis appears at the principal point
+//! let place = frame.from_ray(DVec3::Z)?;
+//! assert!((place.x - matrix[0][2]).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::Vector3;

@@ -1,4 +1,16 @@
 //! Why a dot of the pattern is not laid out.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let layout = Design::load(THUMB24.as_ref())?.layout()?;
+//! for lost in &layout.lost {
+//!     println!("dot {}: {}", lost.id, lost.reason);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::fmt;
 

@@ -1,4 +1,17 @@
 //! Where in the image a pattern ends.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::region::dome_point;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! let point = dome_point(design.optics().dome_radius_mm(), 0.5, 1.0);
+//! let pixel = design.optics().project(point)?;
+//! assert!((design.optics().trace(pixel)?.surface_mm - point).length() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::f64::consts::TAU;
 

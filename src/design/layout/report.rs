@@ -1,4 +1,20 @@
 //! What a layout came to, for people who judge it and programs that draw it.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::report::LayoutReport;
+//! use domecast_design::layout::{Layout, LayoutSpec};
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! let spec = LayoutSpec::of_design(&design)?;
+//! let report = LayoutReport::new(&design, &spec, &Layout::new(&spec)?);
+//! for line in report.headlines() {
+//!     println!("{line}");
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use serde::Serialize;
 

@@ -1,4 +1,19 @@
 //! What is left of a pattern's evenness when the sensor is not as designed: sensors drawn within the tolerances.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::tolerances::under_tolerances;
+//! use domecast_design::layout::{Layout, LayoutSpec};
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! let spec = LayoutSpec::of_design(&design)?;
+//! let report = under_tolerances(&spec, &Layout::new(&spec)?, &design.sections().tolerances);
+//! let worst = report.ok_or("no dot has a neighbour")?.ranking[0].tolerance;
+//! println!("{worst} costs most");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;

@@ -3,6 +3,16 @@
 //! Each value of a setting has a bound on its error; the cheapest value whose bound, times a safety factor, meets the
 //! design's `accuracy` is chosen. The bounds need no test run: a tolerance is met by construction, and its effect in
 //! the image follows from the derivatives of the optics.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! assert_eq!(design.settings().lines().len(), 4);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DMat3, DVec3};
 

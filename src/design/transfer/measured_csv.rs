@@ -1,5 +1,14 @@
 //! The measured print as a table: `id,x_mm,y_mm` (view from outside) or `id,phi_deg,theta_deg`, optionally
 //! with `print`.
+//!
+//! # Example
+//! ```
+//! use domecast_design::transfer::measured_csv::read;
+//!
+//! let table = read("id,x_mm,y_mm\n0,0.02,-0.01\n1,3.05,0.01\n", 10.0)?;
+//! assert_eq!((table.rows.len(), table.rows[1].id), (2, 1));
+//! # Ok::<(), domecast_design::transfer::measured_csv::TableError>(())
+//! ```
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -4,6 +4,26 @@
 //! with 5 or 8 coefficients, and Kannala-Brandt with 4. All share one
 //! interface, one set of limits ([`LensLimit`]) and one conformance suite.
 //!
+//! # Example
+//! ```
+//! use domecast_optics::camera::{Lens, LensSpec, Model};
+//! use domecast_optics::glam::DVec2;
+//!
+//! let lens = Lens::new(LensSpec {
+//!     model: Model::KannalaBrandt,
+//!     width: 640,
+//!     height: 480,
+//!     matrix: [[230.0, 0.0, 319.5], [0.0, 230.0, 239.5], [0.0, 0.0, 1.0]],
+//!     distortion: vec![-0.01, 0.002, 0.0, 0.0],
+//!     field_of_view_rad: 3.0,
+//!     pupil_shift_mm: vec![],
+//! })?;
+//! let pixel = DVec2::new(100.0, 50.0);
+//! let ray = lens.unproject(pixel)?;
+//! assert!((lens.project(ray)? - pixel).length() < 1e-10);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # Domain
 //! A distortion polynomial is a lens only up to its *fold*, the first place
 //! where the image radius stops growing; past it two rays share a pixel and

@@ -2,6 +2,16 @@
 //!
 //! Their doc comments are the descriptions in the JSON schema, and the bounds given here are the
 //! bounds of a single field; rules between fields are checked when the design is resolved.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! assert_eq!(design.sections().dome.radius_mm, 10.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod accuracy;
 mod camera;

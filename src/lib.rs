@@ -1,5 +1,5 @@
-//! domecast: from a parameter file to a dome-shaped camera tactile sensor that can be printed, cast, assembled and
-//! calibrated.
+//! domecast: from a parameter file to a dome-shaped camera tactile sensor that can be printed, cast, assembled,
+//! calibrated and run.
 //!
 //! # The map
 //!
@@ -7,42 +7,45 @@
 //! design file -> Design -+-> layout --> artwork     what to print
 //!   camera, optics ------+     |
 //!                        +-> parts ---> meshes      what to build
-//!                        +-> constants              what the runtime must know
+//!                        +-> constants ---> track   what the runtime must know, and what it feels
+//!                        +-> sim                    what the sensor will see
 //! ```
 //!
-//! | to | look into |
+//! | to | use |
 //! |---|---|
-//! | read a design, or tell what a field means | [`design`] |
-//! | turn pixels into points on the dome and back | [`optics`], over the lens models of [`camera`] |
-//! | lay out dots, judge their evenness, carry them to the plate | [`layout`], [`transfer`] |
+//! | read a design | [`Design::load`], or [`Design`] from a string; [`design`] for its fields |
+//! | turn pixels into points on the dome and back | [`Design::optics`]; [`optics`], over the lens models of [`camera`] |
+//! | lay out dots, judge their evenness, project them to the plate | [`Design::layout`]; [`layout`], [`transfer`] |
 //! | draw films | [`artwork`] |
 //! | make platforms, mould, jig | [`parts`], over the solids of [`mesh`] |
-//! | know what the springs carry | [`mechanics`] |
+//! | know what the springs carry | [`springs`] |
+//! | press an object against the dome | [`contact`] |
 //! | find the platform's pose from its white markers | [`pose`] |
 //! | find blobs in a camera's frames | [`frames`] |
-//! | write and read what the runtime needs | [`constants`] |
+//! | write and read what the runtime needs | [`Constants`]; [`constants`] |
 //! | replace nominal numbers by measured ones | [`calibrate`] |
-//! | turn frames into markers, pose, wrench and displacement | [`track`] |
-//! | see what accuracy costs in time | [`accuracy`] |
+//! | turn frames into markers, pose, wrench and displacement | [`Tracker`]; [`track`] |
+//! | simulate what the sensor sees | [`Scene`]; [`sim`] |
 //! | do all of it | [`build`], and [`report`] for its page; [`compare`] two of them |
 //!
-//! Formulas and their sources stand with the functions; [`guide`] tells the subjects in one page each.
+//! Each module comes from a crate of its own (`domecast-optics`, `domecast-runtime`, ..): a robot that only tracks
+//! depends on `domecast-runtime` and compiles none of the rest. Formulas and their sources stand with the functions;
+//! [`guide`] has a page on each subject.
 //!
 //! # In five lines
 //!
 //! ```
-//! use domecast::{design, glam::DVec2};
+//! use domecast::{Design, glam::DVec2};
 //!
-//! let design = domecast::design::Design::from_str(include_str!("../designs/thumb24.json"))?;
+//! let design: Design = include_str!("../designs/thumb24.json").parse()?;
 //! let seen = design.optics().trace(DVec2::new(400.0, 240.0)).expect("inside the lens's domain");
 //! let back = design.optics().project(seen.surface_mm).expect("it was just seen");
 //! assert!(back.distance(DVec2::new(400.0, 240.0)) < 1e-9);
-//! # Ok::<(), design::DesignError>(())
+//! # Ok::<(), domecast::Error>(())
 //! ```
 pub use glam;
 pub use nalgebra;
 
-pub use domecast_cli::{accuracy, run};
 pub use domecast_contact as contact;
 pub use domecast_design as design;
 pub use domecast_design::{layout, parts, transfer};
@@ -54,6 +57,16 @@ pub use domecast_runtime::{calibrate, frames, track};
 pub use domecast_sim as sim;
 pub use domecast_springs as springs;
 
+pub use constants::Constants;
+pub use design::Design;
+pub use error::Error;
+pub use layout::Layout;
+pub use numeric::Rigid as Pose;
+pub use sim::Scene;
+pub use springs::Wrench;
+pub use track::Tracker;
+
+mod error;
 pub mod guide;
 
 /// What the runtime needs to know of one sensor, how it follows from a design, and the files that carry it.

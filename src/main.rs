@@ -1,5 +1,5 @@
 //! The command line of domecast.
 
 fn main() -> std::process::ExitCode {
-    domecast::run()
+    domecast_cli::run()
 }

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::str::FromStr;
 
 use domecast::constants::{self, Constants};
 use domecast::layout::Layout;
@@ -72,7 +73,7 @@ fn a_measured_stiffness_replaces_the_nominal_one() {
     let told: serde_json::Value = serde_json::from_slice(&ran.stdout).expect("JSON");
     assert_eq!(told["fit"]["refused"][0], "Mz: no reading");
     let text = fs::read_to_string(bench.path("constants.measured.json")).expect("measured constants");
-    let (measured, nominal) = (Constants::parse(&text).expect("constants"), thumb24());
+    let (measured, nominal) = (Constants::from_str(&text).expect("constants"), thumb24());
     let (measured, nominal) = (measured.springs.expect("springs"), nominal.springs.expect("springs"));
     assert_eq!(measured.source, "measured");
     assert!((measured.stiffness[2][2] / nominal.stiffness[2][2] - 1.1).abs() < 1e-9);

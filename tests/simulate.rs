@@ -91,10 +91,10 @@ fn a_scene_becomes_frames_video_and_truth() {
 }
 
 #[test]
-fn a_contact_that_does_not_converge_is_named() {
-    // Bricks of 5 mm and more cannot follow a ball that lies 6 mm deep at once.
+fn a_contact_that_its_level_does_not_cover_is_named() {
+    // 6 mm deep, the ball's contact is no longer small beside the dome.
     let deep = scene(|scene| {
-        scene["contact"] = json!({ "level": "neo_hookean", "element_mm": 5 });
+        scene["contact"] = json!({ "level": "closed_form" });
         scene["objects"][0]["path"][1]["position_mm"] = json!([0, 0, 8]);
         scene["frames"]["images"] = json!(false);
     });
@@ -104,11 +104,11 @@ fn a_contact_that_does_not_converge_is_named() {
     let output = domecast(&more, folder.path());
     let message = String::from_utf8(output.stderr).expect("UTF-8");
     assert_eq!(output.status.code(), Some(0), "{message}");
-    assert!(message.contains("contact not_converged in 1 of 2 frames, first in frame 1: "), "{message}");
+    assert!(message.contains("contact not_applicable in 1 of 2 frames, first in frame 1: "), "{message}");
     let output = domecast(&[&more[..], &["--json"]].concat(), folder.path());
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let fault = &told["contact"][0];
-    assert_eq!((&fault["status"], &fault["first"]), (&json!("not_converged"), &json!(1)), "{told}");
+    assert_eq!((&fault["status"], &fault["first"]), (&json!("not_applicable"), &json!(1)), "{told}");
     assert_eq!(fault["frames"], json!(1), "{told}");
 }
 
@@ -140,6 +140,8 @@ fn bad_scenes_are_named() {
     }
     let unknown = scene(|scene| scene["effects"] = json!({ "gravity_waves": "always" }));
     refused(&unknown, &[], &["effects.gravity_waves", "unknown key"]);
+    let level = scene(|scene| scene["contact"] = json!({ "level": "neo_hookean" }));
+    refused(&level, &[], &["contact.level", "neo_hookean", "geometric", "closed_form", "linear"]);
     let heavy = scene(|scene| {
         scene["objects"] = json!([]);
         scene["motion"] =

@@ -7,11 +7,11 @@ use super::effects::contact::level_named;
 use super::eye::Eye;
 use super::instant::Instant;
 use super::pipeline::{Geometry, Pipeline};
+use super::scene::Scene;
 use super::scene::file::LevelName;
-use super::scene::{LookedAt, Scene};
 use super::shapes::Shape;
 use super::spots::Points;
-use super::touch::{Between, Stepper};
+use super::touch::{Between, SolvedFrames};
 use super::work::Work;
 use domecast_contact::Level;
 
@@ -51,28 +51,9 @@ fn frames(scene: &Scene) -> Vec<u32> {
 fn quickest_level(scene: &Scene) -> Level {
     let edged = scene.objects().iter().any(|object| object.indenter.solid.is_mesh());
     match scene.file().contact.level {
-        LevelName::Linear | LevelName::NeoHookean if edged => level_named(scene, LevelName::Linear),
+        LevelName::Linear if edged => level_named(scene, LevelName::Linear),
         _ => Level::Geometric,
     }
-}
-
-/// The sensor's states at some frames; under an object by a quick level.
-fn states(scene: &Scene, frames: &[u32]) -> Result<Vec<LookedAt>, SimError> {
-    let mut uncounted = Work::default();
-    let mut stepper =
-        if scene.objects().is_empty() { None } else { Some(Stepper::new(scene, quickest_level(scene))?) };
-    let mut out = Vec::new();
-    for frame in frames {
-        let time_s = scene.time_s(*frame);
-        out.push(match &mut stepper {
-            None => (*frame, scene.state_at(*frame, time_s)?, None),
-            Some(stepper) => {
-                let touch = stepper.next(*frame, time_s, &mut uncounted)?;
-                (*frame, touch.state.clone(), Some(Between::at_frame(touch)))
-            }
-        });
-    }
-    Ok(out)
 }
 
 /// A dot's centroid moves with the mean of its surroundings: no more than this often the largest motion of a centre.
@@ -104,11 +85,13 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
     let colours = if a_eye.channels() == 1 && b_eye.channels() == 1 { 1 } else { scene.planes() };
     let mut last: Vec<DVec2> = Vec::new();
     let (mut worst, mut change): (f64, f64) = (0.0, 0.0);
-    for (frame, state, touch) in scene.looked_at(|| states(scene, &frames))? {
-        let time_s = scene.time_s(*frame);
+    let solved = scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames))?;
+    for (frame, touch) in solved.touches() {
+        let time_s = scene.time_s(frame);
+        let between = Between::at_frame(touch.clone());
         let mut at = |eye: &Eye, geometry: Geometry| {
-            let shape = Shape { touch: touch.clone(), ..Shape::default() };
-            Instant::new(eye, geometry, time_s, state.clone(), shape, &mut uncounted)
+            let shape = Shape { touch: Some(between.clone()), ..Shape::default() };
+            Instant::new(eye, geometry, time_s, touch.state.clone(), shape, &mut uncounted)
         };
         let (a, b) = (at(&a_eye, with)?, at(&b_eye, without)?);
         let mut now = Vec::new();

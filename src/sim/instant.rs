@@ -69,7 +69,7 @@ impl Instant {
 /// are smoother than the elements themselves, whose slopes jump from one to the next.
 pub(super) fn dent_step_mm(level: Option<Level>) -> f64 {
     match level {
-        Some(Level::Linear { element_mm } | Level::NeoHookean { element_mm }) => (0.5 * element_mm).max(0.15),
+        Some(Level::Linear { element_mm }) => (0.5 * element_mm).max(0.15),
         Some(Level::ClosedForm) => 0.25,
         _ => 0.15,
     }

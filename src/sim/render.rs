@@ -170,7 +170,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// Draws a frame and tells its truth. Where contact takes part, the frames up to it are solved first: for
-    /// whole sequences [`super::run::run`] keeps what it has solved.
+    /// whole sequences [`crate::output::run`] keeps what it has solved.
     ///
     /// # Errors
     /// A frame whose load has no balance, or whose pose cannot be.

@@ -31,6 +31,45 @@ pub struct Stepper<'a> {
     scene: &'a Scene,
     contact: Contact,
     last: Option<Pressed>,
+    /// Frames that are solved already.
+    known: Option<Arc<SolvedFrames>>,
+}
+
+/// Some frames of a scene, solved by one level; kept with the scene.
+#[derive(Debug)]
+pub(crate) struct SolvedFrames {
+    level: Level,
+    contact: Contact,
+    /// By number; with what each took.
+    frames: Vec<(u32, Touch, Work)>,
+    last: Option<Pressed>,
+}
+
+impl SolvedFrames {
+    /// Solves some frames, in order.
+    ///
+    /// # Errors
+    /// As [`Stepper::next`].
+    pub fn new(scene: &Scene, level: Level, numbers: &[u32]) -> Result<Self, SimError> {
+        let mut stepper = Stepper::new(scene, level)?;
+        let mut frames = Vec::with_capacity(numbers.len());
+        for number in numbers {
+            let mut work = Work::default();
+            let touch = stepper.next(*number, scene.time_s(*number), &mut work)?;
+            frames.push((*number, touch, work));
+        }
+        Ok(Self { level, contact: stepper.contact, frames, last: stepper.last })
+    }
+
+    /// The frames with their numbers.
+    pub fn touches(&self) -> impl Iterator<Item = (u32, &Touch)> {
+        self.frames.iter().map(|(number, touch, _)| (*number, touch))
+    }
+
+    /// A frame, where all frames up to it are known: friction remembers the way.
+    fn frame(&self, number: u32) -> Option<&(u32, Touch, Work)> {
+        self.frames.get(number as usize).filter(|(known, ..)| *known == number)
+    }
 }
 
 impl<'a> Stepper<'a> {
@@ -39,10 +78,14 @@ impl<'a> Stepper<'a> {
     /// # Errors
     /// An elastomer that the level cannot work with.
     pub fn new(scene: &'a Scene, level: Level) -> Result<Self, SimError> {
+        if let Some(known) = scene.kept::<SolvedFrames>().filter(|known| known.level == level) {
+            let contact = known.contact.clone();
+            return Ok(Self { scene, contact, last: None, known: Some(known) });
+        }
         let contact = Contact::new(crate::elastomer_of(scene.design()), level).map_err(|error| {
             DesignError::at("contact", "", error.to_string(), "an elastomer and a level that fit")
         })?;
-        Ok(Self { scene, contact, last: None })
+        Ok(Self { scene, contact, last: None, known: None })
     }
 
     /// Solves the next frame.
@@ -50,6 +93,13 @@ impl<'a> Stepper<'a> {
     /// # Errors
     /// An object inside the sheet, or deeper in the dome than the level goes; named with the frame.
     pub fn next(&mut self, frame: u32, time_s: f64, work: &mut Work) -> Result<Touch, SimError> {
+        if let Some(known) = &self.known
+            && let Some((_, touch, spent)) = known.frame(frame)
+        {
+            work.merge(spent);
+            self.last.clone_from(&known.last);
+            return Ok(touch.clone());
+        }
         let free = |rest: &Scene| -> Result<Touch, SimError> {
             let state = rest.state_at(frame, time_s)?;
             Ok(Touch { state, contact: None, solved: ContactTruth::away() })

@@ -4,6 +4,7 @@ use domecast::constants::Constants;
 use domecast::numeric::Rigid;
 use domecast::track::{Frame, MarkState, Problem, TrackOptions, Tracker};
 use serde_json::{Value, json};
+use std::str::FromStr;
 
 use super::render::{Picture, noise, still};
 use super::{SENSOR, drawn, frame, names, pose, score, tracker};
@@ -151,7 +152,7 @@ fn absurd_constants_give_an_error_or_a_named_status() {
         for value in &values {
             let mut changed = whole.clone();
             *changed.pointer_mut(path).unwrap() = value.clone();
-            let Ok(constants) = Constants::parse(&changed.to_string()) else {
+            let Ok(constants) = Constants::from_str(&changed.to_string()) else {
                 refused += 1;
                 continue;
             };
@@ -173,8 +174,8 @@ fn absurd_constants_give_an_error_or_a_named_status() {
     for path in ["camera", "optics", "mask", "white_markers", "black_dots"] {
         let mut changed = whole.clone();
         changed.as_object_mut().unwrap().remove(path);
-        let error = Constants::parse(&changed.to_string()).unwrap_err();
-        assert!(error.contains(path), "{error}");
+        let error = Constants::from_str(&changed.to_string()).unwrap_err();
+        assert!(error.problem.contains(path), "{error}");
     }
 }
 
@@ -247,7 +248,7 @@ fn mutated_constants_do_no_harm() {
             let end = if round % 2 == 0 { 150 } else { digits.len() };
             bytes[digits[random(end)]] = b"0123456789-eE.+"[random(15)];
         }
-        let Ok(constants) = Constants::parse(&String::from_utf8(bytes).unwrap()) else { continue };
+        let Ok(constants) = Constants::from_str(&String::from_utf8(bytes).unwrap()) else { continue };
         let Ok(mut tracker) = Tracker::new(&constants, TrackOptions::default()) else { continue };
         let tracked = tracker.track(0, &frame(&picture.bytes));
         let numbers = tracked.wrench.iter().chain(&tracked.wrench_sd).chain(&tracked.pose_sd).flatten();

@@ -9,6 +9,7 @@ mod sequences;
 mod simulated;
 
 use std::path::Path;
+use std::str::FromStr;
 use std::sync::LazyLock;
 
 use domecast::constants::{Constants, MarkerSight};
@@ -34,7 +35,7 @@ static SENSOR: LazyLock<Sensor> = LazyLock::new(|| {
     let layout = Layout::of_design(&design).expect("its layout");
     let constants = domecast::constants::of(&design, &layout).expect("its constants");
     // As a runtime gets them.
-    let constants = Constants::parse(&constants.to_json()).expect("its own file");
+    let constants = Constants::from_str(&constants.to_json()).expect("its own file");
     let optics = constants.sensor().expect("its optics");
     Sensor { design, constants, optics }
 });

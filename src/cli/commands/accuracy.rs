@@ -8,7 +8,6 @@ use serde_json::json;
 use super::output::{Failure, Output};
 use crate::accuracy;
 use crate::accuracy::AccuracyError;
-use domecast_design;
 use domecast_design::DesignError;
 use domecast_fab::build::{DESIGN_NAME, DesignRecord, MANIFEST_NAME, Manifest, Tree, sha256_hex};
 use domecast_sim::{Scene, SimError};
@@ -50,7 +49,7 @@ pub fn run(
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
     let record =
         DesignRecord { name: design.name().to_owned(), sha256: sha256_hex(design.text().as_bytes()) };
-    let manifest = Manifest::new(record, Vec::new(), Vec::new(), &tree);
+    let manifest = Manifest::new(record, Vec::new(), Vec::new(), tree.files());
     let text =
         serde_json::to_string_pretty(&manifest).map_err(|error| Failure::Internal(error.to_string()))?;
     tree.add(MANIFEST_NAME, text.into_bytes());
@@ -59,7 +58,7 @@ pub fn run(
         Path::to_path_buf,
     );
     output.step("writing");
-    tree.write(&out).map_err(Failure::Write)?;
+    tree.write(&out)?;
     output.steps_done();
     for ladder in &measured.ladders {
         let rung = |index: Option<usize>| index.and_then(|index| ladder.rungs.get(index));

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant, SystemTime};
 use serde_json::json;
 
 use super::output::{Failure, Output};
-use domecast_design;
 use domecast_fab::build;
 use domecast_fab::build::{Build, BuildError, Measured};
 
@@ -76,7 +75,7 @@ fn once(output: &Output, design_file: &Path, folders: &Folders<'_>, watched: boo
     }
     let out = folders.out.map_or_else(|| PathBuf::from("output").join(design.name()), Path::to_path_buf);
     output.step("writing");
-    result.tree.write(&out).map_err(Failure::Write)?;
+    result.tree.write(&out)?;
     output.steps_done();
     tell(output, &result, &out, began.elapsed())?;
     if design.settings().any_chosen() {

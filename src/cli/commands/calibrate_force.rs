@@ -1,12 +1,14 @@
 //! `domecast calibrate-force MEASURED.csv CONSTANTS`
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{DVec2, DVec3};
 use serde_json::json;
 
+use super::input::{input_fault, measured_beside, read_constants};
 use super::output::{Failure, Output};
-use domecast_design::{DesignError, read_text};
+use domecast_design::read_text;
+use domecast_files::write_file;
 use domecast_optics::pose::{PoseOptions, PoseSolver, Sighting};
 use domecast_runtime::calibrate::Table;
 use domecast_runtime::calibrate::force::{Pair, fit};
@@ -17,33 +19,6 @@ use domecast_springs::Displacement;
 const MOVED: [f64; 6] = [0.02, 0.02, 0.02, 0.002, 0.002, 0.002];
 /// Noise that a marker's centroid in a measured table may have, px.
 const CENTROID_NOISE_PX: f64 = 0.5;
-
-pub(super) fn input_fault(path: &Path, problem: impl Into<String>, allowed: &str) -> Failure {
-    DesignError::at("", "", problem, allowed).in_file(path).into()
-}
-
-pub(super) fn read_constants(path: &Path) -> Result<Constants, Failure> {
-    let text = read_text(path)?;
-    Constants::parse(&text).map_err(|error| input_fault(path, error, "a constants.json of this release"))
-}
-
-/// Where measured constants go when nobody says: beside the nominal ones.
-pub(super) fn measured_beside(constants: &Path) -> PathBuf {
-    constants.with_file_name("constants.measured.json")
-}
-
-/// Writes a file whole or not at all.
-pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), Failure> {
-    use std::io::Write;
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let fault = |error: std::io::Error| {
-        input_fault(path, format!("cannot be written ({error})"), "a place that can be written")
-    };
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fault)?;
-    file.write_all(text.as_bytes()).map_err(fault)?;
-    file.persist(path).map_err(|error| fault(error.error))?;
-    Ok(())
-}
 
 /// Fits the springs to measured pairs and writes constants with `"source": "measured"`.
 pub fn run(
@@ -82,7 +57,7 @@ pub fn run(
     constants.refit_plain_runtime();
     constants.calibrations.push(json!({ "kind": "force", "pairs": pairs.len(), "fit": found }));
     let path = out.map_or_else(|| measured_beside(constants_path), Path::to_path_buf);
-    write_whole(&path, &constants.to_json())?;
+    write_file(&path, constants.to_json().as_bytes())?;
     output.steps_done();
     output.say(&format!("{} pairs, model {:?}", pairs.len(), found.model))?;
     for axis in &found.axes {

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use glam::DVec2;
 use serde_json::json;
 
-use super::calibrate_force::{input_fault, measured_beside, read_constants, write_whole};
+use super::input::{input_fault, measured_beside, read_constants};
 use super::output::{Failure, Output};
 use domecast_design::read_text;
+use domecast_files::write_file;
 use domecast_runtime::calibrate::detect::Detector;
 use domecast_runtime::calibrate::optics::{Kind, Observation, fit};
 use domecast_runtime::calibrate::{Table, TableError};
@@ -42,7 +43,7 @@ pub fn run(
     let (observations, missing) = if seen.is_dir() || is_png(seen) {
         let found = observations_in(output, &frames_of(seen)?, &constants)?;
         if let Some(path) = files.centroids {
-            write_whole(path, &table_of(&found.0))?;
+            write_file(path, table_of(&found.0).as_bytes())?;
         }
         found
     } else {
@@ -59,7 +60,7 @@ pub fn run(
         "parameters": found.parameters,
     }));
     let path = files.out.map_or_else(|| measured_beside(constants_path), Path::to_path_buf);
-    write_whole(&path, &found.constants.to_json())?;
+    write_file(&path, found.constants.to_json().as_bytes())?;
     output.steps_done();
     let [before, after] = found.rms_px;
     output.say(&format!(

@@ -1,6 +1,5 @@
 //! `domecast calibrate-print MEASURED.csv DESIGN`: a measured print in, a design with a better map out.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -8,10 +7,10 @@ use clap::ValueEnum;
 use serde_json::{Value, json};
 
 use super::output::{Failure, Output};
-use domecast_design;
 use domecast_design::layout::calibrate::{CalibrateError, Calibration, Printed, calibrate};
 use domecast_design::layout::{Layout, LayoutSpec};
 use domecast_design::{Design, DesignError, parse_json, read_text};
+use domecast_files::write_file;
 
 /// Which artwork was printed and measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -49,7 +48,7 @@ pub fn run(
     // The new design must stand on its own before it is written.
     let new_design = Design::from_str(&new_text).map_err(|error| error.in_file(design_file))?;
     let out = out.map_or_else(|| beside(design_file), Path::to_path_buf);
-    write_whole(&out, new_text.as_bytes())?;
+    write_file(&out, new_text.as_bytes())?;
     output.steps_done();
     if let Err(error) = LayoutSpec::of_design(&new_design).and_then(|spec| Layout::new(&spec)) {
         output.warn(&format!("the new map does not print the design's pattern: {error}"));
@@ -100,22 +99,6 @@ fn beside(design_file: &Path) -> PathBuf {
     let stem = design_file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let stem = stem.strip_suffix("-measured").unwrap_or(&stem);
     design_file.with_file_name(format!("{stem}-measured.json"))
-}
-
-/// Writes a file so that it is there whole or not at all.
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let written = tempfile::NamedTempFile::new_in(folder).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.flush()?;
-        file.persist(path).map_err(|error| error.error)?;
-        Ok(())
-    });
-    written.map_err(|error| {
-        let allowed = "a file in a folder that can be written, with space left";
-        let problem = format!("cannot be written ({error})");
-        DesignError::at("--out", json!(path.display().to_string()), problem, allowed).into()
-    })
 }
 
 fn tell(output: &Output, found: &Calibration, out: &Path) -> Result<(), Failure> {

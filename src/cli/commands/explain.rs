@@ -5,7 +5,6 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::output::{Failure, Output};
-use domecast_design;
 
 /// The design whose values and reasons are shown where none is named.
 const EXAMPLE: &str = include_str!("../../../designs/thumb24.json");

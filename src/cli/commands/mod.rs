@@ -8,6 +8,7 @@ mod calibrate_print;
 mod check;
 mod compare;
 mod explain;
+mod input;
 mod new;
 mod output;
 mod points;

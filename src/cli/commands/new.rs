@@ -7,7 +7,6 @@ use std::str::FromStr;
 use serde_json::json;
 
 use super::output::{Failure, Output};
-use domecast_design;
 use domecast_design::DesignError;
 
 /// The paper's sensor: every field is there, each with its reason.

@@ -5,7 +5,7 @@ use std::io::{self, IsTerminal, Write};
 use serde_json::{Value, json};
 
 use domecast_design::DesignError;
-use domecast_fab::build::WriteError;
+use domecast_files::WriteError;
 
 /// Why a command did not do what it was asked for.
 #[derive(Debug)]
@@ -25,6 +25,12 @@ pub enum Failure {
 impl From<DesignError> for Failure {
     fn from(error: DesignError) -> Self {
         Self::Input(Box::new(error))
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        Self::Write(error)
     }
 }
 

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::output::{Failure, Output};
 use domecast_design::DesignError;
-use domecast_fab::build::WriteError;
+use domecast_files::WriteError;
 use domecast_sim::run;
 use domecast_sim::run::{ContactFault, RunError};
 use domecast_sim::{Plan, Scene, SimError};

@@ -7,11 +7,10 @@ use std::str::FromStr;
 use glam::{DVec2, DVec3};
 
 use super::manifest::{DESIGN_NAME, MANIFEST_NAME, Manifest, PartRecord, sha256_hex};
-use super::tree::list_files;
 use crate::artwork;
-use domecast_design;
 use domecast_design::layout::Layout;
 use domecast_design::{Design, DesignError};
+use domecast_files::list_files;
 use domecast_mesh::{inspect, read_stl};
 use domecast_runtime::constants::Constants;
 
@@ -70,7 +69,8 @@ pub fn check(dir: &Path, step: &mut dyn FnMut(&str)) -> Result<CheckReport, Desi
         design.as_ref().map(|_| "resolves, its hash agrees".to_owned()).map_err(Clone::clone),
     );
     step("checking the dots");
-    let constants = read(dir, "constants/constants.json").and_then(|text| Constants::parse(&text));
+    let constants = read(dir, "constants/constants.json")
+        .and_then(|text| Constants::from_str(&text).map_err(|error| error.to_string()));
     match (&design, &constants) {
         (Ok(design), Ok(constants)) => check_constants(&mut report, dir, design, constants),
         (_, Err(problem)) => {
@@ -123,8 +123,8 @@ fn load_design(dir: &Path, manifest: &Manifest) -> Result<Design, String> {
 }
 
 fn check_constants(report: &mut CheckReport, dir: &Path, design: &Design, constants: &Constants) {
-    let layout = match super::lay_out(design) {
-        Ok((_, layout)) => layout,
+    let layout = match Layout::of_design(design) {
+        Ok(layout) => layout,
         Err(error) => {
             report.add("layout", Err(error.to_string()));
             return;

@@ -6,7 +6,6 @@ use std::path::{Component, Path};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::tree::Tree;
 use domecast_design::DesignError;
 
 /// The manifest's name in the folder of a build.
@@ -94,10 +93,14 @@ pub struct Warning {
 }
 
 impl Manifest {
-    /// The manifest of the files in `tree`.
-    pub fn new(design: DesignRecord, parts: Vec<PartRecord>, warnings: Vec<Warning>, tree: &Tree) -> Self {
-        let files = tree
-            .files()
+    /// The manifest of `files`: path and content of each.
+    pub fn new<'a>(
+        design: DesignRecord,
+        parts: Vec<PartRecord>,
+        warnings: Vec<Warning>,
+        files: impl Iterator<Item = (&'a str, &'a [u8])>,
+    ) -> Self {
+        let files = files
             .map(|(path, bytes)| FileRecord {
                 path: path.to_owned(),
                 bytes: bytes.len() as u64,

@@ -9,11 +9,12 @@ mod manifest;
 mod measured;
 mod tree;
 
+pub use domecast_files::{WriteError, list_files};
 pub use manifest::{
     DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning, sha256_hex,
 };
 pub use measured::Measured;
-pub use tree::{Tree, WriteError, list_files};
+pub use tree::Tree;
 
 use std::fmt;
 
@@ -110,7 +111,7 @@ impl Build {
         // the manifest lists all files but itself
         self.tree.remove(MANIFEST_NAME);
         let Manifest { design, parts, warnings, .. } = self.manifest.clone();
-        self.manifest = Manifest::new(design, parts, warnings, &self.tree);
+        self.manifest = Manifest::new(design, parts, warnings, self.tree.files());
         self.tree.add(MANIFEST_NAME, pretty(&self.manifest));
     }
 }
@@ -219,7 +220,7 @@ fn make(
     step("writing the page");
     let told: Vec<(String, String)> =
         warnings.iter().map(|warning| (warning.field.clone(), warning.message.clone())).collect();
-    let page = report::page(&report::Subject {
+    let page = report::page(&report::ReportSubject {
         design,
         layout: &layout,
         judged: &judged,
@@ -234,7 +235,7 @@ fn make(
     tree.add("report/index.html", page.into_bytes());
 
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
-    let manifest = Manifest::new(record, records, warnings, &tree);
+    let manifest = Manifest::new(record, records, warnings, tree.files());
     tree.add(MANIFEST_NAME, pretty(&manifest));
     let mut headlines = judged.headlines();
     if let (Some(asked), Some(frames)) = (&design.sections().accuracy, forces.frames_to_average) {

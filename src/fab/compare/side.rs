@@ -6,7 +6,6 @@ use serde_json::Value;
 
 use crate::build;
 use crate::build::{BuildError, DESIGN_NAME, MANIFEST_NAME};
-use domecast_design;
 use domecast_design::DesignError;
 
 const CONSTANTS: &str = "constants/constants.json";

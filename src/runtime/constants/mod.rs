@@ -1,5 +1,9 @@
 //! What the runtime needs to know of one sensor: the form of `constants.json`, and the sensor that it describes.
 
+use std::path::Path;
+use std::str::FromStr;
+
+mod error;
 mod law;
 mod loads;
 mod model;
@@ -10,6 +14,7 @@ mod refit;
 mod sensor;
 mod stiffness;
 
+pub use error::ConstantsError;
 pub use law::{MagnetLaw, SpringLaw, SpringLawEnds};
 pub use loads::{PosedLoad, loads_over};
 pub use model::{
@@ -43,18 +48,31 @@ impl Constants {
         text
     }
 
-    /// Reads the file's text.
+    /// Reads a constants file.
     ///
     /// # Errors
-    /// A sentence that says what is wrong with it.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    /// [`ConstantsError`]: the file cannot be read, or is of another form or version.
+    pub fn load(path: &Path) -> Result<Self, ConstantsError> {
+        let fault = |problem: String| ConstantsError { file: None, problem }.in_file(path);
+        let text =
+            std::fs::read_to_string(path).map_err(|error| fault(format!("cannot be read: {error}")))?;
+        text.parse().map_err(|error: ConstantsError| error.in_file(path))
+    }
+}
+
+impl FromStr for Constants {
+    type Err = ConstantsError;
+
+    /// Reads the text of a constants file.
+    fn from_str(text: &str) -> Result<Self, ConstantsError> {
+        let fault = |problem| ConstantsError { file: None, problem };
         let constants: Self =
-            serde_json::from_str(text).map_err(|error| format!("is not a constants file: {error}"))?;
+            serde_json::from_str(text).map_err(|error| fault(format!("is not a constants file: {error}")))?;
         if constants.format != FORMAT || constants.version != VERSION {
-            return Err(format!(
+            return Err(fault(format!(
                 "has format \"{}\" version {}; this release reads \"{FORMAT}\" version {VERSION}",
                 constants.format, constants.version
-            ));
+            )));
         }
         Ok(constants)
     }

@@ -27,7 +27,6 @@ pub fn level_named(scene: &Scene, name: LevelName) -> Level {
         LevelName::Geometric => Level::Geometric,
         LevelName::ClosedForm => Level::ClosedForm,
         LevelName::Linear => Level::Linear { element_mm },
-        LevelName::NeoHookean => Level::NeoHookean { element_mm },
     }
 }
 
@@ -64,7 +63,7 @@ pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
     let most_n = scene.file().tolerance.force_n.unwrap_or(f64::INFINITY);
     let px_per_mm = largest_px_per_mm(scene);
     let own_work = per_frame(scene, best);
-    [LevelName::Geometric, LevelName::ClosedForm, LevelName::Linear]
+    [LevelName::Geometric, LevelName::ClosedForm]
         .into_iter()
         .filter(|name| *name < best)
         .filter_map(|name| {

@@ -177,12 +177,9 @@ struct Found {
 
 impl Samples {
     fn new(scene: &Scene, moved: bool) -> Result<Self, SimError> {
-        let cases = [
-            ways(scene, false, false)?,
-            ways(scene, false, true)?,
-            ways(scene, true, false)?,
-            ways(scene, true, true)?,
-        ];
+        let [bare, taped] = [ways(scene, false, false)?, ways(scene, true, false)?];
+        let through = |ways: &Ways| Ways { fresnel: true, ..ways.clone() };
+        let cases = [bare.clone(), through(&bare), taped.clone(), through(&taped)];
         let optics = &cases[0].optics;
         let rule = EmitterRule::default();
         let sample = |place: DVec3, normal: Option<DVec3>, beside: bool| Sample {

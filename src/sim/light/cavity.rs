@@ -70,13 +70,30 @@ impl Cavities {
     ///
     /// For a ray that stays within the part's outer faces; outside them everything counts as material.
     pub fn is_free(&self, from_mm: DVec3, to_mm: DVec3) -> bool {
+        self.near(from_mm.min(to_mm), from_mm.max(to_mm)).is_free(from_mm, to_mm)
+    }
+
+    /// The hollows that reach into a box: all that rays inside it may meet.
+    pub fn near(&self, low_mm: DVec3, high_mm: DVec3) -> NearHollows<'_> {
+        let reaches = |hollow: &&Hollow| (low_mm.cmple(hollow.high_mm) & high_mm.cmpge(hollow.low_mm)).all();
+        NearHollows(self.hollows.iter().filter(reaches).collect())
+    }
+}
+
+/// Hollows that the rays of a box may meet.
+#[derive(Debug)]
+pub struct NearHollows<'a>(Vec<&'a Hollow>);
+
+impl NearHollows<'_> {
+    /// [`Cavities::is_free`] for a ray inside the box.
+    pub fn is_free(&self, from_mm: DVec3, to_mm: DVec3) -> bool {
         // Each hollow that the front lies in carries it on to its far side; when no hollow does, it is blocked.
         // Hollows that lie further on wait for it.
         let mut waiting = [(0.0_f64, 0.0_f64); WAITING];
         let mut count = 0;
         let mut front = 0.0;
         let (low, high) = (from_mm.min(to_mm), from_mm.max(to_mm));
-        for hollow in &self.hollows {
+        for hollow in &self.0 {
             if !(low.cmple(hollow.high_mm) & high.cmpge(hollow.low_mm)).all() {
                 continue;
             }

@@ -51,60 +51,115 @@ pub struct DirectLight<'a> {
     pub fresnel: bool,
 }
 
-/// The rule across the emitter, made once.
+/// The rule across the emitter, made once: Gauss's places, and what interpolates between them.
 #[derive(Debug, Clone)]
-pub struct EmitterRule(GaussRule);
+pub struct EmitterRule {
+    rule: GaussRule,
+    /// Barycentric weights of the polynomial through the places.
+    weights: Vec<f64>,
+}
 
 impl Default for EmitterRule {
     fn default() -> Self {
-        Self(GaussRule::new(PLACES))
+        Self::with_places(PLACES)
     }
 }
 
 impl EmitterRule {
     /// A rule with another number of places, to see how much the number matters.
     pub fn with_places(count: usize) -> Self {
-        Self(GaussRule::new(count))
+        let rule = GaussRule::new(count);
+        let nodes = rule.nodes();
+        let product = |i: usize| -> f64 {
+            let others = nodes.iter().enumerate().filter(|(j, _)| *j != i);
+            // Four times the distance keeps the product near 1 for any number of places.
+            others.map(|(_, (v, _))| 4.0 * (nodes[i].0 - v)).product()
+        };
+        let weights = (0..nodes.len()).map(|i| 1.0 / product(i)).collect();
+        Self { rule, weights }
+    }
+
+    fn nodes(&self) -> &[(f64, f64)] {
+        self.rule.nodes()
+    }
+
+    /// Value at `v` of the polynomial through values at the places (J.-P. Berrut and L. N. Trefethen, Barycentric
+    /// Lagrange interpolation, SIAM Review 46, 2004).
+    fn interpolate(&self, values: impl Iterator<Item = DVec3>, v: f64) -> DVec3 {
+        let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+        for ((value, weight), (place, _)) in values.zip(&self.weights).zip(self.nodes()) {
+            let away = v - place;
+            if away == 0.0 {
+                return value;
+            }
+            sum += value * (weight / away);
+            weights += weight / away;
+        }
+        sum / weights
     }
 }
 
 /// What one place of the emitter gives.
+#[derive(Debug, Clone, Copy)]
 struct Share {
     flux: DVec3,
-    tangent: f64,
-    free: bool,
+    /// From the place to where its ray meets the sheet's underside, mm.
+    way_mm: DVec3,
 }
 
 impl DirectLight<'_> {
     /// Vector irradiance at a point of the dome or the sheet's top, mW/mm^2, sensor frame. Its product with the
     /// unit normal *away from* the light is the irradiance.
+    ///
+    /// The rays from the rule's places are solved. Between them, flux and way are smooth along a line of the emitter, and
+    /// the polynomial through the places interpolates both: so the platform's shadow is cut without another solve.
     pub fn vector_irradiance(&self, emitter: &Emitter, point_mm: DVec3, rule: &EmitterRule) -> DVec3 {
         let side = 2.0 * emitter.half_side_mm;
+        let pose = &emitter.platform_from_emitter;
+        let place =
+            |u: f64, v: f64| pose.transform_point3(DVec3::new((u - 0.5) * side, (v - 0.5) * side, 0.0));
         let indices = self.indices(point_mm.z);
-        let mut near = 0.0;
-        let mut sum = DVec3::ZERO;
-        for &(u, across) in rule.0.nodes() {
-            let mut at = |v: f64| {
-                let place = DVec3::new((u - 0.5) * side, (v - 0.5) * side, 0.0);
-                let share = self.share(emitter, place, point_mm, &indices, near);
-                near = share.tangent;
-                share
-            };
-            let Some(_) = self.cavities else {
-                for &(v, up) in rule.0.nodes() {
-                    sum += at(v).flux * (across * up);
-                }
-                continue;
-            };
-            if self.through_platform > 0.0 {
-                for &(v, up) in rule.0.nodes() {
-                    sum += at(v).flux * (across * up * self.through_platform);
+        let count = rule.nodes().len();
+        let mut shares = Vec::with_capacity(count * count);
+        let (mut near, mut low, mut high) = (0.0, DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &(u, _) in rule.nodes() {
+            for &(v, _) in rule.nodes() {
+                let source = place(u, v);
+                let Some(share) = self.share(emitter, source, point_mm, &indices, &mut near) else {
+                    return DVec3::ZERO;
+                };
+                shares.push(share);
+                for end in [source, source + share.way_mm] {
+                    (low, high) = (low.min(end), high.max(end));
                 }
             }
-            let pieces = pieces_in_sight(|v| at(v).free);
-            for (low, high) in pieces {
-                for (v, up) in rule.0.over(low, high) {
-                    sum += at(v).flux * (across * up * (1.0 - self.through_platform));
+        }
+        let open = if self.cavities.is_some() { self.through_platform } else { 1.0 };
+        let mut sum = DVec3::ZERO;
+        if open > 0.0 {
+            for (line, &(u, across)) in shares.chunks_exact(count).zip(rule.nodes()) {
+                for (share, &(v, up)) in line.iter().zip(rule.nodes()) {
+                    if self.enters(place(u, v) + share.way_mm) {
+                        sum += share.flux * (across * up * open);
+                    }
+                }
+            }
+        }
+        if let Some(cavities) = self.cavities.filter(|_| open < 1.0) {
+            // The emitter's corners lie a little beyond the rule's places.
+            let beyond = DVec3::splat(emitter.half_side_mm);
+            let hollows = cavities.near(low - beyond, high + beyond);
+            for (line, &(u, across)) in shares.chunks_exact(count).zip(rule.nodes()) {
+                let is_free = |v: f64| {
+                    let source = place(u, v);
+                    let end = source + rule.interpolate(line.iter().map(|share| share.way_mm), v);
+                    self.enters(end) && hollows.is_free(source, end)
+                };
+                for (low, high) in pieces_in_sight(is_free) {
+                    for (v, up) in rule.rule.over(low, high) {
+                        let flux = rule.interpolate(line.iter().map(|share| share.flux), v);
+                        sum += flux * (across * up * (1.0 - open));
+                    }
                 }
             }
         }
@@ -119,20 +174,26 @@ impl DirectLight<'_> {
         layers[..count].iter().map(|layer| layer.index_for(channel)).collect()
     }
 
-    fn share(&self, emitter: &Emitter, place: DVec3, point_mm: DVec3, indices: &[f64], near: f64) -> Share {
-        let pose = &emitter.platform_from_emitter;
-        let source = pose.transform_point3(place);
-        let dark = Share { flux: DVec3::ZERO, tangent: near, free: false };
-        let Ok(tube) = self.optics.light_tube(source, point_mm, near) else { return dark };
-        let per_sr = emitter.lobe.per_sr(tube.leaving.dot(pose.matrix3.z_axis));
-        // Between two emitters' faces and beyond the sheet's edge there is no way in.
-        let inside = tube.underside_mm.truncate().abs().cmple(self.sheet_half_mm).all();
-        if per_sr <= 0.0 || !inside {
-            return Share { tangent: tube.tangent, ..dark };
-        }
+    /// Whether a place of the plane of the sheet's underside is the sheet's.
+    fn enters(&self, underside_mm: DVec3) -> bool {
+        underside_mm.truncate().abs().cmple(self.sheet_half_mm).all()
+    }
+
+    /// What a place of the emitter sends to a point; `None` where no ray leads there. `near` is a neighbour's tangent.
+    fn share(
+        &self,
+        emitter: &Emitter,
+        source: DVec3,
+        point_mm: DVec3,
+        indices: &[f64],
+        near: &mut f64,
+    ) -> Option<Share> {
+        let tube = self.optics.light_tube(source, point_mm, *near).ok()?;
+        *near = tube.tangent;
+        let per_sr = emitter.lobe.per_sr(tube.leaving.dot(emitter.platform_from_emitter.matrix3.z_axis));
         let passed = if self.fresnel { fresnel::through(indices, tube.momentum) } else { 1.0 };
-        let free = self.cavities.is_none_or(|cavities| cavities.is_free(source, tube.underside_mm));
-        Share { flux: tube.arriving * (per_sr * passed * tube.sr_per_mm2), tangent: tube.tangent, free }
+        let flux = tube.arriving * (per_sr * passed * tube.sr_per_mm2);
+        Some(Share { flux, way_mm: tube.underside_mm - source })
     }
 }
 

@@ -51,54 +51,71 @@ impl DomeGrid {
 
     /// Values at all nodes, row by row, of a function of the direction; rows are shared among threads.
     ///
-    /// A node beyond the rim, which no direction has, gets the parabola through the rim and two places inside
-    /// continued, as far apart as it lies outside. Where no look-up comes it gets zeros.
+    /// A node beyond the rim, which no direction has, gets the parabola over the radius through the rim and two places
+    /// inside continued. These are asked for at even azimuths, a cell apart along the rim; a cubic leads from
+    /// one to the next. Where no look-up comes it gets zeros.
     pub fn fill_in_parallel<const K: usize>(
         &self,
         value: impl Fn(DVec3) -> [f64; K] + Sync,
     ) -> Vec<[f64; K]> {
-        let rows: Vec<Vec<[f64; K]>> = (0..self.nodes)
+        let azimuths = self.azimuths();
+        let step = RIM_STEP * self.cell();
+        let rim: Vec<[[f64; K]; 3]> = (0..azimuths)
             .into_par_iter()
-            .map(|row| (0..self.nodes).map(|column| self.node(column, row, &value)).collect())
+            .map(|k| {
+                let aside = DVec2::from_angle(std::f64::consts::TAU * k as f64 / azimuths as f64);
+                [1.0, 1.0 - step, 1.0 - 2.0 * step].map(|radius| value(direction_from_disc(aside * radius)))
+            })
             .collect();
-        rows.into_iter().flatten().collect()
-    }
-
-    fn node<const K: usize>(
-        &self,
-        column: usize,
-        row: usize,
-        value: &impl Fn(DVec3) -> [f64; K],
-    ) -> [f64; K] {
-        let place = self.place(column, row);
-        let radius = place.length();
-        match self.evaluations_at(radius) {
-            0 => [0.0; K],
-            1 => value(direction_from_disc(place)),
-            _ => {
-                let rim = value(direction_from_disc(place / radius));
-                let inside = value(direction_from_disc(place * ((2.0 - radius) / radius)));
-                let deeper = value(direction_from_disc(place * ((3.0 - 2.0 * radius) / radius)));
-                std::array::from_fn(|k| 3.0 * (rim[k] - inside[k]) + deeper[k])
+        let node = |i: usize| {
+            let place = self.place(i % self.nodes, i / self.nodes);
+            if place.length() <= 1.0 {
+                return value(direction_from_disc(place));
             }
-        }
+            if !self.is_beside(place.length()) { [0.0; K] } else { beyond(&rim, place, step) }
+        };
+        (0..self.nodes * self.nodes).into_par_iter().map(node).collect()
     }
 
-    fn evaluations_at(&self, radius: f64) -> u64 {
-        if radius <= 1.0 {
-            1
-        } else if radius <= 1.0 + 2.0 * std::f64::consts::SQRT_2 * self.cell() {
-            3
-        } else {
-            0
-        }
+    /// Azimuths at which the rim is asked for.
+    fn azimuths(&self) -> usize {
+        (std::f64::consts::TAU / self.cell()).ceil() as usize
+    }
+
+    /// Whether a look-up inside the disc may ask for a node so far from the middle.
+    fn is_beside(&self, radius: f64) -> bool {
+        radius <= 1.0 + 2.0 * std::f64::consts::SQRT_2 * self.cell()
     }
 
     /// How often [`DomeGrid::fill_in_parallel`] calls its function.
     pub fn evaluations(&self) -> u64 {
         let nodes = (0..self.nodes).flat_map(|row| (0..self.nodes).map(move |column| (column, row)));
-        nodes.map(|(column, row)| self.evaluations_at(self.place(column, row).length())).sum()
+        let inside = nodes.filter(|(column, row)| self.place(*column, *row).length() <= 1.0).count();
+        (inside + 3 * self.azimuths()) as u64
     }
+}
+
+/// Distance of the three places over the radius that continue a table beyond the rim, cells.
+const RIM_STEP: f64 = 1.0;
+
+/// The parabola over the radius from the rim's values, at a place beyond the rim.
+fn beyond<const K: usize>(rim: &[[[f64; K]; 3]], place: DVec2, step: f64) -> [f64; K] {
+    let count = rim.len();
+    let turn = (place.y.atan2(place.x) / std::f64::consts::TAU).rem_euclid(1.0) * count as f64;
+    let (first, wide) = (turn as usize, weights(turn.fract()));
+    // Newton's form of the parabola, from the rim outwards.
+    let t = (place.length() - 1.0) / step;
+    let along = [1.0 + t * (1.5 + 0.5 * t), -t * (2.0 + t), 0.5 * t * (1.0 + t)];
+    let mut out = [0.0; K];
+    for (i, across) in wide.iter().enumerate() {
+        let Some(three) = rim.get((first + count + i - 1) % count) else { continue };
+        for (values, along) in three.iter().zip(along) {
+            for (sum, value) in out.iter_mut().zip(values) {
+                *sum += across * along * value;
+            }
+        }
+    }
+    out
 }
 
 /// The disc's point for a unit direction.

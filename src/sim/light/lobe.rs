@@ -2,6 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use rayon::prelude::*;
+
 use super::quadrature::GaussRule;
 
 /// Places of the rule over the azimuth: a Gaussian over seven of its standard deviations to 1e-7.
@@ -70,8 +72,8 @@ impl Lobe {
         )
     }
 
-    fn from_intensity(intensity: impl Fn(f64) -> f64, flux: f64) -> Self {
-        let table = (0..=TABLE).map(|i| intensity(i as f64 / TABLE as f64)).collect();
+    fn from_intensity(intensity: impl Fn(f64) -> f64 + Sync, flux: f64) -> Self {
+        let table = (0..=TABLE).into_par_iter().map(|i| intensity(i as f64 / TABLE as f64)).collect();
         Self { table, flux }
     }
 

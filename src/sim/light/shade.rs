@@ -29,10 +29,6 @@ pub const DIFFUSER_UNITS: u64 = 20_000_000;
 /// Work of the dome's balance with itself.
 pub const ROOM_UNITS: u64 = 40_000_000;
 
-/// Largest error of a light's table that is refined no further, as a part of its largest value: it stands in a narrow
-/// strip along the edge of the platform's shadow.
-const TABLE_TOLERANCE: f64 = 1e-2;
-
 /// Places of the table of what leaves towards the camera.
 const LEAVING: usize = 512;
 
@@ -79,7 +75,6 @@ impl LitDome {
             falloff: used.falloff,
             albedo: used.interreflection.then(|| setup::mean_reflectance(scene)),
             moved: !scene.file().objects.is_empty(),
-            tolerance: TABLE_TOLERANCE,
         };
         let field = LightField::new(&ways, &prepared, &parts);
         let exact = field.evaluations() * lights;

@@ -13,8 +13,9 @@ use super::dome_map::{DomeGrid, bicubic};
 use super::radiosity::{DomeRoom, Rings, Underside};
 use domecast_optics::SensorOptics;
 
-/// Cells of the coarsest table, and of those that are tried after it.
-const CELLS: [usize; 2] = [36, 60];
+/// Cells across the table on the dome, and across those on the shells inside it, where light is smoother.
+const DOME_CELLS: usize = 60;
+pub(crate) const SHELL_CELLS: usize = 36;
 
 /// Radii of the shells for moved points, parts of the dome's.
 pub(super) const SHELLS: [f64; 3] = [1.0, 0.86, 0.72];
@@ -81,13 +82,17 @@ impl Ways {
     }
 }
 
+/// A source's vector irradiance along x, y and z, then the irradiance of a surface whose normal is the direction: looked up
+/// for itself, it is smoother than its parts.
+pub type Node = [f64; 4];
+
 /// A table over the dome for each source.
 #[derive(Debug)]
-pub struct Tables<const K: usize> {
+pub struct Tables {
     /// Their grid.
     pub grid: DomeGrid,
     /// For each source, its values at the nodes.
-    pub sources: Vec<Vec<[f64; K]>>,
+    pub sources: Vec<Vec<Node>>,
     /// Largest error seen in the probes, as a part of the source's largest value.
     pub error: f64,
     /// Points at which one source was worked out exactly.
@@ -97,22 +102,23 @@ pub struct Tables<const K: usize> {
 /// All that is worked out once for a design and a choice of effects.
 #[derive(Debug, Default)]
 pub struct Prepared {
-    still: OnceLock<Tables<1>>,
-    shells: OnceLock<Vec<Tables<3>>>,
+    dome: OnceLock<Tables>,
+    shells: OnceLock<Vec<Tables>>,
     rooms: OnceLock<Vec<DomeRoom>>,
     pub(super) samples: OnceLock<Samples>,
 }
 
 impl Prepared {
-    /// Irradiance of the undeformed membrane by each source; refined until its error is within the tolerance or the
-    /// finest is reached.
-    pub fn still(&self, ways: &Ways, tolerance: f64) -> &Tables<1> {
-        self.still.get_or_init(|| still_tables(ways, tolerance))
+    /// Vector irradiance of each source on the undeformed dome.
+    pub fn dome(&self, ways: &Ways) -> &Tables {
+        self.dome.get_or_init(|| dome_tables(ways))
     }
 
-    /// Vector irradiance of each source on the shells.
-    pub fn shells(&self, ways: &Ways) -> &[Tables<3>] {
-        self.shells.get_or_init(|| SHELLS.iter().map(|&part| shell_tables(ways, part)).collect())
+    /// The same on the shells inside it.
+    pub fn shells(&self, ways: &Ways) -> &[Tables] {
+        self.shells.get_or_init(|| {
+            SHELLS.iter().skip(1).map(|&part| tables(ways, part, DomeGrid::with_cells(SHELL_CELLS))).collect()
+        })
     }
 
     /// The dome as a room, for each channel.
@@ -143,52 +149,42 @@ pub fn prepared(key: &str) -> Arc<Prepared> {
     new
 }
 
-fn still_tables(ways: &Ways, tolerance: f64) -> Tables<1> {
+fn dome_tables(ways: &Ways) -> Tables {
     let rule = EmitterRule::default();
-    let probes: Vec<DVec3> = (0..PROBES).map(probe).collect();
-    let exact: Vec<Vec<f64>> = ways
-        .sources
-        .iter()
-        .map(|source| probes.par_iter().map(|d| ways.still(source, *d, &rule)).collect())
-        .collect();
-    let mut evaluations = PROBES as u64;
-    let mut made = None;
-    for cells in CELLS {
-        let grid = DomeGrid::with_cells(cells);
-        let fill = |source| grid.fill_in_parallel(|direction| [ways.still(source, direction, &rule)]);
-        let sources: Vec<Vec<[f64; 1]>> = ways.sources.iter().map(fill).collect();
-        evaluations += grid.evaluations();
-        let mut error = 0.0_f64;
-        for (table, exact) in sources.iter().zip(&exact) {
-            let largest = table.iter().map(|v| v[0]).fold(f64::MIN_POSITIVE, f64::max);
-            for (direction, value) in probes.iter().zip(exact) {
-                let [found] = bicubic(&grid, table, grid.coordinates(*direction));
-                error = error.max((found - value).abs() / largest);
-            }
-        }
-        let good = error <= tolerance;
-        made = Some(Tables { grid, sources, error, evaluations });
-        if good {
-            break;
-        }
-    }
-    made.unwrap_or(Tables { grid: DomeGrid::with_cells(8), sources: Vec::new(), error: 0.0, evaluations })
+    let made = tables(ways, 1.0, DomeGrid::with_cells(DOME_CELLS));
+    let off = |(source, table): (&Source, &Vec<Node>)| {
+        let probes = (0..PROBES).into_par_iter().map(|i| {
+            let direction = probe(i);
+            let [.., found] = bicubic(&made.grid, table, made.grid.coordinates(direction));
+            let exact = ways.still(source, direction, &rule);
+            (exact, (found - exact).abs())
+        });
+        let most = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
+        let (largest, off) = probes.reduce(|| (f64::MIN_POSITIVE, 0.0), most);
+        off / largest
+    };
+    let error = ways.sources.iter().zip(&made.sources).map(off).fold(0.0, f64::max);
+    Tables { error, evaluations: made.evaluations + PROBES as u64, ..made }
 }
 
-fn shell_tables(ways: &Ways, part: f64) -> Tables<3> {
+/// Vector irradiance of each source on the sphere of a part of the dome's radius.
+fn tables(ways: &Ways, part: f64, grid: DomeGrid) -> Tables {
     let rule = EmitterRule::default();
-    let grid = DomeGrid::with_cells(CELLS[0]);
     let fill = |source| {
-        grid.fill_in_parallel(|direction| ways.flux(source, ways.point(direction, part), &rule).to_array())
+        grid.fill_in_parallel(|direction| {
+            let flux = ways.flux(source, ways.point(direction, part), &rule);
+            flux.extend(flux.dot(direction).max(0.0)).to_array()
+        })
     };
     let sources = ways.sources.iter().map(fill).collect();
     Tables { grid, sources, error: 0.0, evaluations: grid.evaluations() }
 }
 
-/// Exact evaluations of each source, if the coarsest table is enough, with or without shells.
+/// Exact evaluations of each source, with or without shells.
 pub fn predicted_evaluations(shells: bool) -> u64 {
-    let grid = DomeGrid::with_cells(CELLS[0]).evaluations();
-    PROBES as u64 + grid * if shells { 1 + SHELLS.len() as u64 } else { 1 }
+    let of = |cells| DomeGrid::with_cells(cells).evaluations();
+    let inside = if shells { (SHELLS.len() as u64 - 1) * of(SHELL_CELLS) } else { 0 };
+    PROBES as u64 + of(DOME_CELLS) + inside
 }
 
 /// Directions spread evenly over the hemisphere (a golden spiral), none of them a node of a table.

@@ -351,7 +351,7 @@ fn ways_of(optics: &SensorOptics, source: Emitter) -> Ways {
 #[test]
 fn the_table_of_direct_light_matches_closed_forms_to_a_thousandth() {
     let optics = sensor(&[1.0], 1.0);
-    let parts = FieldParts { falloff: true, albedo: None, moved: true, tolerance: 5e-4 };
+    let parts = FieldParts { falloff: true, albedo: None, moved: true };
     // A point on the sphere: even light.
     let at = DVec3::new(6.0, 0.0, -8.0);
     let ways = ways_of(&optics, emitter(at, -at, 1e-4, 1.0));

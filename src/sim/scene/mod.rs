@@ -8,8 +8,9 @@ pub mod object;
 pub mod objects;
 mod resolve;
 
+use std::any::Any;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
@@ -25,7 +26,6 @@ use object::SceneObject;
 
 use super::SimError;
 use super::effect::{EffectChoice, EffectName};
-use super::touch::Between;
 
 /// Points that carry a dot's outline.
 pub const RIM_POINTS: usize = 8;
@@ -55,11 +55,8 @@ pub struct Scene {
     markers: Vec<Marker>,
     motion: Motion,
     objects: Vec<SceneObject>,
-    looked_at: OnceLock<Vec<LookedAt>>,
+    kept: OnceLock<Arc<dyn Any + Send + Sync>>,
 }
-
-/// A frame that stands for others where bounds are sought: its number, the sensor's state, the touched dome.
-pub(super) type LookedAt = (u32, State, Option<Between>);
 
 impl Scene {
     /// Reads and resolves a scene file, with the design that it names.
@@ -98,7 +95,7 @@ impl Scene {
                 );
             }
             self.file.frames.count = count;
-            self.looked_at = OnceLock::new();
+            self.kept = OnceLock::new();
         }
         self.file.seed = seed.unwrap_or(self.file.seed);
         Ok(())
@@ -163,16 +160,26 @@ impl Scene {
         state.map_err(|error| SimError::Frame { frame, problem: error.to_string() })
     }
 
-    /// The states that bounds look at: every effect's, found once.
-    pub(super) fn looked_at(
+    /// What a later stage has computed of the scene once and keeps with it.
+    pub(crate) fn kept<T: Any + Send + Sync>(&self) -> Option<Arc<T>> {
+        self.kept.get().and_then(|kept| Arc::clone(kept).downcast().ok())
+    }
+
+    /// [`Scene::kept`], computed now if nobody has.
+    ///
+    /// # Errors
+    /// Why it cannot be.
+    pub(crate) fn keep<T: Any + Send + Sync>(
         &self,
-        find: impl FnOnce() -> Result<Vec<LookedAt>, SimError>,
-    ) -> Result<&[LookedAt], SimError> {
-        if let Some(known) = self.looked_at.get() {
-            return Ok(known);
+        make: impl FnOnce() -> Result<T, SimError>,
+    ) -> Result<Arc<T>, SimError> {
+        if let Some(kept) = self.kept() {
+            return Ok(kept);
         }
-        let found = find()?;
-        Ok(self.looked_at.get_or_init(|| found))
+        let made = Arc::new(make()?);
+        // Another thread may have been first, with the same.
+        let _ = self.kept.set(Arc::<T>::clone(&made));
+        Ok(made)
     }
 
     /// The objects that may touch the dome.

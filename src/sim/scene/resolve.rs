@@ -67,7 +67,7 @@ pub(super) fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<
         markers,
         motion,
         objects,
-        looked_at: OnceLock::new(),
+        kept: OnceLock::new(),
     })
 }
 

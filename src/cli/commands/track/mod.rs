@@ -5,15 +5,16 @@ mod source;
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use serde_json::json;
 
-use super::calibrate_force::{input_fault, read_constants};
+use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
+use domecast_files::StagedFile;
 use domecast_runtime::track::{
     CSV_HEADER, Channel, DOTS_CSV_HEADER, Frame, Motion, Reference, Steps, Thresholds, TrackOptions, Tracked,
     Tracker, Undistorted, overlay_png, write_csv, write_dots_csv, write_json,
@@ -137,30 +138,30 @@ impl TrackArguments {
 
 /// Where the lines go: a file that is there whole or not at all, or standard output, frame by frame.
 enum Sink {
-    File(BufWriter<tempfile::NamedTempFile>, PathBuf),
+    File(StagedFile),
     Standard(io::Stdout),
 }
 
 impl Sink {
     fn new(out: Option<&Path>) -> Result<Self, Failure> {
-        let Some(path) = out else { return Ok(Self::Standard(io::stdout())) };
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let file = tempfile::NamedTempFile::new_in(folder).map_err(|e| unwritable(path, &e))?;
-        Ok(Self::File(BufWriter::new(file), path.to_path_buf()))
+        Ok(match out {
+            Some(path) => Self::File(StagedFile::new(path)?),
+            None => Self::Standard(io::stdout()),
+        })
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<(), Failure> {
         match self {
-            Self::File(file, path) => file.write_all(bytes).map_err(|e| unwritable(path, &e)),
+            Self::File(file) => Ok(file.write(bytes)?),
             Self::Standard(out) => Ok(out.write_all(bytes).and_then(|()| out.flush())?),
         }
     }
 
     fn end(self) -> Result<(), Failure> {
-        let Self::File(file, path) = self else { return Ok(()) };
-        let file = file.into_inner().map_err(|e| unwritable(&path, e.error()))?;
-        file.persist(&path).map_err(|e| unwritable(&path, &e.error))?;
-        Ok(())
+        match self {
+            Self::File(file) => Ok(file.commit()?),
+            Self::Standard(_) => Ok(()),
+        }
     }
 }
 

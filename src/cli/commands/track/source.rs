@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::str::FromStr;
 
-use super::super::calibrate_force::input_fault;
+use super::super::input::input_fault;
 use super::super::output::Failure;
 use super::decode::{self, Picture};
 

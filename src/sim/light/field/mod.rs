@@ -32,8 +32,6 @@ pub struct FieldParts {
     pub albedo: Option<[f64; 3]>,
     /// Whether moved points are asked for.
     pub moved: bool,
-    /// Largest error of the tables, as a part of each light's largest value.
-    pub tolerance: f64,
 }
 
 /// Light on the membrane for the three channels of the camera, mW/mm^2 weighted by their responses.
@@ -70,7 +68,7 @@ impl LightField {
         };
         let rule = EmitterRule::default();
         let (grid, table) = if parts.falloff {
-            let tables = prepared.still(ways, parts.tolerance);
+            let tables = prepared.dome(ways);
             field.error = tables.error;
             field.evaluations += tables.evaluations;
             (tables.grid, channels(ways, tables))
@@ -89,7 +87,7 @@ impl LightField {
         if parts.moved && parts.falloff {
             let tables = prepared.shells(ways);
             field.evaluations += tables.iter().map(|tables| tables.evaluations).sum::<u64>();
-            field.shells = Shells::new(ways, tables);
+            field.shells = Shells::new(ways, prepared.dome(ways), tables);
         }
         field.own = own;
         field
@@ -253,11 +251,11 @@ fn continued<const K: usize>(place: DVec2, inside: impl Fn(DVec2) -> [f64; K]) -
     std::array::from_fn(|k| 3.0 * (rim[k] - near[k]) + deep[k])
 }
 
-/// The lights' tables as the channels see them together.
-fn channels(ways: &Ways, tables: &Tables<1>) -> Vec<[f64; 3]> {
+/// The lights' irradiance of the undeformed membrane as the channels see it together.
+fn channels(ways: &Ways, tables: &Tables) -> Vec<[f64; 3]> {
     let mut sum = vec![[0.0; 3]; tables.grid.nodes * tables.grid.nodes];
     for (source, table) in ways.sources.iter().zip(&tables.sources) {
-        for (total, [light]) in sum.iter_mut().zip(table) {
+        for (total, [.., light]) in sum.iter_mut().zip(table) {
             for (channel, seen) in total.iter_mut().zip(source.seen_mw) {
                 *channel += light * seen;
             }

@@ -11,7 +11,7 @@ use super::bend::{squared_thirds, squares};
 use super::continued;
 use super::places::{Scale, cells, disc_of, split};
 use crate::light::dome_map::{DomeGrid, bicubic};
-use crate::light::tables::{SHELLS, Tables, Ways};
+use crate::light::tables::{SHELL_CELLS, SHELLS, Tables, Ways};
 use crate::rests::{largest, rest_of_jumps};
 use crate::shading::{MovedBend, Turned};
 use crate::splines::{Degree, quadratics, to_coefficients};
@@ -49,13 +49,11 @@ pub(super) struct Shells {
 
 impl Shells {
     /// Sums up the lights' tables; `None` where there are none.
-    pub fn new(ways: &Ways, tables: &[Tables<3>]) -> Option<Self> {
-        let grid = tables.first()?.grid;
-        let flux = |tables: &Tables<3>| flux(ways, tables, &grid);
-        let [outer, second, third] = match tables {
-            [outer, second, third] => [outer, second, third].map(flux),
-            _ => return None,
-        };
+    pub fn new(ways: &Ways, outer: &Tables, inside: &[Tables]) -> Option<Self> {
+        let grid = DomeGrid::with_cells(SHELL_CELLS);
+        let flux = |tables: &Tables| flux(ways, tables, &grid);
+        let [second, third] = inside else { return None };
+        let [outer, second, third] = [outer, second, third].map(flux);
         let more = |shell: &[Vec<Vec4>; 3]| -> [Vec<Vec4>; 3] {
             std::array::from_fn(|k| shell[k].iter().zip(&outer[k]).map(|(a, b)| *a - *b).collect())
         };
@@ -145,8 +143,9 @@ pub(super) fn over(table: &[f32], nodes: usize, low: Vec2, high: Vec2) -> f32 {
 }
 
 /// The flux of all lights on a shell as the channels see it: tables of x, y and z, continued beyond the rim.
-fn flux(ways: &Ways, tables: &Tables<3>, grid: &DomeGrid) -> [Vec<Vec4>; 3] {
-    let mut flux = vec![[0.0; 9]; grid.nodes * grid.nodes];
+fn flux(ways: &Ways, tables: &Tables, grid: &DomeGrid) -> [Vec<Vec4>; 3] {
+    let own = &tables.grid;
+    let mut flux = vec![[0.0; 9]; own.nodes * own.nodes];
     for (source, table) in ways.sources.iter().zip(&tables.sources) {
         for (sum, vector) in flux.iter_mut().zip(table) {
             for (k, total) in sum.iter_mut().enumerate() {
@@ -154,7 +153,7 @@ fn flux(ways: &Ways, tables: &Tables<3>, grid: &DomeGrid) -> [Vec<Vec4>; 3] {
             }
         }
     }
-    let inside = |place: DVec2| bicubic(grid, &flux, grid.coordinates_of_disc(place));
+    let inside = |place: DVec2| bicubic(own, &flux, own.coordinates_of_disc(place));
     let node = |i: usize| continued(grid.place(i % grid.nodes, i / grid.nodes), inside);
     let nodes: Vec<[f64; 9]> = (0..grid.nodes * grid.nodes).map(node).collect();
     let wide =

@@ -1,0 +1,142 @@
+//! A drawn frame as the bytes of its files.
+
+use std::io;
+
+use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+
+use crate::frame::Image8;
+use crate::render::Drawn;
+use crate::scene::Scene;
+use crate::truth::FrameTruth;
+use crate::work::Work;
+
+/// Quality of the video's JPEGs: the PNG frames are the exact ones.
+const QUALITY: u8 = 92;
+
+/// A frame's picture in both codes.
+pub(super) struct CodedImage {
+    pub width: usize,
+    pub height: usize,
+    pub png: Vec<u8>,
+    pub jpeg: Vec<u8>,
+}
+
+/// A frame, coded.
+pub(super) struct CodedFrame {
+    pub image: Option<CodedImage>,
+    /// Further files by name.
+    pub extras: Vec<(String, Vec<u8>)>,
+    /// The truth's line.
+    pub line: String,
+    pub truth: FrameTruth,
+    pub work: Work,
+}
+
+impl CodedFrame {
+    /// Codes a frame; its picture comes back, for its room.
+    pub fn new(scene: &Scene, drawn: Drawn) -> Result<(Self, Option<Image8>), String> {
+        let image = match &drawn.image {
+            Some(image) => Some(CodedImage {
+                width: image.width,
+                height: image.height,
+                png: png_bytes(image).map_err(|error| error.to_string())?,
+                jpeg: jpeg_bytes(image).map_err(|error| error.to_string())?,
+            }),
+            None => None,
+        };
+        let extras = extras(scene, &drawn).map_err(|error| error.to_string())?;
+        let line = drawn.truth.to_line();
+        Ok((Self { image, extras, line, truth: drawn.truth, work: drawn.work }, drawn.image))
+    }
+}
+
+/// A picture as PNG: grey or RGB, 8 bits, coded fast.
+fn png_bytes(image: &Image8) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::with_capacity(image.bytes.len() / 2);
+    let width = u32::try_from(image.width).unwrap_or(u32::MAX);
+    let height = u32::try_from(image.height).unwrap_or(u32::MAX);
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(if image.channels == 3 { png::ColorType::Rgb } else { png::ColorType::Grayscale });
+    encoder.set_depth(png::BitDepth::Eight);
+    // One filter for all rows: smooth pictures gain little from a choice, which takes longer than the code.
+    encoder.set_compression(png::Compression::Fastest);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&image.bytes)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// A picture as JPEG, no colour thinned out.
+fn jpeg_bytes(image: &Image8) -> io::Result<Vec<u8>> {
+    let side = |n: usize| {
+        let long = || io::Error::new(io::ErrorKind::InvalidInput, "a JPEG side has at most 65535 pixels");
+        u16::try_from(n).map_err(|_| long())
+    };
+    let mut jpeg = Vec::with_capacity(image.bytes.len() / 8);
+    let mut encoder = Encoder::new(&mut jpeg, QUALITY);
+    encoder.set_sampling_factor(SamplingFactor::F_1_1);
+    let color = if image.channels == 3 { ColorType::Rgb } else { ColorType::Luma };
+    encoder
+        .encode(&image.bytes, side(image.width)?, side(image.height)?, color)
+        .map_err(|error| io::Error::other(error.to_string()))?;
+    Ok(jpeg)
+}
+
+/// Samples along each side of a height map.
+const HEIGHT_SIDE: u32 = 200;
+
+/// The membrane's heights and the contact's pressure, where the scene wants them.
+fn extras(scene: &Scene, drawn: &Drawn) -> tiff::TiffResult<Vec<(String, Vec<u8>)>> {
+    let wanted = scene.file().output;
+    let number = drawn.truth.frame;
+    let radius_mm = scene.optics().dome_radius_mm();
+    let mut files = Vec::new();
+    if wanted.heights {
+        let heights = match &drawn.contact {
+            Some(contact) => contact.height_map_mm(radius_mm, HEIGHT_SIDE as usize),
+            None => still_heights_mm(radius_mm, HEIGHT_SIDE as usize),
+        };
+        files.push((format!("heights_{number:04}.tif"), float_tiff(&heights, HEIGHT_SIDE)?));
+    }
+    if wanted.pressure {
+        files.push((format!("pressure_{number:04}.json"), pressure_json(drawn).into_bytes()));
+    }
+    Ok(files)
+}
+
+fn pressure_json(drawn: &Drawn) -> String {
+    let nodes = drawn.contact.as_ref().map_or(&[][..], |contact| &contact.nodes);
+    let nodes: Vec<_> = nodes
+        .iter()
+        .map(|node| {
+            serde_json::json!({
+                "at_mm": node.at_mm.to_array(), "area_mm2": node.area_mm2, "force_n": node.force_n.to_array(),
+                "pressure_mpa": node.pressure_mpa, "sticks": node.sticks,
+            })
+        })
+        .collect();
+    let text = serde_json::json!({
+        "frame": drawn.truth.frame,
+        "contact_radius_mm": drawn.contact.as_ref().map(|contact| contact.contact_radius_mm),
+        "peak_pressure_mpa": drawn.contact.as_ref().map(|contact| contact.peak_pressure_mpa),
+        "nodes": nodes,
+    });
+    format!("{text}\n")
+}
+
+/// Heights of the undeformed dome on the raster of [`domecast_contact::ContactState::height_map_mm`].
+fn still_heights_mm(radius_mm: f64, side: usize) -> Vec<f64> {
+    let at = |i: usize| ((2 * i + 1) as f64 / side as f64 - 1.0) * radius_mm;
+    let height =
+        |k: usize| (radius_mm * radius_mm - at(k % side).powi(2) - at(k / side).powi(2)).max(0.0).sqrt();
+    (0..side * side).map(height).collect()
+}
+
+/// A square raster as 32-bit float TIFF.
+fn float_tiff(values: &[f64], side: u32) -> tiff::TiffResult<Vec<u8>> {
+    let mut bytes = io::Cursor::new(Vec::new());
+    let values: Vec<f32> = values.iter().map(|v| *v as f32).collect();
+    let mut encoder = tiff::encoder::TiffEncoder::new(&mut bytes)?;
+    encoder.write_image::<tiff::encoder::colortype::Gray32Float>(side, side, &values)?;
+    Ok(bytes.into_inner())
+}

@@ -273,8 +273,8 @@ impl Run<'_> {
         match self.lens().unproject_solved(pixel) {
             Ok(found) => {
                 self.seen.most.lens = self.seen.most.lens.max(found.iterations);
-                assert_eq!(self.lens().unproject(pixel), Ok(found.value), "seed {seed}");
-                self.ray_is_right(pixel, found.value, "unproject");
+                assert_eq!(self.lens().unproject(pixel), Ok(found.ray), "seed {seed}");
+                self.ray_is_right(pixel, found.ray, "unproject");
             }
             Err(limit) => {
                 assert_eq!(limit, self.lens().end_limit(), "seed {seed}: pixel {pixel}");
@@ -384,13 +384,13 @@ impl Run<'_> {
                 Err(limit) => panic!("seed {seed}: {limit} for {pixel} at {inside} of the domain"),
             };
             self.seen.most.lens = self.seen.most.lens.max(back.iterations);
-            let error = distance(v3(back.value), unit(v3(ray)));
+            let error = distance(v3(back.ray), unit(v3(ray)));
             let allowed = (pixel_ulps(self.lens(), pixel) + by_lens) * condition(&slope, ray.length());
             assert!(
                 error <= allowed.max(1e-10),
                 "seed {seed}: {pixel} at {inside}: {error:e} rad, {allowed:e} allowed"
             );
-            self.ray_is_right(pixel, back.value, "back");
+            self.ray_is_right(pixel, back.ray, "back");
         }
         self.seen.ok += 1;
     }

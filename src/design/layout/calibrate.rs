@@ -109,7 +109,7 @@ impl From<LayoutError> for CalibrateError {
 /// Where each mark of an artwork stands: on the plate, and on the dome by the present map.
 struct KnownMarks {
     printed: Printed,
-    /// By id: place on the plate, and the turn into the frame of its hit.
+    /// By id: place on the plate, and the turn into the frame of its print pass.
     places: Vec<Option<(DVec2, glam::DMat3)>>,
 }
 
@@ -210,7 +210,7 @@ fn target_marks(spec: &LayoutSpec, transfer: &TransferMap) -> KnownMarks {
 }
 
 fn dot_marks(layout: &Layout) -> KnownMarks {
-    let place = |dot: &super::Dot| Some((dot.plate_mm, layout.hits[dot.hit].hit_from_sensor));
+    let place = |dot: &super::Dot| Some((dot.plate_mm, layout.passes[dot.pass].hit_from_sensor));
     KnownMarks { printed: Printed::Dots, places: layout.dots.iter().map(place).collect() }
 }
 

@@ -13,7 +13,7 @@ use super::zones::{self, ImageZone};
 pub(super) fn check_dot(
     spec: &LayoutSpec,
     projector: &DotProjector<'_>,
-    hits: &[Hit],
+    passes: &[Hit],
     zones: &[ImageZone],
     even_px: DVec2,
 ) -> Result<Dot, LostDot> {
@@ -26,7 +26,7 @@ pub(super) fn check_dot(
     let diameter_mm = projector.dome_diameter_mm(&curve).map_err(lose)?;
     check_seen(spec, &image_outline).map_err(lose)?;
     zones::check(zones, &image_outline).map_err(lose)?;
-    let (hit, wrap_rad) = nearest_hit(hits, surface.normal);
+    let (pass, wrap_rad) = nearest_pass(passes, surface.normal);
     let own_rad = (0.5 * diameter_mm / spec.optics.dome_radius_mm()).min(1.0).asin();
     let reach_rad = wrap_rad + own_rad;
     let limit_rad = spec.print.wrap_limit_deg.to_radians();
@@ -41,7 +41,7 @@ pub(super) fn check_dot(
     if reach_rad > limit_rad {
         return Err(lose(Reason::BeyondWrap { wrap_rad: reach_rad, limit_rad }));
     }
-    let hit_from_sensor = hits[hit].hit_from_sensor;
+    let hit_from_sensor = passes[pass].hit_from_sensor;
     let plate_mm = projector
         .transfer
         .plate_from_dome(hit_from_sensor * surface.surface_mm)
@@ -60,7 +60,7 @@ pub(super) fn check_dot(
         surface_mm: surface.surface_mm,
         normal: surface.normal,
         field_angle_rad: surface.field_angle_rad,
-        hit,
+        pass,
         wrap_rad,
         plate_mm,
         diameter_mm,
@@ -70,10 +70,10 @@ pub(super) fn check_dot(
     })
 }
 
-fn nearest_hit(hits: &[Hit], normal: DVec3) -> (usize, f64) {
+fn nearest_pass(passes: &[Hit], normal: DVec3) -> (usize, f64) {
     let mut best = (0, f64::INFINITY);
-    for (index, hit) in hits.iter().enumerate() {
-        let local = hit.hit_from_sensor * normal;
+    for (index, pass) in passes.iter().enumerate() {
+        let local = pass.hit_from_sensor * normal;
         let wrap_rad = local.truncate().length().atan2(local.z);
         if wrap_rad < best.1 {
             best = (index, wrap_rad);

@@ -37,17 +37,17 @@ pub struct Dot {
     pub normal: DVec3,
     /// Angle of its ray in air to the camera's axis, rad.
     pub field_angle_rad: f64,
-    /// Index of the pad's hit that prints it.
-    pub hit: usize,
-    /// Angle between the normal and the stroke of its hit, rad.
+    /// Index of the print pass that prints it.
+    pub pass: usize,
+    /// Angle between the normal and the stroke of its print pass, rad.
     pub wrap_rad: f64,
-    /// Its centre on the plate of its hit, mm.
+    /// Its centre on the plate of its print pass, mm.
     pub plate_mm: DVec2,
     /// Diameter of the flat disc with the area that its outline on the dome encloses, mm.
     pub diameter_mm: f64,
     /// Its outline in the raw image, px.
     pub image_outline: Outline,
-    /// Its outline on the plate of its hit, mm.
+    /// Its outline on the plate of its print pass, mm.
     pub plate_outline: Outline,
     /// The dots next to it in the image, by id, ascending.
     pub neighbors: Vec<u32>,
@@ -149,7 +149,7 @@ impl DotCurve<'_> {
 }
 
 impl DotProjector<'_> {
-    /// A dot's outline on the plate of a hit, as `hit_from_sensor` turns the dome under the pad, drawn as closely as
+    /// A dot's outline on the plate of a print pass, as `hit_from_sensor` turns the dome under the pad, drawn as closely as
     /// `tolerance_mm` asks.
     ///
     /// # Errors
@@ -213,7 +213,7 @@ impl DotProjector<'_> {
     }
 }
 
-/// A curve's outline on the plate of a hit, as `hit_from_sensor` turns the dome under the pad.
+/// A curve's outline on the plate of a print pass, as `hit_from_sensor` turns the dome under the pad.
 pub(super) fn plate_outline(
     curve: &DotCurve<'_>,
     transfer: &TransferMap,

@@ -53,7 +53,7 @@ pub struct EvennessReport {
     pub image_px: Evenness,
     /// Along the dome, mm.
     pub dome_mm: Evenness,
-    /// On the plate, between dots of one hit, mm.
+    /// On the plate, between dots of one print pass, mm.
     pub plate_mm: Option<Evenness>,
 }
 
@@ -70,7 +70,7 @@ pub struct PinholeComparison {
     pub mean_shift_mm: f64,
     /// The largest of them, mm.
     pub max_shift_mm: f64,
-    /// Dots that would not be seen, or not hit the dome.
+    /// Dots that would not be seen, or whose ray misses the dome.
     pub lost: usize,
 }
 
@@ -159,7 +159,7 @@ pub fn by_pinhole(spec: &LayoutSpec, layout: &Layout) -> Option<PinholeCompariso
     }
     let clear = SensorOptics::new(&clear).ok()?;
     let placed: Vec<Option<DVec3>> =
-        layout.dots.iter().map(|dot| clear.trace(dot.image_px).ok().map(|hit| hit.surface_mm)).collect();
+        layout.dots.iter().map(|dot| clear.trace(dot.image_px).ok().map(|point| point.surface_mm)).collect();
     let seen: Vec<Option<DVec2>> =
         placed.iter().map(|point| point.and_then(|point| spec.optics.project(point).ok())).collect();
     let image_px = evenness(layout, &seen, in_plane, |_, _| true)?;

@@ -64,7 +64,7 @@ pub enum Reason {
         /// What can be printed, mm.
         min_mm: f64,
     },
-    /// Further around the dome than the pad can wrap, from every hit.
+    /// Further around the dome than the pad can wrap, from every print pass.
     BeyondWrap {
         /// Largest angle between its normals and the stroke, rad.
         wrap_rad: f64,

@@ -50,4 +50,4 @@ pub use error::LayoutError;
 pub use lost::{LostDot, Reason, Rule, Zone};
 pub use passes::Hit;
 pub use plan::Layout;
-pub use spec::{LayoutSpec, Mask, WhiteMarker};
+pub use spec::{LayoutSpec, Mask};

@@ -1,23 +1,23 @@
-//! The pad's hits: one from straight above, or the fewest tilted ones that reach every dot.
+//! Print passes: one from straight above, or the fewest tilted ones that reach every dot.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DMat3;
 
-/// One hit of the pad.
+/// One print pass: a stroke of the pad from one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// Angle between the dome's axis and the stroke, rad.
     pub tilt_rad: f64,
     /// Azimuth towards which the stroke's contact moves from the pole, rad from +x.
     pub azimuth_rad: f64,
-    /// Turns a direction of the sensor frame into the hit's frame, whose +z is the stroke reversed. Zero tilt
-    /// is the identity; else the meridian towards the hit stays where it is.
+    /// Turns a direction of the sensor frame into the pass's frame, whose +z is the stroke reversed. Zero tilt
+    /// is the identity; else the meridian towards the pass stays where it is.
     pub hit_from_sensor: DMat3,
 }
 
 impl Hit {
-    /// The hit whose pad comes down along the normal at this polar angle and azimuth.
+    /// The pass whose pad comes down along the normal at this polar angle and azimuth.
     pub fn new(tilt_rad: f64, azimuth_rad: f64) -> Self {
         let turn = DMat3::from_rotation_z(azimuth_rad);
         let hit_from_sensor = turn * DMat3::from_rotation_y(-tilt_rad) * turn.transpose();
@@ -31,7 +31,7 @@ const MAX_SECTORS: u32 = 12;
 /// Halvings in the search for the tilt.
 const HALVINGS: u32 = 60;
 
-/// The hits for dots whose centres lie up to `polar_rad` from the pole, where each hit reaches centres up to
+/// The passes for dots whose centres lie up to `polar_rad` from the pole, where each pass reaches centres up to
 /// `reach_rad` from its stroke: a centre, and sectors around it, as few as cover everything.
 ///
 /// The sectors stand at equal azimuths, the first at +x. Halfway between two of them, a sector must meet the

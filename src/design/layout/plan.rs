@@ -32,8 +32,8 @@ pub struct Layout {
     pub dots: Vec<Dot>,
     /// The dots of the pattern that are left out, with their reasons.
     pub lost: Vec<LostDot>,
-    /// The pad's hits.
-    pub hits: Vec<Hit>,
+    /// The print passes.
+    pub passes: Vec<Hit>,
     /// Distance of neighbours in the even frame, px; solved if the design gives a number of dots.
     pub pitch_px: f64,
     /// Size of the dots.
@@ -42,7 +42,7 @@ pub struct Layout {
     pub center_px: DVec2,
     /// Edge of the pattern in the even frame, around its centre.
     pub edge: Boundary,
-    /// The pad's map, the same for each hit.
+    /// The pad's map, the same for each print pass.
     pub transfer: TransferMap,
     /// What a person should know, in words.
     pub warnings: Vec<String>,
@@ -102,11 +102,11 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
             format!("below the pitch, {pitch_px} px"),
         ));
     }
-    let hits = plan_hits(spec, &projector, center_px, &places);
+    let passes = plan_passes(spec, &projector, center_px, &places);
     let zones = zones::image_zones(spec);
     let checked: Vec<Result<Dot, LostDot>> = places
         .par_iter()
-        .map(|place| check_dot(spec, &projector, &hits, &zones, center_px + *place))
+        .map(|place| check_dot(spec, &projector, &passes, &zones, center_px + *place))
         .collect();
     let checked = gaps::keep_apart(checked, spec.print.min_gap_mm);
     let mut dots = Vec::with_capacity(checked.len());
@@ -144,11 +144,11 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
             dots.len() + lost.len()
         ));
     }
-    Ok(Layout { dots, lost, hits, pitch_px, size, center_px, edge, transfer, warnings })
+    Ok(Layout { dots, lost, passes, pitch_px, size, center_px, edge, transfer, warnings })
 }
 
-/// The hits that the dots of the pattern need, those left aside that the lens does not see.
-fn plan_hits(
+/// The print passes that the dots of the pattern need, those that the lens does not see left out.
+fn plan_passes(
     spec: &LayoutSpec,
     projector: &DotProjector<'_>,
     center_px: DVec2,

@@ -40,8 +40,9 @@ pub struct LayoutReport {
     pub dot_diameter_mm: [f64; 2],
     /// Dots of the pattern that are left out.
     pub lost: Vec<LostRecord>,
-    /// The pad's hits.
-    pub hits: Vec<HitRecord>,
+    /// The print passes.
+    #[serde(rename = "hits")]
+    pub passes: Vec<HitRecord>,
     /// How even the pattern is by design; null where no dot has a neighbour.
     pub evenness: Option<EvennessReport>,
     /// The same pattern laid out by the pinhole alone, seen through the real stack.
@@ -67,7 +68,7 @@ pub struct LostRecord {
     pub because: String,
 }
 
-/// A hit of the pad.
+/// A print pass.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HitRecord {
     /// Its film, from 1.
@@ -117,7 +118,7 @@ impl LayoutReport {
                     because: dot.reason.to_string(),
                 })
                 .collect(),
-            hits: hits(layout),
+            passes: passes(layout),
             evenness: evenness::by_design(layout),
             pinhole_alone: evenness::by_pinhole(spec, layout),
             tolerances: tolerances::under_tolerances(spec, layout, &design.sections().tolerances),
@@ -162,13 +163,13 @@ impl LayoutReport {
     }
 }
 
-fn hits(layout: &Layout) -> Vec<HitRecord> {
-    let record = |(index, hit): (usize, &super::Hit)| {
+fn passes(layout: &Layout) -> Vec<HitRecord> {
+    let record = |(index, pass): (usize, &super::Hit)| {
         let dots = || layout.dots.iter().filter(move |dot| dot.hit == index);
         HitRecord {
             film: index + 1,
-            tilt_deg: hit.tilt_rad.to_degrees(),
-            azimuth_deg: hit.azimuth_rad.to_degrees(),
+            tilt_deg: pass.tilt_rad.to_degrees(),
+            azimuth_deg: pass.azimuth_rad.to_degrees(),
             dots: dots().count(),
             wrap_deg: dots().map(|dot| dot.wrap_rad).fold(0.0, f64::max).to_degrees(),
         }

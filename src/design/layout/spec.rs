@@ -1,6 +1,6 @@
 //! What a layout is made from.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::dot::DotSize;
 use super::error::LayoutError;
@@ -9,17 +9,7 @@ use crate::spec::Design;
 use crate::spec::sections::{PatternSection, PrintSection, TransferMapName};
 use crate::transfer::{Correction, Nominal, TransferError, TransferMap};
 use domecast_optics::SensorOptics;
-
-/// A white marker on the sheet's top.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WhiteMarker {
-    /// Its number.
-    pub id: u32,
-    /// Its centre, sensor frame, mm.
-    pub position_mm: DVec3,
-    /// Its diameter, mm.
-    pub diameter_mm: f64,
-}
+use domecast_optics::pose::Marker;
 
 /// The circle outside which the runtime does not look, in the undistorted frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +30,7 @@ pub struct LayoutSpec {
     /// The runtime's mask; dots outside are not seen.
     pub mask: Option<Mask>,
     /// The white markers, which may hide dots.
-    pub white_markers: Vec<WhiteMarker>,
+    pub white_markers: Vec<Marker>,
     /// The design's pattern.
     pub pattern: PatternSection,
     /// The design's print.
@@ -73,7 +63,7 @@ impl LayoutSpec {
                 radius_px: sections.runtime.mask_radius_px,
             }),
             white_markers: markers
-                .map(|(id, position_mm)| WhiteMarker { id, position_mm, diameter_mm })
+                .map(|(id, position_mm)| Marker { id, position_mm, diameter_mm })
                 .collect(),
             pattern: sections.pattern.clone(),
             print: sections.print.clone(),

@@ -30,7 +30,7 @@ pub struct TargetMark {
     pub ring: u32,
     /// Its place on the ring, from +x.
     pub spoke: u32,
-    /// Where it should land on the dome, frame of the hit, mm.
+    /// Where it should land on the dome, frame of the print pass, mm.
     pub surface_mm: DVec3,
     /// Where it stands on the plate by the design's map, mm.
     pub plate_mm: DVec2,

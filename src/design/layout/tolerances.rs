@@ -217,7 +217,7 @@ fn sensor(
 
     // Each print pass has its own registration.
     let moved: Vec<(DVec2, DVec2)> = layout
-        .hits
+        .passes
         .iter()
         .map(|_| {
             let shift_mm = random.normal_pair() * tolerances.print_registration_mm * counts(5);

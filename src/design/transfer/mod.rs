@@ -6,7 +6,7 @@
 //! [`Correction`].
 //!
 //! Plate coordinates are mm in the *plate* frame: origin under the pole, seen from above, x as the sensor's
-//! x, y up as the sensor's y. Points of the dome are mm in the frame of the hit: the sensor frame for a hit
+//! x, y up as the sensor's y. Points of the dome are mm in the frame of the print pass: the sensor frame for a pass
 //! from straight above, a tilted one for others; +z is the pad's stroke, reversed.
 //!
 //! # Example

@@ -30,14 +30,14 @@ pub struct Lens {
 /// Pixels that are computed side by side.
 pub(crate) const LANES: usize = 16;
 
-/// What an inverse found, and how.
+/// The direction that a pixel sees, and how it was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solved<T> {
-    /// The answer.
-    pub value: T,
+pub struct SolvedRay {
+    /// Unit direction, camera frame.
+    pub ray: DVec3,
     /// Evaluations of the formula that it took.
     pub iterations: u32,
-    /// Distance, in pixels, from the input to where the answer maps.
+    /// Distance from the pixel to the projection of the ray, px.
     pub residual_px: f64,
 }
 
@@ -166,7 +166,7 @@ impl Lens {
     ///
     /// # Errors
     /// As [`Lens::unproject`].
-    pub fn unproject_solved(&self, pixel: DVec2) -> Result<Solved<DVec3>, LensLimit> {
+    pub fn unproject_solved(&self, pixel: DVec2) -> Result<SolvedRay, LensLimit> {
         let ray = self.unproject(pixel)?;
         let (image, slack) = (self.image_of(pixel), self.slack(pixel));
         let iterations = match &self.formula {
@@ -174,7 +174,7 @@ impl Lens {
             Formula::BrownConrady(model) => model.plane_of(image, slack)?.1,
             Formula::KannalaBrandt(model) => model.angle_of(image, slack)?.1,
         };
-        Ok(Solved { value: ray, iterations, residual_px: (self.project(ray)? - pixel).length() })
+        Ok(SolvedRay { ray, iterations, residual_px: (self.project(ray)? - pixel).length() })
     }
 
     /// [`Lens::project`] and the derivative of the pixel by the ray's three

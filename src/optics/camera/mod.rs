@@ -57,7 +57,7 @@ mod pinhole;
 mod pupil;
 mod spec;
 
-pub use lens::{Lens, Solved};
+pub use lens::{Lens, SolvedRay};
 pub use limit::LensLimit;
 pub use spec::{LensError, LensSpec, Model};
 

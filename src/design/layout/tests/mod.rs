@@ -197,7 +197,7 @@ fn a_camera_off_the_axis_still_gives_an_even_image() {
 }
 
 #[test]
-fn hits_are_few_and_reach_everything() {
+fn print_passes_are_few_and_reach_everything() {
     for limit_deg in [30.0, 40.0, 50.0] {
         let mut spec =
             spec(Model::KannalaBrandt, serde_json::json!({"polar_angle_deg": 75.0, "pitch_px": 18.0}));
@@ -210,10 +210,10 @@ fn hits_are_few_and_reach_everything() {
         let mut shares = vec![0; layout.hits.len()];
         for dot in &layout.dots {
             shares[dot.hit] += 1;
-            let hit = &layout.hits[dot.hit];
+            let pass = &layout.passes[dot.pass];
             assert!(dot.wrap_rad < limit_deg.to_radians());
             let on_hit = layout.transfer.dome_from_plate(dot.plate_mm).unwrap();
-            assert!((hit.hit_from_sensor.transpose() * on_hit - dot.surface_mm).length() < 1e-12);
+            assert!((pass.hit_from_sensor.transpose() * on_hit - dot.surface_mm).length() < 1e-12);
             // Nearer to its own stroke than to any other.
             for other in &layout.hits {
                 let z = (other.hit_from_sensor * dot.normal).z;
@@ -236,11 +236,11 @@ fn hits_are_few_and_reach_everything() {
             assert!(!(0..900).any(|k| reached(sectors - 1, f64::from(k).to_radians() / 10.0)), "{sectors}");
         }
     }
-    // The stroke's axis, in the hit's frame, is its +z; the azimuth keeps its direction.
-    let hit = Hit::new(0.7, 2.0);
+    // The stroke's axis, in the pass's frame, is its +z; the azimuth keeps its direction.
+    let pass = Hit::new(0.7, 2.0);
     let axis = region::dome_point(1.0, 0.7, 2.0);
-    assert!((hit.hit_from_sensor * axis - DVec3::Z).length() < 1e-15);
-    let further = hit.hit_from_sensor * region::dome_point(1.0, 0.9, 2.0);
+    assert!((pass.hit_from_sensor * axis - DVec3::Z).length() < 1e-15);
+    let further = pass.hit_from_sensor * region::dome_point(1.0, 0.9, 2.0);
     assert!((further - region::dome_point(1.0, 0.2, 2.0)).length() < 1e-15);
 }
 

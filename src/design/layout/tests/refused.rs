@@ -50,7 +50,7 @@ fn white_markers_and_zones_take_dots_away() {
     });
     let mut spec = spec(Model::KannalaBrandt, change);
     spec.white_markers =
-        vec![WhiteMarker { id: 3, position_mm: DVec3::new(3.0, 3.0, 0.0), diameter_mm: 1.0 }];
+        vec![domecast_optics::pose::Marker { id: 3, position_mm: DVec3::new(3.0, 3.0, 0.0), diameter_mm: 1.0 }];
     let layout = Layout::new(&spec).unwrap();
     let reasons: std::collections::BTreeSet<&str> =
         layout.lost.iter().map(|dot| dot.reason.as_str()).collect();

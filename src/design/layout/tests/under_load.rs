@@ -69,7 +69,7 @@ fn a_load_that_hides_dots_says_which_and_why() {
     // A marker beside the dots at rest; as the sheet comes nearer, it moves outwards faster than they do.
     let mut spec = spec(Model::KannalaBrandt, serde_json::json!({"unseen": "drop"}));
     spec.white_markers =
-        vec![WhiteMarker { id: 2, position_mm: DVec3::new(3.1, 2.8, 0.0), diameter_mm: 1.0 }];
+        vec![domecast_optics::pose::Marker { id: 2, position_mm: DVec3::new(3.1, 2.8, 0.0), diameter_mm: 1.0 }];
     let layout = Layout::new(&spec).unwrap();
     let rest = coverage::coverage(&spec, &layout, &spec.optics, None);
     assert!(rest.unseen_dots.is_empty(), "{:?}", rest.unseen_dots);

@@ -4,14 +4,14 @@
 //! The sensor's optics stand at the top; [`camera`] has the lenses, [`pose`] the pose, [`numeric`] what they share.
 //!
 //! ```
-//! use domecast_optics::camera::{LensSpec, Model};
+//! use domecast_optics::camera::{LensSpec, LensModel};
 //! use domecast_optics::glam::{DVec2, DVec3};
 //! use domecast_optics::numeric::Rigid;
-//! use domecast_optics::{Layer, OpticsSpec, SensorOptics};
+//! use domecast_optics::{FlatLayer, OpticsSpec, SensorOptics};
 //!
 //! let optics = SensorOptics::new(&OpticsSpec {
 //!     lens: LensSpec {
-//!         model: Model::Pinhole,
+//!         model: LensModel::Pinhole,
 //!         width: 640,
 //!         height: 480,
 //!         matrix: [[230.0, 0.0, 319.5], [0.0, 230.0, 239.5], [0.0, 0.0, 1.0]],
@@ -21,8 +21,8 @@
 //!     },
 //!     sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0)),
 //!     layers: vec![
-//!         Layer { name: "acrylic".into(), index: [1.49; 3], thickness_mm: Some(1.0) },
-//!         Layer { name: "silicone".into(), index: [1.41; 3], thickness_mm: None },
+//!         FlatLayer { name: "acrylic".into(), index: [1.49; 3], thickness_mm: Some(1.0) },
+//!         FlatLayer { name: "silicone".into(), index: [1.41; 3], thickness_mm: None },
 //!     ],
 //!     dome_radius_mm: 10.0,
 //! })?;

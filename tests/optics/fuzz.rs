@@ -6,9 +6,9 @@
 use domecast::numeric::SeededRandom;
 use std::f64::consts::PI;
 
-use domecast::camera::{Lens, LensLimit, LensSpec, Model};
+use domecast::camera::{Lens, LensLimit, LensModel, LensSpec};
 use domecast::numeric::Rigid;
-use domecast::optics::{Channel, Layer, Limit, OpticsSpec, SensorOptics};
+use domecast::optics::{ColorChannel, FlatLayer, OpticsSpec, RayLimit, SensorOptics};
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::Matrix2x3;
 use rayon::prelude::*;
@@ -18,7 +18,7 @@ use super::reference::{self, distance, field_angle, unit, v3};
 
 pub fn lens_spec(r: &mut SeededRandom) -> LensSpec {
     let (model, distortion, widest) = match r.next_u64() % 8 {
-        0 => (Model::Pinhole, vec![], 179.9),
+        0 => (LensModel::Pinhole, vec![], 179.9),
         // Like published ones, then anything.
         1 | 2 => {
             let p = if r.next_u64().is_multiple_of(2) { 0.0 } else { 0.005 };
@@ -29,28 +29,28 @@ pub fn lens_spec(r: &mut SeededRandom) -> LensSpec {
                 p * r.between(-1.0, 1.0),
                 r.between(-0.02, 0.02),
             ];
-            (Model::BrownConrady, k, 179.9)
+            (LensModel::BrownConrady, k, 179.9)
         }
         3 => {
             let size = 10f64.powf(r.between(-2.0, 2.0));
             let mut k: Vec<f64> = (0..5).map(|_| size * r.between(-1.0, 1.0)).collect();
             k[2] *= 0.02;
             k[3] *= 0.02;
-            (Model::BrownConrady, k, 179.9)
+            (LensModel::BrownConrady, k, 179.9)
         }
         4 => {
             let mut k: Vec<f64> = (0..8).map(|_| r.between(-1.0, 1.0)).collect();
             k[2] *= 0.01;
             k[3] *= 0.01;
-            (Model::BrownConrady, k, 179.9)
+            (LensModel::BrownConrady, k, 179.9)
         }
         5 | 6 => {
             let k = (0..4).map(|_| r.between(-0.06, 0.06)).collect();
-            (Model::KannalaBrandt, k, 260.0)
+            (LensModel::KannalaBrandt, k, 260.0)
         }
         _ => {
             let k = (0..4).map(|_| r.between(-0.5, 0.5)).collect();
-            (Model::KannalaBrandt, k, 360.0)
+            (LensModel::KannalaBrandt, k, 360.0)
         }
     };
     let fx = 10f64.powf(r.between(1.7, 3.3));
@@ -81,14 +81,14 @@ fn optics_spec(r: &mut SeededRandom, mut lens: LensSpec) -> OpticsSpec {
         };
         last = index;
         let thickness = if r.next_u64().is_multiple_of(5) { 0.0 } else { radius * r.between(0.0, 0.3) };
-        layers.push(Layer {
+        layers.push(FlatLayer {
             name: "sheet".into(),
             index: [index, (index * 1.002).min(2.5), index * 1.005],
             thickness_mm: Some(thickness),
         });
     }
     let fill = if r.next_u64().is_multiple_of(6) { 1.0 } else { r.between(1.0, 2.0) };
-    layers.push(Layer { name: "fill".into(), index: [fill; 3], thickness_mm: None });
+    layers.push(FlatLayer { name: "fill".into(), index: [fill; 3], thickness_mm: None });
     let bottom: f64 = layers.iter().filter_map(|l| l.thickness_mm).sum();
     let gap = match r.next_u64() % 8 {
         0 => 0.0,
@@ -280,7 +280,7 @@ impl Run<'_> {
                 assert_eq!(limit, self.lens().end_limit(), "seed {seed}: pixel {pixel}");
                 let tangential = {
                     let spec = self.lens().spec();
-                    spec.model == Model::BrownConrady
+                    spec.model == LensModel::BrownConrady
                         && (spec.distortion[2], spec.distortion[3]) != (0.0, 0.0)
                 };
                 if tangential {
@@ -288,7 +288,7 @@ impl Run<'_> {
                 } else {
                     let [x, y] = self.reference.lens.image_of_pixel(pixel);
                     let rho = (x * x + y * y).sqrt().f64();
-                    let fisheye = self.lens().spec().model == Model::KannalaBrandt;
+                    let fisheye = self.lens().spec().model == LensModel::KannalaBrandt;
                     let rim = self.reference.lens.radius(dd(if fisheye { self.end } else { self.end.tan() }));
                     assert!(rho >= rim.f64() * (1.0 - 4.0 * EPS), "seed {seed}: pixel {pixel} refused");
                 }
@@ -305,9 +305,9 @@ impl Run<'_> {
                 (hit, slope.norm())
             }
             Err(limit) => {
-                assert_ne!(limit, Limit::NotConverged, "seed {seed}: pixel {pixel}");
+                assert_ne!(limit, RayLimit::NotConverged, "seed {seed}: pixel {pixel}");
                 self.seen.limits += 1;
-                if limit == Limit::MissesDome && self.optics.trace(pixel).is_err() {
+                if limit == RayLimit::MissesDome && self.optics.trace(pixel).is_err() {
                     let Ok(ray) = self.lens().unproject(pixel) else {
                         panic!("seed {seed}: {limit}");
                     };
@@ -416,7 +416,7 @@ impl Run<'_> {
         let seed = self.seed;
         let found = self.optics.project_with_motion(point);
         let plain = self.optics.project(point);
-        assert_ne!(plain, Err(Limit::NotConverged), "seed {seed}: point {point}");
+        assert_ne!(plain, Err(RayLimit::NotConverged), "seed {seed}: point {point}");
         let theta = match self.reference.chief(v3(point), self.end) {
             Some(ray) => field_angle(ray).f64(),
             // No reference: total reflection, or a pupil that does not settle.
@@ -440,7 +440,7 @@ impl Run<'_> {
         match self.optics.project_solved(point) {
             Ok(solved) => {
                 assert_eq!(solved.pixel, pixel, "seed {seed}");
-                self.seen.most.climb = self.seen.most.climb.max(solved.climb_iterations);
+                self.seen.most.climb = self.seen.most.climb.max(solved.newton_iterations);
                 self.seen.most.pupil = self.seen.most.pupil.max(solved.pupil_iterations);
             }
             Err(limit) => panic!("seed {seed}: {limit} at {point}"),
@@ -479,7 +479,7 @@ fn run(seed: u64, per_lens: u64) -> Seen {
     let mut r = SeededRandom::new(seed);
     let lens = lens_spec(&mut r);
     let spec = optics_spec(&mut r, lens);
-    let channel = Channel::ALL[(r.next_u64() % 3) as usize];
+    let channel = ColorChannel::ALL[(r.next_u64() % 3) as usize];
     let optics = match SensorOptics::new(&spec) {
         Ok(optics) => optics.for_channel(channel),
         Err(error) => panic!("seed {seed}: {error}"),
@@ -517,7 +517,7 @@ fn first_seed(default: u64) -> u64 {
 fn within_the_stated_iterations(most: &Iterations) {
     let stated = [
         (most.lens, Lens::MAX_UNPROJECT_ITERATIONS),
-        (most.climb, SensorOptics::MAX_CLIMB_ITERATIONS),
+        (most.climb, SensorOptics::MAX_NEWTON_ITERATIONS),
         (most.pupil, SensorOptics::MAX_PUPIL_ITERATIONS),
     ];
     for (met, bound) in stated {

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::dot::{Dot, DotProjector, plate_outline};
 use super::lost::{LostDot, Reason, Zone};
 use super::outline::Outline;
-use super::passes::Hit;
+use super::passes::PrintPass;
 use super::spec::LayoutSpec;
 use super::zones::{self, ImageZone};
 
@@ -13,7 +13,7 @@ use super::zones::{self, ImageZone};
 pub(super) fn check_dot(
     spec: &LayoutSpec,
     projector: &DotProjector<'_>,
-    passes: &[Hit],
+    passes: &[PrintPass],
     zones: &[ImageZone],
     even_px: DVec2,
 ) -> Result<Dot, LostDot> {
@@ -41,13 +41,13 @@ pub(super) fn check_dot(
     if reach_rad > limit_rad {
         return Err(lose(Reason::BeyondWrap { wrap_rad: reach_rad, limit_rad }));
     }
-    let hit_from_sensor = passes[pass].hit_from_sensor;
+    let pass_from_sensor = passes[pass].pass_from_sensor;
     let plate_mm = projector
         .transfer
-        .plate_from_dome(hit_from_sensor * surface.surface_mm)
+        .plate_from_dome(pass_from_sensor * surface.surface_mm)
         .map_err(|limit| lose(Reason::BeyondTransfer(limit)))?;
     let plate_outline =
-        plate_outline(&curve, projector.transfer, hit_from_sensor, projector.outline_tolerance_mm)
+        plate_outline(&curve, projector.transfer, pass_from_sensor, projector.outline_tolerance_mm)
             .map_err(lose)?;
     let (width_mm, _) = plate_outline.widths();
     if width_mm < spec.print.min_dot_mm {
@@ -70,10 +70,10 @@ pub(super) fn check_dot(
     })
 }
 
-fn nearest_pass(passes: &[Hit], normal: DVec3) -> (usize, f64) {
+fn nearest_pass(passes: &[PrintPass], normal: DVec3) -> (usize, f64) {
     let mut best = (0, f64::INFINITY);
     for (index, pass) in passes.iter().enumerate() {
-        let local = pass.hit_from_sensor * normal;
+        let local = pass.pass_from_sensor * normal;
         let wrap_rad = local.truncate().length().atan2(local.z);
         if wrap_rad < best.1 {
             best = (index, wrap_rad);

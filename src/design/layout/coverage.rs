@@ -44,7 +44,7 @@ const NEAR: f64 = 6.0;
 
 /// How much of the dome is seen at one pose.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Coverage {
+pub struct DomeCoverage {
     /// Share of the dome's area that the lens sees through the layers, in the image or beyond its edges.
     pub seen_by_lens: f64,
     /// Share inside the image.
@@ -79,7 +79,7 @@ pub fn coverage(
     layout: &Layout,
     optics: &SensorOptics,
     window: Option<&Window>,
-) -> Coverage {
+) -> DomeCoverage {
     let visibility = Visibility { spec, optics, markers: marker_zones(optics, &spec.white_markers), window };
     let radius_mm = optics.dome_radius_mm();
     let (mut lens, mut raster, mut mask, mut free, mut whole) = (0u32, 0u32, 0u32, 0u32, true);
@@ -106,7 +106,7 @@ pub fn coverage(
     }
     let all = f64::from(RINGS * AROUND);
     let (window_gap_mm, unseen_dots) = visibility.dots(layout);
-    Coverage {
+    DomeCoverage {
         seen_by_lens: f64::from(lens) / all,
         on_raster: f64::from(raster) / all,
         in_mask: f64::from(mask) / all,

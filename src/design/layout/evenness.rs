@@ -146,7 +146,7 @@ pub fn by_design(layout: &Layout) -> Option<EvennessReport> {
         even_frame_px: evenness(layout, &even, in_plane, any)?,
         image_px: evenness(layout, &image, in_plane, any)?,
         dome_mm: evenness(layout, &dome, arc, any)?,
-        plate_mm: evenness(layout, &plate, in_plane, |i, j| dots[i].hit == dots[j].hit),
+        plate_mm: evenness(layout, &plate, in_plane, |i, j| dots[i].pass == dots[j].pass),
     })
 }
 

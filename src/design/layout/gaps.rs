@@ -33,7 +33,7 @@ pub(super) fn keep_apart(dots: Vec<Result<Dot, LostDot>>, min_mm: f64) -> Vec<Re
             let near = (-1..=1).flat_map(|di| (-1..=1).map(move |dj| (di, dj)));
             let mut polygon = Vec::new();
             for (di, dj) in near {
-                for other in cells.get(&(dot.hit, i + di, j + dj)).into_iter().flatten() {
+                for other in cells.get(&(dot.pass, i + di, j + dj)).into_iter().flatten() {
                     if center.distance(other.center) - reach - other.reach >= min_mm {
                         continue;
                     }
@@ -50,7 +50,7 @@ pub(super) fn keep_apart(dots: Vec<Result<Dot, LostDot>>, min_mm: f64) -> Vec<Re
                 }
             }
             let kept = Kept { center, reach, outline: dot.plate_outline.clone() };
-            cells.entry((dot.hit, i, j)).or_default().push(kept);
+            cells.entry((dot.pass, i, j)).or_default().push(kept);
             Ok(dot)
         })
         .collect()

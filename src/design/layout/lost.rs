@@ -17,7 +17,7 @@ use std::fmt;
 use glam::DVec2;
 
 use crate::transfer::TransferLimit;
-use domecast_optics::Limit;
+use domecast_optics::RayLimit;
 
 /// A dot of the pattern that is left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +36,7 @@ pub struct LostDot {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reason {
     /// Lens, layers or dome give no ray for it.
-    Unseen(Limit),
+    Unseen(RayLimit),
     /// Part of it would lie outside the image.
     OutsideImage,
     /// Part of it would lie outside the runtime's mask.

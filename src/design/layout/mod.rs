@@ -48,6 +48,6 @@ mod zones;
 pub use dot::{Dot, DotSize};
 pub use error::LayoutError;
 pub use lost::{LostDot, Reason, Rule, Zone};
-pub use passes::Hit;
+pub use passes::PrintPass;
 pub use plan::Layout;
 pub use spec::{LayoutSpec, Mask};

@@ -11,12 +11,12 @@ use super::error::LayoutError;
 use super::frame::EvenFrame;
 use super::lost::{LostDot, Rule};
 use super::neighbors::neighbors;
-use super::passes::{self, Hit};
+use super::passes::{self, PrintPass};
 use super::pattern::{Pattern, PatternError};
 use super::spec::LayoutSpec;
 use super::{gaps, zones};
 use crate::spec::Design;
-use crate::spec::sections::{Hits, OnLost, PatternKind};
+use crate::spec::sections::{OnLost, PatternKind, PrintPasses};
 use crate::transfer::TransferMap;
 
 /// Delaunay edges up to this multiple of the nearest distance count as neighbours: below the diagonal of a
@@ -33,7 +33,7 @@ pub struct Layout {
     /// The dots of the pattern that are left out, with their reasons.
     pub lost: Vec<LostDot>,
     /// The print passes.
-    pub passes: Vec<Hit>,
+    pub passes: Vec<PrintPass>,
     /// Distance of neighbours in the even frame, px; solved if the design gives a number of dots.
     pub pitch_px: f64,
     /// Size of the dots.
@@ -153,9 +153,9 @@ fn plan_passes(
     projector: &DotProjector<'_>,
     center_px: DVec2,
     places: &[DVec2],
-) -> Vec<Hit> {
-    if spec.print.hits == Hits::Single {
-        return vec![Hit::new(0.0, 0.0)];
+) -> Vec<PrintPass> {
+    if spec.print.hits == PrintPasses::Single {
+        return vec![PrintPass::new(0.0, 0.0)];
     }
     let radius_mm = spec.optics.dome_radius_mm();
     let polar_and_own = |place: &DVec2| -> Option<(f64, f64)> {

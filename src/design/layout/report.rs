@@ -18,7 +18,7 @@
 
 use serde::Serialize;
 
-use super::coverage::{Coverage, coverage};
+use super::coverage::{DomeCoverage, coverage};
 use super::evenness::{self, EvennessReport, PinholeComparison};
 use super::tolerances::{self, ToleranceReport};
 use super::window::Window;
@@ -42,7 +42,7 @@ pub struct LayoutReport {
     pub lost: Vec<LostRecord>,
     /// The print passes.
     #[serde(rename = "hits")]
-    pub passes: Vec<HitRecord>,
+    pub passes: Vec<PassRecord>,
     /// How even the pattern is by design; null where no dot has a neighbour.
     pub evenness: Option<EvennessReport>,
     /// The same pattern laid out by the pinhole alone, seen through the real stack.
@@ -70,7 +70,7 @@ pub struct LostRecord {
 
 /// A print pass.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HitRecord {
+pub struct PassRecord {
     /// Its film, from 1.
     pub film: usize,
     /// Tilt of the dome under the pad, degrees.
@@ -89,7 +89,7 @@ pub struct CoverageRecord {
     /// `at rest`, or the name of the claimed load.
     pub load: String,
     /// The coverage; null where the load has no balance or leaves no room for the camera.
-    pub coverage: Option<Coverage>,
+    pub coverage: Option<DomeCoverage>,
 }
 
 impl LayoutReport {
@@ -163,10 +163,10 @@ impl LayoutReport {
     }
 }
 
-fn passes(layout: &Layout) -> Vec<HitRecord> {
-    let record = |(index, pass): (usize, &super::Hit)| {
-        let dots = || layout.dots.iter().filter(move |dot| dot.hit == index);
-        HitRecord {
+fn passes(layout: &Layout) -> Vec<PassRecord> {
+    let record = |(index, pass): (usize, &super::PrintPass)| {
+        let dots = || layout.dots.iter().filter(move |dot| dot.pass == index);
+        PassRecord {
             film: index + 1,
             tilt_deg: pass.tilt_rad.to_degrees(),
             azimuth_deg: pass.azimuth_rad.to_degrees(),
@@ -174,7 +174,7 @@ fn passes(layout: &Layout) -> Vec<HitRecord> {
             wrap_deg: dots().map(|dot| dot.wrap_rad).fold(0.0, f64::max).to_degrees(),
         }
     };
-    layout.hits.iter().enumerate().map(record).collect()
+    layout.passes.iter().enumerate().map(record).collect()
 }
 
 fn coverages(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<CoverageRecord> {

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::dot::DotSize;
 use super::error::LayoutError;
-use super::frame::Undistorted;
+use super::frame::UndistortedFrame;
 use crate::spec::Design;
 use crate::spec::sections::{PatternSection, PrintSection, TransferMapName};
 use crate::transfer::{Correction, Nominal, TransferError, TransferMap};
@@ -26,7 +26,7 @@ pub struct LayoutSpec {
     /// Lens, layers and dome at rest, reference channel.
     pub optics: SensorOptics,
     /// The runtime's undistorted frame.
-    pub undistorted: Undistorted,
+    pub undistorted: UndistortedFrame,
     /// The runtime's mask; dots outside are not seen.
     pub mask: Option<Mask>,
     /// The white markers, which may hide dots.
@@ -45,7 +45,7 @@ impl LayoutSpec {
     pub fn of_design(design: &Design) -> Result<Self, LayoutError> {
         let sections = design.sections();
         let matrix = design.undistorted_matrix();
-        let undistorted = Undistorted::new(&matrix).ok_or_else(|| {
+        let undistorted = UndistortedFrame::new(&matrix).ok_or_else(|| {
             LayoutError::new(
                 "runtime.mask_field_angle_deg",
                 sections.runtime.mask_field_angle_deg,
@@ -62,9 +62,7 @@ impl LayoutSpec {
                 center_px: DVec2::new(matrix[0][2], matrix[1][2]),
                 radius_px: sections.runtime.mask_radius_px,
             }),
-            white_markers: markers
-                .map(|(id, position_mm)| Marker { id, position_mm, diameter_mm })
-                .collect(),
+            white_markers: markers.map(|(id, position_mm)| Marker { id, position_mm, diameter_mm }).collect(),
             pattern: sections.pattern.clone(),
             print: sections.print.clone(),
         })

@@ -234,11 +234,11 @@ fn sensor(
             if !needed {
                 return Some(None);
             }
-            let (shift_mm, turn) = *moved.get(dot.hit)?;
+            let (shift_mm, turn) = *moved.get(dot.pass)?;
             let scatter_mm = random.normal_pair() * tolerances.print_scatter_mm * counts(7);
             let plate_mm = turn.rotate(dot.plate_mm) + shift_mm + scatter_mm;
-            let on_hit = layout.transfer.dome_from_plate(plate_mm).ok()?;
-            let surface = layout.hits.get(dot.hit)?.hit_from_sensor.transpose() * on_hit * larger;
+            let on_pass = layout.transfer.dome_from_plate(plate_mm).ok()?;
+            let surface = layout.passes.get(dot.pass)?.pass_from_sensor.transpose() * on_pass * larger;
             Some(Some(optics.project(surface).ok()?))
         })
         .collect();

@@ -253,7 +253,7 @@ fn spread(
 ) -> f64 {
     let t = &file.tolerances;
     let mut squares = 0.0;
-    for sensor in off_by_tolerances(optics, t).into_iter().flat_map(|off| off.sensors) {
+    for sensor in toleranced_optics(optics, t).into_iter().flat_map(|off| off.sensors) {
         let shifts = points
             .iter()
             .filter_map(|(point, pixel)| Some(sensor.project(*point).ok()?.distance_squared(*pixel)));
@@ -277,7 +277,7 @@ fn spread(
 
 /// The optics with one number off by its tolerance.
 #[derive(Debug, Clone)]
-pub struct Off {
+pub struct TolerancedOptics {
     /// What it is, in words.
     pub what: &'static str,
     /// Its field in the design file.
@@ -287,7 +287,7 @@ pub struct Off {
 }
 
 /// The optics with one number at a time off by its tolerance.
-pub fn off_by_tolerances(optics: &SensorOptics, t: &TolerancesSection) -> Vec<Off> {
+pub fn toleranced_optics(optics: &SensorOptics, t: &TolerancesSection) -> Vec<TolerancedOptics> {
     let spec = optics.spec();
     let with = |change: &dyn Fn(&mut OpticsSpec)| {
         let mut changed = spec.clone();
@@ -320,7 +320,7 @@ pub fn off_by_tolerances(optics: &SensorOptics, t: &TolerancesSection) -> Vec<Of
         })
     };
     let layers = 0..spec.layers.len();
-    let off = |what, field, sensors| Off { what, field, sensors };
+    let off = |what, field, sensors| TolerancedOptics { what, field, sensors };
     vec![
         off("pupil's place", "tolerances.pupil_mm", axes.into_iter().filter_map(moved).collect()),
         off(

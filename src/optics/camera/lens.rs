@@ -9,7 +9,7 @@ use super::lanes::Lanes;
 use super::limit::Domain;
 use super::pinhole::Pinhole;
 use super::pupil::PupilPolynomial;
-use super::{LensError, LensLimit, LensSpec, Model};
+use super::{LensError, LensLimit, LensModel, LensSpec};
 use crate::numeric::LengthMismatch;
 use crate::numeric::batch::{fill, fill_runs};
 
@@ -67,10 +67,10 @@ impl Lens {
         spec.check()?;
         let view = spec.field_of_view_rad;
         let formula = match (spec.model, spec.distortion.as_slice()) {
-            (Model::KannalaBrandt, &[k1, k2, k3, k4]) => {
+            (LensModel::KannalaBrandt, &[k1, k2, k3, k4]) => {
                 KannalaBrandt::new([k1, k2, k3, k4], view).map(Formula::KannalaBrandt)
             }
-            (Model::BrownConrady, distortion) => {
+            (LensModel::BrownConrady, distortion) => {
                 BrownConrady::new(distortion, view).map(Formula::BrownConrady)
             }
             _ => Some(Formula::Pinhole(Pinhole::new(view))),

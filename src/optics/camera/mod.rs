@@ -1,16 +1,16 @@
 //! Lens models: the direction of a ray in air to a pixel, and back.
 //!
-//! One type, [`Lens`], serves three forms ([`Model`]): a pinhole, Brown-Conrady
+//! One type, [`Lens`], serves three forms ([`LensModel`]): a pinhole, Brown-Conrady
 //! with 5 or 8 coefficients, and Kannala-Brandt with 4. All share one
 //! interface, one set of limits ([`LensLimit`]) and one conformance suite.
 //!
 //! # Example
 //! ```
-//! use domecast_optics::camera::{Lens, LensSpec, Model};
+//! use domecast_optics::camera::{Lens, LensSpec, LensModel};
 //! use domecast_optics::glam::DVec2;
 //!
 //! let lens = Lens::new(LensSpec {
-//!     model: Model::KannalaBrandt,
+//!     model: LensModel::KannalaBrandt,
 //!     width: 640,
 //!     height: 480,
 //!     matrix: [[230.0, 0.0, 319.5], [0.0, 230.0, 239.5], [0.0, 0.0, 1.0]],
@@ -59,7 +59,7 @@ mod spec;
 
 pub use lens::{Lens, SolvedRay};
 pub use limit::LensLimit;
-pub use spec::{LensError, LensSpec, Model};
+pub use spec::{LensError, LensModel, LensSpec};
 
 #[cfg(test)]
 mod conformance;

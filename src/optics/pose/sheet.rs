@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::camera::Lens;
 use crate::numeric::Rigid;
-use crate::refraction::{Limit, SensorOptics};
+use crate::refraction::{RayLimit, SensorOptics};
 
 /// Newton steps; each squares the error.
 const MAX_CLIMB_STEPS: u32 = 40;
@@ -94,7 +94,7 @@ impl SheetView {
     }
 
     /// The direction that a pixel sees, with the pixel's derivative by it.
-    pub fn observed_ray(&self, pixel: DVec2) -> Result<ObservedRay, Limit> {
+    pub fn observed_ray(&self, pixel: DVec2) -> Result<ObservedRay, RayLimit> {
         let ray = self.lens.unproject(pixel)?;
         let (_, m) = self.lens.project_with_jacobian(ray)?;
         let row = |i: usize| DVec3::new(m[(i, 0)], m[(i, 1)], m[(i, 2)]);

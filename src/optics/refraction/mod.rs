@@ -15,7 +15,7 @@
 //!   passing it.
 //!
 //! A point is seen only if its chief ray lies in the domain of the lens. Every
-//! way in which there is no answer has its name ([`Limit`]).
+//! way in which there is no answer has its name ([`RayLimit`]).
 
 mod jacobian;
 mod limit;
@@ -27,10 +27,10 @@ mod trace;
 mod tube;
 
 pub use jacobian::PixelMotion;
-pub use limit::Limit;
+pub use limit::RayLimit;
 pub use project::SolvedPixel;
 pub use sensor::SensorOptics;
-pub use spec::{Channel, Layer, OpticsError, OpticsSpec};
+pub use spec::{ColorChannel, FlatLayer, OpticsError, OpticsSpec};
 pub use trace::SurfacePoint;
 pub use tube::LightTube;
 

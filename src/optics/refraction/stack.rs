@@ -1,6 +1,6 @@
 //! Flat layers between the pupil and a height, and the ray through them.
 
-use super::limit::Limit;
+use super::limit::RayLimit;
 
 /// Newton steps of the climb to a point. Observed in millions of random stacks:
 /// at most 14; each step past the first few doubles the digits.
@@ -108,31 +108,31 @@ impl LayerPath<'_> {
     }
 
     /// Lowest index in the way.
-    fn lowest_index(&self) -> Result<f64, Limit> {
+    fn lowest_index(&self) -> Result<f64, RayLimit> {
         if self.air_mm > 0.0 {
             return Ok(1.0);
         }
         let mut lowest = f64::INFINITY;
         self.for_each(|n, _| lowest = lowest.min(n));
-        if lowest.is_finite() { Ok(lowest) } else { Err(Limit::Unreachable) }
+        if lowest.is_finite() { Ok(lowest) } else { Err(RayLimit::Unreachable) }
     }
 
     /// The climb: tangent in the layer of index `n0` whose reach is `reach_mm`.
     ///
     /// `X` rises and is concave, so each Newton step from below ends below.
-    fn climb(&self, n0: f64, reach_mm: f64) -> Result<f64, Limit> {
+    fn climb(&self, n0: f64, reach_mm: f64) -> Result<f64, RayLimit> {
         Ok(self.climb_counted(n0, reach_mm)?.0)
     }
 
     /// [`LayerPath::climb`] and the steps that it took.
-    fn climb_counted(&self, n0: f64, reach_mm: f64) -> Result<(f64, u32), Limit> {
+    fn climb_counted(&self, n0: f64, reach_mm: f64) -> Result<(f64, u32), RayLimit> {
         let (at_axis, _) = self.reach(n0, 0.0);
         // X(t) <= t X'(0): a lower bound of the solution.
         self.climb_above(n0, reach_mm, reach_mm / at_axis)
     }
 
     /// The climb from `t`, which must not lie above the solution, and its steps.
-    fn climb_above(&self, n0: f64, reach_mm: f64, mut t: f64) -> Result<(f64, u32), Limit> {
+    fn climb_above(&self, n0: f64, reach_mm: f64, mut t: f64) -> Result<(f64, u32), RayLimit> {
         if t == 0.0 {
             return Ok((0.0, 0));
         }
@@ -147,11 +147,11 @@ impl LayerPath<'_> {
                 return Ok((t, steps));
             }
         }
-        Err(Limit::NotConverged)
+        Err(RayLimit::NotConverged)
     }
 
     /// Tangent in air of the ray with this reach, per millimetre of reach.
-    pub fn tangent_per_mm(&self, reach_mm: f64) -> Result<f64, Limit> {
+    pub fn tangent_per_mm(&self, reach_mm: f64) -> Result<f64, RayLimit> {
         let n0 = self.lowest_index()?;
         let t = self.climb(n0, reach_mm)?;
         finite(in_air(n0, t)?.0 / self.reach_by(n0, t, reach_mm))
@@ -161,7 +161,7 @@ impl LayerPath<'_> {
     ///
     /// The tangent line of a concave function lies above it, so one Newton step from anywhere, be it above the
     /// solution, ends below; from there the climb is the usual one.
-    pub fn climb_from(&self, reach_mm: f64, near_tangent: f64) -> Result<Climbed, Limit> {
+    pub fn climb_from(&self, reach_mm: f64, near_tangent: f64) -> Result<Climbed, RayLimit> {
         let index = self.lowest_index()?;
         let (at_axis, _) = self.reach(index, 0.0);
         let lowest = reach_mm / at_axis;
@@ -177,7 +177,7 @@ impl LayerPath<'_> {
 
     /// Steps of the climb to this reach, and by how much the reach is missed, in
     /// millimetres.
-    pub fn climb_record(&self, reach_mm: f64) -> Result<(u32, f64), Limit> {
+    pub fn climb_record(&self, reach_mm: f64) -> Result<(u32, f64), RayLimit> {
         let n0 = self.lowest_index()?;
         let (t, steps) = self.climb_counted(n0, reach_mm)?;
         Ok((steps, (self.reach(n0, t).0 * t - reach_mm).abs()))
@@ -189,7 +189,7 @@ impl LayerPath<'_> {
     }
 
     /// [`LayerPath::tangent_per_mm`] with derivatives.
-    pub fn air_ray(&self, reach_mm: f64) -> Result<AirRay, Limit> {
+    pub fn air_ray(&self, reach_mm: f64) -> Result<AirRay, RayLimit> {
         let n0 = self.lowest_index()?;
         let t = self.climb(n0, reach_mm)?;
         let (scale, slope) = in_air(n0, t)?;
@@ -214,13 +214,13 @@ impl LayerPath<'_> {
 /// From the tangent `t` in index `n0` to the tangent in air: the factor, and
 /// the derivative. The sine in air is `n0 sin`, and
 /// `1 - n0^2 sin^2 = (1 - (n0^2 - 1) t^2) / (1 + t^2)`.
-fn in_air(n0: f64, t: f64) -> Result<(f64, f64), Limit> {
+fn in_air(n0: f64, t: f64) -> Result<(f64, f64), RayLimit> {
     if n0 == 1.0 {
         return Ok((1.0, 1.0));
     }
     let left = 1.0 - (n0 - 1.0) * (n0 + 1.0) * t * t;
     if left <= 0.0 {
-        return Err(Limit::TotalInternalReflection);
+        return Err(RayLimit::TotalInternalReflection);
     }
     let root = left.sqrt();
     Ok((n0 / root, n0 / (root * left)))
@@ -228,8 +228,8 @@ fn in_air(n0: f64, t: f64) -> Result<(f64, f64), Limit> {
 
 /// A value that overflowed belongs to a ray along the layers, which no point
 /// at a finite distance has.
-fn finite(value: f64) -> Result<f64, Limit> {
-    if value.is_finite() { Ok(value) } else { Err(Limit::Unreachable) }
+fn finite(value: f64) -> Result<f64, RayLimit> {
+    if value.is_finite() { Ok(value) } else { Err(RayLimit::Unreachable) }
 }
 
 /// Sideways travel of a ray through whole plates, per unit of its momentum

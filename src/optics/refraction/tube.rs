@@ -13,7 +13,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::limit::Limit;
+use super::limit::RayLimit;
 use super::sensor::SensorOptics;
 use super::stack::{LayerPath, Plate};
 
@@ -41,19 +41,19 @@ impl SensorOptics {
     /// `near_tangent` is the [`LightTube::tangent`] of a neighbour, or 0; it changes the time, not the answer.
     ///
     /// # Errors
-    /// [`Limit::Unreachable`] if the source is not below the sheet; else as [`SensorOptics::project`].
+    /// [`RayLimit::Unreachable`] if the source is not below the sheet; else as [`SensorOptics::project`].
     pub fn light_tube(
         &self,
         source_mm: DVec3,
         point_mm: DVec3,
         near_tangent: f64,
-    ) -> Result<LightTube, Limit> {
+    ) -> Result<LightTube, RayLimit> {
         let air_mm = self.bottom_mm - source_mm.z;
         if !(source_mm.is_finite() && point_mm.is_finite() && near_tangent.is_finite()) {
-            return Err(Limit::NotFinite);
+            return Err(RayLimit::NotFinite);
         }
         if air_mm <= 0.0 || point_mm.z < 0.0 {
-            return Err(Limit::Unreachable);
+            return Err(RayLimit::Unreachable);
         }
         let fill = Plate { thickness_mm: point_mm.z, ..self.fill };
         let path = LayerPath { air_mm, plates: &self.plates, skipped_mm: 0.0, fill };
@@ -75,13 +75,18 @@ impl SensorOptics {
     /// point of the dome or of the sheet's top. How much is reflected is not its matter.
     ///
     /// # Errors
-    /// [`Limit::Unreachable`] for points below the sheet's top, and where nothing lies between the two.
-    pub fn mirrored_tube(&self, from_mm: DVec3, to_mm: DVec3, near_tangent: f64) -> Result<LightTube, Limit> {
+    /// [`RayLimit::Unreachable`] for points below the sheet's top, and where nothing lies between the two.
+    pub fn mirrored_tube(
+        &self,
+        from_mm: DVec3,
+        to_mm: DVec3,
+        near_tangent: f64,
+    ) -> Result<LightTube, RayLimit> {
         if !(from_mm.is_finite() && to_mm.is_finite() && near_tangent.is_finite()) {
-            return Err(Limit::NotFinite);
+            return Err(RayLimit::NotFinite);
         }
         if from_mm.z < 0.0 || to_mm.z < 0.0 {
-            return Err(Limit::Unreachable);
+            return Err(RayLimit::Unreachable);
         }
         // Down and up through the same sheet is once through a sheet twice as thick.
         let twice = |plate: &Plate| Plate { thickness_mm: 2.0 * plate.thickness_mm, ..*plate };
@@ -121,7 +126,7 @@ struct TubeEnd {
 }
 
 /// The tube through a path between media of the given indices.
-fn tube(path: &LayerPath<'_>, sideways: DVec2, near: f64, start: f64, end: f64) -> Result<TubeEnd, Limit> {
+fn tube(path: &LayerPath<'_>, sideways: DVec2, near: f64, start: f64, end: f64) -> Result<TubeEnd, RayLimit> {
     let reach_mm = sideways.length();
     let found = path.climb_from(reach_mm, near)?;
     let momentum = found.index * found.tangent / (1.0 + found.tangent * found.tangent).sqrt();
@@ -136,7 +141,7 @@ fn tube(path: &LayerPath<'_>, sideways: DVec2, near: f64, start: f64, end: f64) 
     if sr_per_mm2.is_finite() {
         Ok(TubeEnd { aside, tangent: found.tangent, momentum, sr_per_mm2 })
     } else {
-        Err(Limit::Unreachable)
+        Err(RayLimit::Unreachable)
     }
 }
 

@@ -23,7 +23,7 @@ use super::whites::{Disc, View};
 use crate::constants::Constants;
 use domecast_optics::numeric::Rigid;
 use domecast_optics::pose::{Sighting, displacement_from_motion};
-use domecast_optics::{Limit, SensorOptics, SurfacePoint};
+use domecast_optics::{RayLimit, SensorOptics, SurfacePoint};
 use domecast_springs::Displacement;
 
 /// How far from where the last pose puts it a white marker is looked for, in parts of the dots' spacing, when it is
@@ -75,7 +75,7 @@ pub struct Tracker {
     /// Dots that were found, their centres in the image, and where those are on the dome.
     found: Vec<usize>,
     centers: Vec<DVec2>,
-    hits: Vec<Result<SurfacePoint, Limit>>,
+    hits: Vec<Result<SurfacePoint, RayLimit>>,
     seen: Vec<Seen>,
     discs: Vec<Option<Disc>>,
     /// How the light falls off across each marker.
@@ -689,7 +689,7 @@ impl Tracker {
         }
         if known {
             self.hits.clear();
-            self.hits.resize(self.centers.len(), Err(Limit::MissesDome));
+            self.hits.resize(self.centers.len(), Err(RayLimit::MissesDome));
             // In runs, which one thread does: a long slice would be shared among several.
             for (centers, hits) in self.centers.chunks(TRACE_RUN).zip(self.hits.chunks_mut(TRACE_RUN)) {
                 // Slices of one length are all that it asks for.

@@ -34,7 +34,7 @@ use serde::{Deserialize, Serialize};
 pub use accuracy::AccuracySection;
 pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
 pub use light::{DiffuserSection, PowerRgb, ReflectanceRgb};
-pub use loads::{LoadClaim, LoadsSection, NoiseSection, WhiteMarkersSection};
+pub use loads::{CentroidNoiseSection, LoadClaim, LoadsSection, WhiteMarkersSection};
 pub use making::{
     CouponSection, FillSection, JigSection, MeshSection, MouldSection, PinsSection, ProcessSection,
     StencilSection, VentsSection,
@@ -47,7 +47,7 @@ pub use platforms::{
     CableExitSection, ClampSection, LedColor, LedSection, LedsSection, LowerPlatform, MagnetPocketsSection,
     MountingSection, PlatformsSection, SheetSection, UpperPlatform,
 };
-pub use print::{Hits, MeasuredTransferSection, PrintSection, TransferMapName};
+pub use print::{MeasuredTransferSection, PrintPasses, PrintSection, TransferMapName};
 pub use springs::{
     GravitySection, MagnetFacing, MagnetsSection, SpringEnds, SpringPlaces, SpringRing, SpringsSection,
     WireSection,
@@ -108,7 +108,7 @@ pub struct DesignFile {
     /// The loads that the design claims to carry.
     pub loads: LoadsSection,
     /// What the image processing can measure.
-    pub noise: NoiseSection,
+    pub noise: CentroidNoiseSection,
     /// How far a built sensor may be off.
     pub tolerances: TolerancesSection,
     /// The printed platforms.

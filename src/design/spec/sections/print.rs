@@ -60,7 +60,7 @@ pub struct MeasuredTransferSection {
 /// One print pass, or as many tilted ones as the wrap limit needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Hits {
+pub enum PrintPasses {
     /// One pass from straight above; dots beyond the wrap limit cannot be printed.
     #[default]
     Single,
@@ -92,7 +92,7 @@ pub struct PrintSection {
     pub wrap_limit_deg: f64,
     /// One print pass or several.
     #[serde(default)]
-    pub hits: Hits,
+    pub hits: PrintPasses,
     /// Steepest tilt that the jig can hold, degrees (only for `split`).
     #[serde(default = "default_max_tilt_deg")]
     #[schemars(range(min = 0.0, max = 90.0))]

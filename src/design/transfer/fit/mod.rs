@@ -38,6 +38,6 @@ mod solve;
 mod tests;
 
 pub use error::FitError;
-pub use report::Fit;
+pub use report::TransferFit;
 pub use sample::{MeasuredIn, Sample};
 pub use search::{MIN_SAMPLES, fit};

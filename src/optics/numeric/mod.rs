@@ -17,6 +17,7 @@
 //! ```
 
 pub mod batch;
+pub mod csv;
 mod polynomial;
 mod random;
 mod rigid;

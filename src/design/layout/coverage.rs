@@ -1,4 +1,4 @@
-//! How much of the dome the camera covers, at rest and under load, and which dots it loses on the way.
+//! Which part of the dome the camera sees, at rest and under load, and which dots a load hides.
 //!
 //! # Example
 //! ```
@@ -205,7 +205,7 @@ impl Visibility<'_> {
             let (point, _) = curve.on_dome(TAU * f64::from(k) / f64::from(EDGE_POINTS))?;
             let seen = self.point(point)?;
             window_mm = window_mm.min(seen.window_mm);
-            // A hair inside, so that a dot that just clears a marker in the layout does so here.
+            // Slightly inside, so that a dot that just clears a marker in the layout does so here.
             corners.push(middle.pixel.lerp(seen.pixel, 0.995));
         }
         check_corners(&self.markers, &corners)?;

@@ -1,5 +1,5 @@
-//! How even a pattern is: in the image, on the dome, on the plate; and what would be seen of it if the layout had been
-//! made by the pinhole alone.
+//! How even a pattern is: in the image, on the dome and on the plate; and the image of the same pattern if it is laid
+//! out without refraction.
 //!
 //! # Example
 //! ```
@@ -150,8 +150,8 @@ pub fn by_design(layout: &Layout) -> Option<EvennessReport> {
     })
 }
 
-/// The same pattern laid out by the pinhole alone: the rays of the pattern's pixels, by the same lens, go
-/// straight to the dome as if every index were 1. What the real stack shows of dots placed there.
+/// The same pattern laid out without refraction: the rays of the pattern's pixels, by the same lens, go straight to
+/// the dome, every index 1. The image of the dots placed there, through the real layers.
 pub fn by_pinhole(spec: &LayoutSpec, layout: &Layout) -> Option<PinholeComparison> {
     let mut clear = spec.optics.spec();
     for layer in &mut clear.layers {

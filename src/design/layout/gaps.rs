@@ -11,7 +11,7 @@ use super::zones::gap;
 /// Chord error of the polygons between which gaps are measured, as a share of the least gap.
 const POLYGON_SHARE: f64 = 0.01;
 
-/// Of two dots of one print pass that are closer on the plate than the pad keeps apart, the later in the list goes.
+/// Drops the later of two dots of one print pass whose gap on the plate is too small.
 ///
 /// Dots are sorted into square cells as wide as the widest reach, so that only neighbouring cells are looked
 /// at and the time grows with the number of dots. The map is only asked, never walked through: its order

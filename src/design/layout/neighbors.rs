@@ -1,5 +1,4 @@
-//! Who is next to whom: Delaunay's triangulation of the dots in the image, less the edges that only close the
-//! hull.
+//! Neighbours of dots: the Delaunay triangulation in the image, without the edges that only close the hull.
 //!
 //! # Example
 //! ```

@@ -1,4 +1,4 @@
-//! What a layout came to, for people who judge it and programs that draw it.
+//! The report of a layout: what is written to `artwork/layout.json`.
 //!
 //! # Example
 //! ```
@@ -45,7 +45,7 @@ pub struct LayoutReport {
     pub passes: Vec<PassRecord>,
     /// How even the pattern is by design; null where no dot has a neighbour.
     pub evenness: Option<EvennessReport>,
-    /// The same pattern laid out by the pinhole alone, seen through the real stack.
+    /// The same pattern laid out without refraction, seen through the real layers.
     pub pinhole_alone: Option<PinholeComparison>,
     /// What the design's tolerances do to it.
     pub tolerances: Option<ToleranceReport>,

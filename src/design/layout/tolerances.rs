@@ -1,4 +1,4 @@
-//! What is left of a pattern's evenness when the sensor is not as designed: sensors drawn within the tolerances.
+//! The evenness of a pattern in sensors that are drawn within the tolerances (Monte Carlo).
 //!
 //! # Example
 //! ```

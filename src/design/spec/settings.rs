@@ -141,14 +141,14 @@ fn reason(field: &str, value: f64, why: &str) -> String {
     format!("chosen for accuracy.{field} = {value} with a safety factor of {SAFETY}: {why}")
 }
 
-/// The largest of 1, 2, 5 times a power of ten that is not above a limit, within bounds.
-fn fine(limit: f64, least: f64, most: f64) -> f64 {
+/// The largest of 1, 2, 5 times a power of ten that is not above a limit, clamped.
+fn fine(limit: f64, min: f64, max: f64) -> f64 {
     let decade = 10_f64.powf(limit.log10().floor());
     let step = [5.0, 2.0, 1.0].into_iter().find(|step| step * decade <= limit * (1.0 + 1e-9)).unwrap_or(1.0);
     // to the decimal that a person would write
     let digits = (-limit.log10().floor()).max(0.0);
     let round = 10_f64.powf(digits);
-    ((step * decade * round).round() / round).clamp(least, most)
+    ((step * decade * round).round() / round).clamp(min, max)
 }
 
 fn optical(accuracy: &AccuracySection, sensitivity: &OpticalSensitivity) -> (f64, String) {

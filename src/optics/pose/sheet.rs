@@ -66,7 +66,7 @@ impl SheetView {
             layer.thickness_mm.filter(|d| *d > 0.0).map(|d| [n * n, (n - 1.0) * (n + 1.0), d])
         });
         let plates: Vec<[f64; 3]> = flat.collect();
-        // Newton climbs from below where no layer is thinner than air.
+        // Newton converges from below where no layer is thinner than air.
         if plates.iter().any(|[_, excess, _]| *excess < 0.0) {
             return None;
         }
@@ -102,7 +102,7 @@ impl SheetView {
     }
 
     /// X(t) = air t + sum d t / sqrt(n^2 + (n^2 - 1) t^2) = reach, by Newton: X rises and is concave, so from
-    /// anywhere the first step lands at or below the answer, and the others climb to it.
+    /// anywhere the first step lands at or below the answer, and the others rise to it.
     fn air_ray(&self, air_mm: f64, reach_mm: f64, start: f64) -> Option<SheetRay> {
         let mut t = start;
         for _ in 0..MAX_CLIMB_STEPS {

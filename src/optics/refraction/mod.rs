@@ -6,12 +6,12 @@
 //! pole, millimetres.
 //!
 //! * [`SensorOptics::trace`]: a pixel's chief ray, by Snell's law in closed
-//!   form (the momentum along the layers is the same in all of them), to the
+//!   form (index times sine is the same in all layers), to the
 //!   dome.
 //! * [`SensorOptics::project`]: a point on the dome, inside it, or on the
 //!   sheet's top, to its pixel. The unknown is the tangent of the ray in the
 //!   layer of lowest index; the sideways reach is a rising, concave function of
-//!   it, so Newton's method from below climbs to the one solution without ever
+//!   it, so Newton's method from below converges to the one solution without ever
 //!   passing it.
 //!
 //! A point is seen only if its chief ray lies in the domain of the lens. Every

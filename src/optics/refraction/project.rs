@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::limit::RayLimit;
 use super::sensor::SensorOptics;
-use super::stack::{LayerPath, MAX_CLIMB_STEPS, Plate};
+use super::stack::{LayerPath, MAX_NEWTON_STEPS, Plate};
 use crate::camera::Lens;
 use crate::numeric::batch::fill;
 use crate::numeric::{LengthMismatch, MAX_ITERATIONS, RootError, bracketed_newton};
@@ -18,11 +18,11 @@ const ON_DOME_TOLERANCE: f64 = 1e-6;
 pub struct SolvedPixel {
     /// The pixel.
     pub pixel: DVec2,
-    /// Newton steps of the climb through the layers, at most
+    /// Newton steps for the ray through the layers, at most
     /// [`SensorOptics::MAX_NEWTON_ITERATIONS`].
     pub newton_iterations: u32,
     /// Steps to the place of the entrance pupil, at most
-    /// [`SensorOptics::MAX_PUPIL_ITERATIONS`]; each is a climb of its own. Zero
+    /// [`SensorOptics::MAX_PUPIL_ITERATIONS`]; each solves for a ray of its own. Zero
     /// for a central lens.
     pub pupil_iterations: u32,
     /// By how much the ray misses the point, in millimetres along the sheet.
@@ -53,10 +53,10 @@ impl SensorOptics {
         Ok(self.lens.project(self.central_ray(point_mm, pupil)?)?)
     }
 
-    /// No climb through the layers takes more steps.
-    pub const MAX_NEWTON_ITERATIONS: u32 = MAX_CLIMB_STEPS;
+    /// Bound on the Newton steps for the ray through the layers.
+    pub const MAX_NEWTON_ITERATIONS: u32 = MAX_NEWTON_STEPS;
 
-    /// No search for the place of the entrance pupil takes more steps.
+    /// Bound on the steps to the place of the entrance pupil.
     pub const MAX_PUPIL_ITERATIONS: u32 = MAX_ITERATIONS;
 
     /// [`SensorOptics::project`] and how it was found.
@@ -68,7 +68,7 @@ impl SensorOptics {
         let (pupil, pupil_iterations) = self.chief_pupil(point)?;
         let pixel = self.lens.project(self.central_ray(point, pupil)?)?;
         let reach_mm = DVec2::new(point.x - pupil.x, point.y - pupil.y).length();
-        let (newton_iterations, residual_mm) = self.path(point, pupil)?.climb_record(reach_mm)?;
+        let (newton_iterations, residual_mm) = self.path(point, pupil)?.steps_and_residual(reach_mm)?;
         Ok(SolvedPixel { pixel, newton_iterations, pupil_iterations, residual_mm })
     }
 

@@ -82,7 +82,7 @@ fn fit_as_read(
     let count = samples.len() - rejected.len();
 
     // The simplest model that the data asks for. A model that folds cannot be used; if it explains the data
-    // decisively better than every one that can, the pad itself folds, and to fit it worse would be to lie.
+    // decisively better than every one that can, the pad itself folds, and a worse fit would hide that.
     let mut best: Option<(f64, FitModel, Correction)> = None;
     let mut folded: Option<(f64, TransferError)> = None;
     let max_radial = problem.max_radial();

@@ -48,7 +48,7 @@ pub use poses::Pose;
 pub use sight::{EdgeRay, MarkerView, markers_of};
 pub use view::ViewCone;
 
-use crate::layout::Hit;
+use crate::layout::PrintPass;
 use crate::spec::sections::LedsSection;
 use domecast_mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, truck_modeling, write_stl};
 
@@ -170,7 +170,7 @@ pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
 ///
 /// # Errors
 /// The first part, in that order, that cannot be made.
-pub fn build(m: &Measures, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
+pub fn build(m: &Measures, hits: &[PrintPass]) -> Result<Vec<Part>, PartError> {
     let makers: [Maker; 7] = [
         upper::blueprint,
         lower::blueprint,

@@ -20,7 +20,7 @@ fn at_tolerance(tolerance: f64) -> Vec<Part> {
     m.process.min_wall_mm = 0.0;
     m.chord = Chord::new(tolerance).unwrap();
     m.optical_chord = m.chord;
-    build(&m, &[Hit::new(0.0, 0.0), Hit::new(0.6, 1.0)]).unwrap()
+    build(&m, &[PrintPass::new(0.0, 0.0), PrintPass::new(0.6, 1.0)]).unwrap()
 }
 
 fn worst_deviation_mm(part: &Part) -> f64 {

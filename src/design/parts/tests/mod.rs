@@ -18,8 +18,8 @@ fn thumb24() -> Design {
     Design::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json"))).unwrap()
 }
 
-fn hits() -> Vec<Hit> {
-    vec![Hit::new(0.0, 0.0)]
+fn hits() -> Vec<PrintPass> {
+    vec![PrintPass::new(0.0, 0.0)]
 }
 
 fn solid(part: &Part) -> Solid {

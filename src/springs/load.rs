@@ -49,3 +49,21 @@ impl Wrench {
         self.force_n.is_finite() && self.moment_nmm.is_finite()
     }
 }
+
+impl std::ops::Add for Wrench {
+    type Output = Self;
+
+    /// Of two wrenches about the same point.
+    fn add(self, other: Self) -> Self {
+        Self { force_n: self.force_n + other.force_n, moment_nmm: self.moment_nmm + other.moment_nmm }
+    }
+}
+
+impl std::ops::Sub for Wrench {
+    type Output = Self;
+
+    /// Of two wrenches about the same point.
+    fn sub(self, other: Self) -> Self {
+        Self { force_n: self.force_n - other.force_n, moment_nmm: self.moment_nmm - other.moment_nmm }
+    }
+}

@@ -5,8 +5,7 @@
 
 use std::f64::consts::PI;
 
-use domecast::camera::LensModel;
-use domecast::camera::{Lens, LensLimit};
+use domecast::camera::{Lens, LensLimit, LensModel};
 use domecast::numeric::SeededRandom;
 use domecast::optics::{ColorChannel, RayLimit, SensorOptics};
 use glam::{DVec2, DVec3};

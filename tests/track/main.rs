@@ -202,7 +202,8 @@ fn the_wrench_is_unbiased_and_knows_its_spread_over_the_envelope() {
         for seed in 0..SEEDS {
             drawn.code(2.0, 100 + seed);
             let tracked = tracker.track(seed, &frame(&drawn.bytes));
-            let (wrench, sd) = (tracked.wrench.unwrap(), tracked.wrench_sd.unwrap());
+            let wrench = tracked.wrench.unwrap().to_array();
+            let sd = tracked.wrench_sd.unwrap().to_array();
             for axis in 0..6 {
                 let miss = wrench[axis] - truth[axis];
                 mean[axis] += miss / SEEDS as f64;
@@ -238,7 +239,7 @@ fn the_constants_give_the_wrench() {
         let (found, tangent) = springs.wrench(&d).expect("a pose that the springs have");
         let exact = suspension.tangent_at(&d).expect("the same");
         assert!((tangent - exact).norm() < 1e-9 * exact.norm());
-        for (axis, (found, wanted)) in found.iter().zip(wrench.to_array()).enumerate() {
+        for (axis, (found, wanted)) in found.to_array().iter().zip(wrench.to_array()).enumerate() {
             assert!((found - wanted).abs() < 1e-6, "{name} axis {axis}: {found} for {wanted}");
         }
         tried += 1;

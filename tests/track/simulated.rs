@@ -51,6 +51,7 @@ impl Told {
             }
         }
         if let (Some(wrench), Some(sd)) = (tracked.wrench, tracked.wrench_sd) {
+            let (wrench, sd) = (wrench.to_array(), sd.to_array());
             self.wrenches += 1.0;
             for axis in 0..6 {
                 let miss = wrench[axis] - drawn.truth.wrench[axis];

@@ -3,6 +3,24 @@
 //! [`Tracker`] is the one state object: a [`Frame`] in, a [`Tracked`] out, and nothing is allocated once it runs. It
 //! sees only the constants of a sensor, as a runtime on a robot does.
 //!
+//! # The stages
+//!
+//! ```text
+//! frame -> marks -> identities -> pose -> wrench -> report
+//! ```
+//!
+//! | stage | from | to |
+//! |---|---|---|
+//! | `frame` | the camera's bytes | one channel of them, and their exposure |
+//! | `marks` | pixels around a place, or all | dark spots, dark blobs, fitted discs: nothing of which mark they are |
+//! | `identities` | marks, and optics at a pose to look from | a disc for each white marker, a track for each dot |
+//! | `pose` | the white markers | the platform's pose with its covariance |
+//! | `wrench` | the pose, and the dots at it | displacement and wrench with deviations, displacement of each dot |
+//! | `report` | what all of them found | [`Tracked`], its JSON and CSV lines, a picture |
+//!
+//! A stage knows only the types of the ones before it. The white markers are looked for where the last frame's pose
+//! puts them, the dots where this frame's does.
+//!
 //! # The steps, and what each buys
 //!
 //! The paper (arXiv 2303.03093) undistorts, blurs, masks, sharpens and greys every frame as a whole, thresholds it
@@ -23,34 +41,25 @@
 //! | solvePnP | least squares on raw pixels through lens, layers and disc | plain PnP is biased by millimetres behind a sheet |
 //! | wrench linear in the pose | the springs' law by compression ([`Springs`]) | springs between magnets are not linear over their travel |
 
-mod dots;
 mod error;
 mod frame;
-mod identify;
-pub mod image;
-mod light;
-mod mask;
+mod identities;
+mod marks;
 mod model;
 mod options;
-mod overlay;
-mod refine;
+mod pose;
 mod report;
-mod result;
-mod springs;
-mod status;
-mod surplus;
-mod tilt;
 mod tracker;
-mod undistort;
-mod whites;
+mod wrench;
 
 pub use error::TrackError;
-pub use frame::{Frame, FrameFault};
+pub use frame::{Frame, FrameFault, Undistorted};
+pub use identities::MAX_FALSE_DOTS;
+pub use marks::MarkState;
 pub use options::{Channel, Motion, Reference, Steps, Thresholds, TrackOptions};
-pub use overlay::{OverlayError, overlay_png};
-pub use report::{CSV_HEADER, DOTS_CSV_HEADER, write_csv, write_dots_csv, write_json};
-pub use result::{DotResult, MOST_FALSE_DOTS, MarkerResult, Tracked};
-pub use springs::Springs;
-pub use status::{MarkState, Problem, Problems};
+pub use report::{
+    CSV_HEADER, DOTS_CSV_HEADER, DotResult, MarkerResult, OverlayError, Problem, Problems, Tracked,
+    overlay_png, write_csv, write_dots_csv, write_json,
+};
 pub use tracker::Tracker;
-pub use undistort::Undistorted;
+pub use wrench::Springs;

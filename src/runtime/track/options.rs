@@ -14,7 +14,7 @@ pub enum Channel {
     Luma,
 }
 
-/// How marks are told from the ground when the whole frame is searched.
+/// How marks are separated from the ground when the whole frame is searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Thresholds {
     /// Half way between the ground and the marks of each neighbourhood.
@@ -66,12 +66,12 @@ impl Default for Steps {
     }
 }
 
-/// What a tracker takes for granted.
+/// Settings of a tracker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackOptions {
     /// The channel that marks are measured in.
     pub channel: Channel,
-    /// How marks are told from the ground when the whole frame is searched.
+    /// How marks are separated from the ground when the whole frame is searched.
     pub thresholds: Thresholds,
     /// Steps of that search.
     pub steps: Steps,
@@ -81,12 +81,12 @@ pub struct TrackOptions {
     pub pyramid_levels: usize,
     /// Where displacements and wrenches are counted from.
     pub reference: Reference,
-    /// Largest rms of the white markers' residuals that is still a pose, px. The constants' own tolerances say above which
-    /// they are told to be another camera's.
-    pub most_residual_px: f64,
+    /// Largest rms of the white markers' residuals that is still a pose, px. Above what the constants' own tolerances
+    /// allow, they are reported as another camera's.
+    pub max_residual_px: f64,
     /// Largest distance, in parts of the dots' spacing, at which a quarter of the dots may lie from where the pose
     /// puts them, with which constants still pass for the camera's.
-    pub most_misplaced: f64,
+    pub max_misplaced: f64,
     /// The whole frame is searched for lost and false dots at least every so many frames; 0: only when needed.
     pub search_every: u32,
 }
@@ -100,8 +100,8 @@ impl Default for TrackOptions {
             motion: Motion::Predicted,
             pyramid_levels: 3,
             reference: Reference::Constants,
-            most_residual_px: 2.0,
-            most_misplaced: 0.5,
+            max_residual_px: 2.0,
+            max_misplaced: 0.5,
             search_every: 30,
         }
     }

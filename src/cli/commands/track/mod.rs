@@ -130,8 +130,8 @@ impl TrackArguments {
             pyramid_levels: self.pyramid_levels,
             reference: self.reference.map_or(Reference::Constants, Reference::Frames),
             search_every: self.search_every,
-            most_residual_px: self.most_residual_px,
-            most_misplaced: self.most_misplaced,
+            max_residual_px: self.most_residual_px,
+            max_misplaced: self.most_misplaced,
         }
     }
 }

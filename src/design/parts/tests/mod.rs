@@ -103,7 +103,7 @@ fn window_lets_the_view_through() {
 
 /// The camera, the sheet and the dome as solids fit where the design says.
 #[test]
-fn bought_parts_fit_their_seats() {
+fn purchased_parts_fit_their_seats() {
     let design = thumb24();
     let m = Measures::of(&design).unwrap();
     let parts = build(&m, &hits()).unwrap();

@@ -1,0 +1,164 @@
+//! The dots from frame to frame: what is where each should be, and what its neighbours say.
+
+use glam::DVec2;
+
+use super::dot_track::DotTrack;
+use crate::track::frame::Plane;
+use crate::track::marks::{DarkSpot, Flow, MarkState, SpotFault, SpotMeter};
+use crate::track::model::DotModel;
+
+/// How far from its prediction a spot is a dot without asking its neighbours, in parts of its spacing: with motions up
+/// to half of the spacing, no other dot can be so near.
+const OWN_REACH: f64 = 0.3;
+/// The same from a prediction that the neighbours made in this frame.
+const NEIGHBOR_REACH: f64 = 0.35;
+/// Two dots nearer than this part of their spacing are one blob.
+const ONE_BLOB: f64 = 0.3;
+/// Two starts nearer than this part of the spacing lead to the same spot.
+const SAME_PLACE: f64 = 0.25;
+/// How far a dot's displacement may differ from the mean of its neighbours', in parts of its spacing: a neighbour's blob
+/// is one spacing off, a dome's own folds are less.
+const MAX_TORN: f64 = 0.65;
+/// How far a dot's motion may differ from its neighbours', in parts of its spacing.
+const MAX_UNLIKE: f64 = 0.4;
+/// Rounds in which found dots lead to their neighbours.
+const MAX_ROUNDS: usize = 64;
+
+/// Everything that the search for dots works with.
+pub(super) struct DotSearch<'a, 'b> {
+    pub plane: &'a Plane<'b>,
+    pub meter: &'a mut SpotMeter,
+    pub models: &'a [DotModel],
+    pub tracks: &'a mut [DotTrack],
+    pub order: &'a mut Vec<usize>,
+}
+
+impl DotSearch<'_, '_> {
+    fn measure(&mut self, index: usize, start: DVec2, stray_px: f64) -> Result<DarkSpot, SpotFault> {
+        self.meter.measure(self.plane, start, &self.tracks[index].outline, stray_px)
+    }
+
+    /// Each dot where its own past puts it: what the pose expects and it was displaced by, or the flow.
+    pub fn follow(&mut self, flow: Option<&Flow>) {
+        for index in 0..self.tracks.len() {
+            let track = &mut self.tracks[index];
+            track.spot = None;
+            track.start_px = None;
+            if !track.is_wanted() {
+                continue;
+            }
+            track.state = track.absent();
+            let by_flow = flow.and_then(|flow| flow.follow(track.last_px?));
+            let by_pose = track.expected_px.zip(track.displaced_px).map(|(e, d)| e + d);
+            let Some(start) = by_flow.or(by_pose) else { continue };
+            track.start_px = Some(start);
+            let reach = OWN_REACH * self.models[index].spacing_px;
+            match self.measure(index, start, reach) {
+                Ok(spot) => self.tracks[index].find(spot),
+                Err(SpotFault::Misshapen) => self.tracks[index].state = MarkState::Merged,
+                Err(_) => {}
+            }
+        }
+    }
+
+    /// Mean over the found neighbours of how far they are from where they were looked for, and from where the
+    /// undeformed dome would have them; how many they are.
+    fn neighbors(&self, index: usize) -> (DVec2, DVec2, usize) {
+        let (mut moved, mut displaced, mut count) = (DVec2::ZERO, DVec2::ZERO, 0);
+        for other in &self.models[index].neighbors {
+            let track = &self.tracks[*other];
+            if let (Some(now), Some(expected)) = (track.now_px(), track.expected_px) {
+                moved += now - track.start_px.unwrap_or(now);
+                displaced += now - expected;
+                count += 1;
+            }
+        }
+        let n = f64::from(count as u32).max(1.0);
+        (moved / n, displaced / n, count)
+    }
+
+    /// Lost dots where their neighbours, found in this frame, put them; each one found may lead to the next.
+    pub fn spread(&mut self) {
+        for _ in 0..MAX_ROUNDS {
+            let mut more = false;
+            for index in 0..self.tracks.len() {
+                let track = self.tracks[index];
+                if track.spot.is_some() || !track.is_wanted() {
+                    continue;
+                }
+                let (moved, displaced, count) = self.neighbors(index);
+                let Some(expected) = track.expected_px.filter(|_| count > 0) else { continue };
+                let spacing = self.models[index].spacing_px;
+                let guess = expected + track.displaced_px.map_or(displaced, |own| own + moved);
+                let starts = [guess, expected + displaced];
+                for start in starts {
+                    // What was no spot from there is none from there again.
+                    let again = track.start_px.is_some_and(|p| p.distance(start) < SAME_PLACE * spacing);
+                    if track.state == MarkState::Merged && again {
+                        continue;
+                    }
+                    let Ok(spot) = self.measure(index, start, NEIGHBOR_REACH * spacing) else { continue };
+                    if self.is_free(index, spot.at_px) {
+                        if self.tracks[index].start_px.is_none() {
+                            self.tracks[index].start_px = Some(start);
+                        }
+                        self.tracks[index].find(spot);
+                        more = true;
+                        break;
+                    }
+                }
+            }
+            if !more {
+                break;
+            }
+        }
+    }
+
+    /// Whether no other found dot is at a place.
+    fn is_free(&self, index: usize, at: DVec2) -> bool {
+        let apart = ONE_BLOB * self.models[index].spacing_px;
+        let other = |(i, track): (usize, &DotTrack)| {
+            i != index && track.now_px().is_some_and(|p| p.distance_squared(at) < apart * apart)
+        };
+        !self.tracks.iter().enumerate().any(other)
+    }
+
+    /// Two dots in one place are neither; a dot that moved unlike all its neighbours is another one's blob.
+    pub fn check(&mut self) {
+        self.order.clear();
+        self.order.extend((0..self.tracks.len()).filter(|i| self.tracks[*i].spot.is_some()));
+        let x = |track: &DotTrack| track.now_px().map_or(0.0, |p| p.x);
+        let tracks = &mut *self.tracks;
+        self.order.sort_unstable_by(|a, b| x(&tracks[*a]).total_cmp(&x(&tracks[*b])).then(a.cmp(b)));
+        for position in 0..self.order.len() {
+            let first = self.order[position];
+            for second in self.order.iter().skip(position + 1) {
+                let apart = ONE_BLOB * self.models[first].spacing_px.min(self.models[*second].spacing_px);
+                let (Some(a), Some(b)) = (tracks[first].now_px(), tracks[*second].now_px()) else { continue };
+                if b.x - a.x > apart {
+                    break;
+                }
+                if a.distance(b) < apart {
+                    for index in [first, *second] {
+                        tracks[index].lose(MarkState::Merged);
+                    }
+                }
+            }
+        }
+        for index in 0..self.tracks.len() {
+            let track = self.tracks[index];
+            let (Some(now), Some(start)) = (track.now_px(), track.start_px) else { continue };
+            let (moved, displaced, count) = self.neighbors(index);
+            let spacing = self.models[index].spacing_px;
+            let unlike = (now - start).distance(moved) > MAX_UNLIKE * spacing;
+            let own = track.expected_px.map_or(displaced, |expected| now - expected);
+            let torn = own.distance(displaced) > MAX_TORN * spacing;
+            if count >= 2 && (unlike || torn) {
+                let track = &mut self.tracks[index];
+                track.lose(track.absent());
+                // Where it was is not where it is to be looked for.
+                track.displaced_px = None;
+            }
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! The dots of one frame: each where it is expected, the whole frame where too few are there.
+
+use glam::DVec2;
+
+use super::blob_matching::BlobMatcher;
+use super::dot_prediction::DotPrediction;
+use super::dot_search::DotSearch;
+use super::dot_track::DotTrack;
+use super::false_dots::{MAX_FALSE_DOTS, find_false_dots};
+use crate::track::frame::{Mask, Plane};
+use crate::track::marks::{BlobScan, DarkBlob, Flow, ScanSettings, SpotMeter};
+use crate::track::model::DotModel;
+use crate::track::options::{Motion, Thresholds, TrackOptions};
+use domecast_optics::SensorOptics;
+use domecast_optics::numeric::Rigid;
+
+/// Under load a dot's image grows and shrinks by some tenths: radii over that at rest.
+const RADIUS_RATIO: [f64; 2] = [0.6, 1.6];
+/// Least contrast of a dot to the ground in the search of the whole frame.
+const MIN_BLOB_CONTRAST: f32 = 0.12;
+/// Blobs that the search of the whole frame can hold.
+const MAX_BLOBS: usize = 1 << 15;
+/// A blob's dot is at most this far from it, in parts of its spacing.
+const BLOB_REACH: f64 = 0.3;
+
+/// One frame, as the dots are looked for in it.
+pub(in crate::track) struct DotFrame<'a, 'b> {
+    pub plane: &'a Plane<'b>,
+    pub mask: &'a Mask,
+    pub models: &'a [DotModel],
+    /// At the pose.
+    pub optics: &'a SensorOptics,
+    /// The platform's pose; `None` before the first one is found.
+    pub pose: Option<Rigid>,
+}
+
+/// What was found in a frame.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::track) struct DotsFound<'a> {
+    /// Each dot of the constants, in their order.
+    pub tracks: &'a [DotTrack],
+    /// Whether the whole frame was searched, and the blobs in it that are no dots.
+    pub searched: bool,
+    pub false_dots: &'a [DVec2],
+}
+
+/// Dots and the buffers of their search.
+#[derive(Debug, Clone)]
+struct Dots {
+    meter: SpotMeter,
+    tracks: Vec<DotTrack>,
+    order: Vec<usize>,
+}
+
+impl Dots {
+    fn search<'a, 'b>(&'a mut self, plane: &'a Plane<'b>, models: &'a [DotModel]) -> DotSearch<'a, 'b> {
+        DotSearch { plane, meter: &mut self.meter, models, tracks: &mut self.tracks, order: &mut self.order }
+    }
+
+    fn found(&self) -> usize {
+        self.tracks.iter().filter(|t| t.spot.is_some()).count()
+    }
+
+    /// Measures each dot at its blob; the past is what the match says, not what was followed before.
+    fn measure_at(
+        &mut self,
+        plane: &Plane<'_>,
+        models: &[DotModel],
+        blob_of: impl Fn(usize) -> Option<DVec2>,
+    ) {
+        for (index, (track, model)) in self.tracks.iter_mut().zip(models).enumerate() {
+            if !track.is_wanted() {
+                continue;
+            }
+            track.lose(track.absent());
+            let Some(at) = blob_of(index) else { continue };
+            let reach = BLOB_REACH * model.spacing_px;
+            if let Ok(spot) = self.meter.measure(plane, at, &track.outline, reach) {
+                track.find(spot);
+                track.start_px = Some(spot.at_px);
+                if let Some(expected) = track.expected_px {
+                    track.displaced_px = Some(spot.at_px - expected);
+                }
+            }
+        }
+    }
+}
+
+/// Follows the dots through the frames.
+#[derive(Debug, Clone)]
+pub(in crate::track) struct DotIdentities {
+    dots: Dots,
+    prediction: DotPrediction,
+    flow: Option<Flow>,
+    scan: BlobScan,
+    scan_settings: ScanSettings,
+    matcher: BlobMatcher,
+    search_every: u32,
+    since_search: u32,
+    searched: bool,
+    false_dots: Vec<DVec2>,
+}
+
+impl DotIdentities {
+    /// For the dots of a sensor, in frames of one size.
+    pub fn new(models: &[DotModel], [width, height]: [usize; 2], options: &TrackOptions) -> Self {
+        let mut meter = SpotMeter::default();
+        let [smallest, largest] = RADIUS_RATIO;
+        for model in models {
+            let mut radius = smallest * model.outline.radius_px;
+            while radius < largest * model.outline.radius_px {
+                meter.prepare(radius);
+                radius += 0.2;
+            }
+            meter.prepare(largest * model.outline.radius_px);
+        }
+        let count = models.len();
+        let follows = options.motion == Motion::LucasKanade;
+        let steps = options.steps;
+        Self {
+            dots: Dots { meter, tracks: vec![DotTrack::default(); count], order: Vec::with_capacity(count) },
+            prediction: DotPrediction::default(),
+            flow: follows.then(|| Flow::new(width, height, options.pyramid_levels)),
+            scan: BlobScan::new(width, height),
+            scan_settings: ScanSettings {
+                blur: steps.blur,
+                sharpen: steps.sharpen,
+                open: steps.open,
+                level: match options.thresholds {
+                    Thresholds::Adaptive => None,
+                    Thresholds::Fixed { black, .. } => Some(black),
+                },
+                min_contrast: MIN_BLOB_CONTRAST,
+            },
+            matcher: BlobMatcher::new(count, MAX_BLOBS),
+            search_every: options.search_every,
+            since_search: u32::MAX,
+            searched: false,
+            false_dots: Vec::with_capacity(MAX_FALSE_DOTS),
+        }
+    }
+
+    /// Finds the dots of the next frame.
+    pub fn find(&mut self, frame: &DotFrame<'_, '_>) -> DotsFound<'_> {
+        let &DotFrame { plane, mask, models, optics, ref pose } = frame;
+        self.searched = false;
+        self.false_dots.clear();
+        if let Some(flow) = &mut self.flow {
+            let has_last = self.dots.tracks.iter().any(|t| t.last_px.is_some());
+            flow.take(plane, has_last);
+        }
+        match pose {
+            Some(pose) => {
+                self.prediction.predict(pose, optics, mask, models, &mut self.dots.tracks);
+                self.find_predicted(plane, mask, models);
+            }
+            None => self.dots.tracks.iter_mut().for_each(|track| track.spot = None),
+        }
+        self.dots.tracks.iter_mut().for_each(DotTrack::remember);
+        self.now()
+    }
+
+    fn find_predicted(&mut self, plane: &Plane<'_>, mask: &Mask, models: &[DotModel]) {
+        let wanted = self.dots.tracks.iter().filter(|t| t.is_wanted());
+        let (known, wanted) =
+            wanted.fold((0, 0), |(known, all), t| (known + usize::from(t.displaced_px.is_some()), all + 1));
+        let mut search = self.dots.search(plane, models);
+        search.follow(self.flow.as_ref());
+        search.spread();
+        search.check();
+        let found = self.dots.found();
+        self.since_search = self.since_search.saturating_add(1);
+        let few = 4 * found < 3 * known.max(1) || (known == 0 && wanted > 0);
+        let due = self.search_every > 0 && self.since_search >= self.search_every;
+        if few || due {
+            self.search_frame(plane, mask, models, few);
+        }
+    }
+
+    /// The whole frame: for dots that were not found where they should be, and for blobs that are no dots.
+    fn search_frame(&mut self, plane: &Plane<'_>, mask: &Mask, models: &[DotModel], identify: bool) {
+        let blobs = self.scan.dark_blobs(plane, |y| mask.span(y), &self.scan_settings);
+        // More blobs than dots could make are noise. Nothing is known of false dots then.
+        let Some(blobs) = blobs else { return };
+        self.since_search = 0;
+        self.searched = true;
+        if identify {
+            let size = [plane.width(), plane.height()];
+            let count = self.matcher.match_blobs(blobs, models, &self.dots.tracks, size);
+            if count > self.dots.found() {
+                let matched = &self.matcher.blob_of;
+                let at = |blob: usize| blobs.get(blob).map(|blob: &DarkBlob| blob.at_px);
+                self.dots.measure_at(plane, models, |dot| matched.get(dot).copied().flatten().and_then(at));
+                let mut search = self.dots.search(plane, models);
+                search.spread();
+                search.check();
+            }
+        }
+        find_false_dots(blobs, models, &self.dots.tracks, &mut self.false_dots);
+    }
+
+    /// A frame in which nothing was looked for.
+    pub fn miss(&mut self) -> DotsFound<'_> {
+        self.searched = false;
+        self.false_dots.clear();
+        for track in &mut self.dots.tracks {
+            track.lose(track.absent());
+            track.motion_px = None;
+        }
+        self.forget_last();
+        self.now()
+    }
+
+    fn now(&self) -> DotsFound<'_> {
+        DotsFound { tracks: &self.dots.tracks, searched: self.searched, false_dots: &self.false_dots }
+    }
+
+    /// The last frame does not count: the next one has nothing to be followed from.
+    pub fn forget_last(&mut self) {
+        self.dots.tracks.iter_mut().for_each(DotTrack::forget_last);
+        if let Some(flow) = &mut self.flow {
+            flow.forget();
+        }
+    }
+
+    /// Forgets all frames.
+    pub fn restart(&mut self) {
+        self.forget_last();
+        self.dots.tracks.fill(DotTrack::default());
+        self.prediction = DotPrediction::default();
+    }
+}

@@ -1,0 +1,20 @@
+//! Stage 3: which mark is which.
+//!
+//! In: a [`Plane`](super::frame::Plane), the sensor's model, and optics at a pose to look from: the last frame's for
+//! the white markers, this frame's for the dots. Out: [`MarkerIdentities::discs`], a fitted disc for each white marker,
+//! and [`DotsFound`], a [`DotTrack`] for each dot.
+
+mod blob_matching;
+mod dot_prediction;
+mod dot_search;
+mod dot_track;
+mod dots;
+mod false_dots;
+mod marker_hypotheses;
+mod markers;
+
+pub(super) use dot_track::DotTrack;
+pub(super) use dots::{DotFrame, DotIdentities, DotsFound};
+pub use false_dots::MAX_FALSE_DOTS;
+pub(super) use marker_hypotheses::MarkerHypotheses;
+pub(super) use markers::{MarkerFrame, MarkerIdentities};

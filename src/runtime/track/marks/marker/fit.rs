@@ -1,0 +1,109 @@
+//! The fit of a disc beside the dome to its pixels.
+
+use glam::DVec2;
+use nalgebra::SVector;
+
+use super::candidates::MIN_RISE;
+use super::equations::WindowSums;
+use super::view::MarkerView;
+use crate::track::frame::Plane;
+
+/// A fit may go so far from its candidate, px.
+pub(in crate::track) const FIT_REACH_PX: f64 = 4.0;
+const MAX_STEPS: u32 = 12;
+/// A step below this ends the fit, px; the next one would be a tenth of it.
+const CONVERGED_PX: f64 = 4e-3;
+/// Longest step, px.
+const MAX_STEP_PX: f64 = 1.5;
+/// Least difference between marker and ground in parts of the noise of one pixel.
+const MIN_RISE_IN_NOISE: f64 = 3.0;
+/// Largest part of the contrast that the picture of a disc may leave unexplained.
+const MAX_MISFIT: f64 = 0.25;
+/// Pixels between a disc's middle and the frame's border.
+const BORDER_PX: f64 = 2.0;
+
+/// A disc as it was fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::track) struct FittedDisc {
+    pub centroid_px: DVec2,
+    /// Standard deviation of the centroid on each axis, px.
+    pub sd_px: f64,
+    /// Part of the contrast that the picture of a disc leaves unexplained.
+    pub misfit: f64,
+    /// Levels of ground, disc and dome, the last two counted from the ground: a start for the next frame.
+    pub levels: [f64; 3],
+    /// By what part of itself the disc's level rises in a px, as this frame shows it; `None` where too little of it is
+    /// flat.
+    pub shading: Option<DVec2>,
+}
+
+impl MarkerView {
+    /// The disc near `start`, at most `stray_px` from it: Gauss-Newton on the pixels, for the place, the levels of
+    /// ground, disc and dome; `levels`: those of the last frame, if there was one; `shading`: how the light falls off.
+    ///
+    /// `None` where the steps leave the frame or `stray_px` or do not converge in [`MAX_STEPS`], and where what is
+    /// there is no disc brighter than its ground.
+    pub fn fit(
+        &self,
+        plane: &Plane<'_>,
+        start: DVec2,
+        stray_px: f64,
+        levels: Option<[f64; 3]>,
+        shading: DVec2,
+    ) -> Option<FittedDisc> {
+        let mut at = start;
+        let mut levels = levels.map(SVector::from);
+        for _ in 0..MAX_STEPS {
+            if !(is_inside(plane, at) && at.distance(start) <= stray_px) {
+                return None;
+            }
+            // First the levels alone, at the start; then the place with them.
+            let known = match levels {
+                Some(known) => known,
+                None => WindowSums::over(self, plane, at, None, shading)?.solve_levels()?,
+            };
+            let sums = WindowSums::over(self, plane, at, Some(&known), shading)?;
+            let step = sums.solve_all()?;
+            let fitted = known + step.fixed_rows::<3>(0);
+            levels = Some(fitted);
+            let shift = DVec2::new(step[3], step[4]).clamp_length_max(MAX_STEP_PX);
+            at += shift;
+            if shift.length() < CONVERGED_PX {
+                let slope = sums.slope.map(|slope| shading + slope / (known[0] + known[1]).max(MIN_RISE));
+                return accept(&sums, at, &fitted, slope);
+            }
+        }
+        None
+    }
+}
+
+fn is_inside(plane: &Plane<'_>, at: DVec2) -> bool {
+    let end = |length: usize| length as f64 - BORDER_PX - 1.0;
+    at.x > BORDER_PX && at.y > BORDER_PX && at.x < end(plane.width()) && at.y < end(plane.height())
+}
+
+/// A converged fit, if it is a disc's.
+fn accept(
+    sums: &WindowSums,
+    at: DVec2,
+    levels: &SVector<f64, 3>,
+    shading: Option<DVec2>,
+) -> Option<FittedDisc> {
+    let (noise, rms) = (sums.noise(), sums.rms());
+    let rise = levels[1];
+    // What is a disc, perhaps beside a dome brighter than it, leaves a small part of that unexplained.
+    let contrast = rise.max(0.5 * levels[2].abs());
+    let clear = rise > MIN_RISE && rise > MIN_RISE_IN_NOISE * noise;
+    if !(clear && rms < MAX_MISFIT * contrast) {
+        return None;
+    }
+    let inverse = sums.inverse()?;
+    let sd_px = noise * (0.5 * (inverse[(3, 3)] + inverse[(4, 4)])).max(0.0).sqrt();
+    at.is_finite().then_some(FittedDisc {
+        centroid_px: at,
+        sd_px,
+        misfit: rms / contrast,
+        levels: (*levels).into(),
+        shading,
+    })
+}

@@ -1,0 +1,241 @@
+//! The centroid of a dark spot, from the grey pixels around where it is expected.
+
+use glam::DVec2;
+
+use super::ground::{Ground, ground_of};
+use super::stencil::{LANES, Stencil, class_of, class_radius_px};
+use crate::track::frame::Plane;
+
+/// Steps of the window towards its own centroid.
+const MAX_STEPS: u32 = 10;
+/// A step below this ends the climb, px: a hundredth of what is aimed at.
+const CONVERGED_PX: f64 = 2e-3;
+
+/// What the outline of a spot should be.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SpotOutline {
+    /// Largest distance of the outline from the centroid, px.
+    pub radius_px: f64,
+    /// Area, px^2.
+    pub area_px: f64,
+    /// Mean square distance of its area from the centroid, px^2.
+    pub spread_px2: f64,
+}
+
+/// A spot as it was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DarkSpot {
+    /// Its centroid, px.
+    pub at_px: DVec2,
+    /// How much darker than the ground its middle is, in parts of the ground's level.
+    pub contrast: f64,
+    /// Area that the grey values mean, px^2.
+    pub area_px: f64,
+    /// Mean square distance of it from the centroid, px^2.
+    pub spread_px2: f64,
+    /// Standard deviation of the centroid on each axis that the ground's noise means, px.
+    pub sd_px: f64,
+    /// Level of the ground at the centroid.
+    pub ground: f64,
+}
+
+/// Why there is no spot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SpotFault {
+    /// The window left the frame, or went too far from where it began.
+    Strayed,
+    /// Nothing darker than the ground stands out from the noise.
+    Faint,
+    /// Too little ground around it.
+    NoGround,
+    /// Its area or spread is that of more than one spot, or of something else.
+    Misshapen,
+}
+
+/// Measures spots; keeps its stencils and its buffers.
+#[derive(Debug, Clone, Default)]
+pub struct SpotMeter {
+    stencils: Vec<Option<Stencil>>,
+    /// The square of levels, how much darker than the ground the soft window's pixels are, the ring's levels.
+    levels: Vec<f32>,
+    dark: Vec<f32>,
+    ring: Vec<f32>,
+}
+
+impl SpotMeter {
+    /// Makes ready for outlines of this radius; others are not measured.
+    pub fn prepare(&mut self, radius_px: f64) {
+        let class = class_of(radius_px);
+        if self.stencils.len() <= class {
+            self.stencils.resize(class + 1, None);
+        }
+        if self.stencils[class].is_some() {
+            return;
+        }
+        let stencil = Stencil::new(class_radius_px(class));
+        let grow = |buffer: &mut Vec<f32>, size: usize| buffer.resize(buffer.len().max(size), 0.0);
+        grow(&mut self.levels, stencil.side() * stencil.side());
+        grow(&mut self.dark, stencil.columns.len() * (2 * stencil.disc_half + 1) as usize);
+        grow(&mut self.ring, stencil.ring.len());
+        self.stencils[class] = Some(stencil);
+    }
+
+    /// The spot near `start`, at most `stray_px` from it.
+    ///
+    /// The ground is a plane through the ring around, other marks left out; each pixel weighs by how much darker than
+    /// the ground it is, as a part of the ground's level: light that changes across a dot then moves nothing. The
+    /// window is round, soft-edged and centred on the answer (a fixed point), so what it cuts off, it cuts evenly.
+    pub fn measure(
+        &mut self,
+        plane: &Plane<'_>,
+        start: DVec2,
+        shape: &SpotOutline,
+        stray_px: f64,
+    ) -> Result<DarkSpot, SpotFault> {
+        let Some(Some(stencil)) = self.stencils.get(class_of(shape.radius_px)) else {
+            return Err(SpotFault::NoGround);
+        };
+        let side = stencil.side();
+        let levels = &mut self.levels[..side * side];
+        let dark = &mut self.dark[..stencil.columns.len() * (2 * stencil.disc_half + 1) as usize];
+        let mut at = start;
+        let mut middle = (i32::MIN, i32::MIN);
+        let mut ground = Ground { a: 0.0, b: 0.0, c: 0.0, noise: 0.0 };
+        let mut sums = Sums::default();
+        let mut from = DVec2::ZERO;
+        for _ in 0..MAX_STEPS {
+            let inside = |v: f64, end: usize| v > 0.0 && v < end as f64 - 1.0;
+            if !(inside(at.x, plane.width())
+                && inside(at.y, plane.height())
+                && at.distance(start) <= stray_px)
+            {
+                return Err(SpotFault::Strayed);
+            }
+            let next = (at.x.round() as i32, at.y.round() as i32);
+            if next != middle {
+                middle = next;
+                plane.square_into(middle.0 - stencil.half, middle.1 - stencil.half, side, levels);
+                ground = ground_of(stencil, levels, &mut self.ring).ok_or(SpotFault::NoGround)?;
+                darken(stencil, levels, &ground, dark);
+            }
+            from = DVec2::new(at.x - f64::from(middle.0), at.y - f64::from(middle.1));
+            sums = Sums::over(stencil, dark, from);
+            let noise = f64::from(ground.noise / ground.a.max(1.0));
+            // Less than four times what noise leaves of such a sum is nothing.
+            if sums.weight <= 4.0 * noise * stencil.count.sqrt() || sums.weight < 0.02 * shape.area_px {
+                return Err(SpotFault::Faint);
+            }
+            let step = DVec2::new(sums.x, sums.y) / sums.weight;
+            // Half of the spot outside of the window halves the step; it never overshoots by more than the window.
+            at += step.clamp_length_max(f64::from(stencil.reach_px));
+            if step.length_squared() < CONVERGED_PX * CONVERGED_PX {
+                break;
+            }
+        }
+        if !(at.is_finite() && at.distance(start) <= stray_px) {
+            return Err(SpotFault::Strayed);
+        }
+        finish(stencil, dark, from, &sums, &ground, shape, at)
+    }
+}
+
+/// How much darker than the ground each pixel of the soft window is, as a part of the ground's level; the columns that
+/// only fill the lanes are 0.
+fn darken(stencil: &Stencil, levels: &[f32], ground: &Ground, dark: &mut [f32]) {
+    let (side, stride) = (stencil.side(), stencil.columns.len());
+    let offset = (stencil.half - stencil.disc_half) as usize;
+    let width = (2 * stencil.disc_half + 1) as usize;
+    for (row, out) in dark.chunks_exact_mut(stride).enumerate() {
+        let start = (row + offset) * side + offset;
+        let y = row as f32 - stencil.disc_half as f32;
+        let (out, rest) = out.split_at_mut(width);
+        for ((to, value), x) in out.iter_mut().zip(&levels[start..start + width]).zip(&stencil.columns) {
+            let level = (ground.a + ground.b * x + ground.c * y).max(1.0);
+            *to = 1.0 - value / level;
+        }
+        rest.fill(0.0);
+    }
+}
+
+/// Weighted sums over the window, about its middle.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    weight: f64,
+    x: f64,
+    y: f64,
+    square: f64,
+}
+
+impl Sums {
+    fn over(stencil: &Stencil, dark: &[f32], from: DVec2) -> Self {
+        let (cx, cy) = (from.x as f32, from.y as f32);
+        let end = stencil.reach_px + 0.5;
+        let (end, per) = (end * end, 1.0 / (2.0 * stencil.reach_px));
+        // Sums in lanes of their own: the order of the additions is fixed, and the loop goes in vectors.
+        let [mut weights, mut xs, mut ys, mut squares] = [[0.0_f32; LANES]; 4];
+        let (columns, _) = stencil.columns.as_chunks::<LANES>();
+        for (row, values) in dark.chunks_exact(stencil.columns.len()).enumerate() {
+            let dy = row as f32 - stencil.disc_half as f32 - cy;
+            let (values, _) = values.as_chunks::<LANES>();
+            for (values, columns) in values.iter().zip(columns) {
+                for k in 0..LANES {
+                    let dx = columns[k] - cx;
+                    let square = dx * dx + dy * dy;
+                    let weight = ((end - square) * per).clamp(0.0, 1.0) * values[k];
+                    weights[k] += weight;
+                    xs[k] += weight * dx;
+                    ys[k] += weight * dy;
+                    squares[k] += weight * square;
+                }
+            }
+        }
+        let sum = |lanes: [f32; LANES]| f64::from(lanes.iter().sum::<f32>());
+        Self { weight: sum(weights), x: sum(xs), y: sum(ys), square: sum(squares) }
+    }
+}
+
+/// Mean darkness of the pixels that are surely inside of the outline.
+fn core_of(stencil: &Stencil, dark: &[f32], from: DVec2) -> f64 {
+    let (cx, cy) = (from.x as f32, from.y as f32);
+    let reach = stencil.core_px2.sqrt().ceil() as i32 + 1;
+    let (mut sum, mut count) = (0.0, 0.0);
+    for y in -reach..=reach {
+        for x in -reach..=reach {
+            let (dx, dy) = (x as f32 - cx, y as f32 - cy);
+            if dx * dx + dy * dy < stencil.core_px2 {
+                let at = (y + stencil.disc_half) as usize * stencil.columns.len();
+                sum += dark.get(at + (x + stencil.disc_half) as usize).copied().unwrap_or(0.0);
+                count += 1.0;
+            }
+        }
+    }
+    f64::from(sum / f32::max(count, 1.0))
+}
+
+fn finish(
+    stencil: &Stencil,
+    dark: &[f32],
+    from: DVec2,
+    sums: &Sums,
+    ground: &Ground,
+    shape: &SpotOutline,
+    at_px: DVec2,
+) -> Result<DarkSpot, SpotFault> {
+    let contrast = core_of(stencil, dark, from);
+    let level = f64::from(ground.a);
+    let noise = f64::from(ground.noise) / level.max(1.0);
+    if !(contrast > 0.06 && contrast > 3.0 * noise) {
+        return Err(SpotFault::Faint);
+    }
+    let area_px = sums.weight / contrast;
+    let spread_px2 = sums.square / sums.weight;
+    // One spot alone, whole: blur widens the spread, not the area.
+    let sound =
+        area_px > 0.4 * shape.area_px && area_px < 2.2 * shape.area_px && spread_px2 > 0.3 * shape.spread_px2;
+    if !sound {
+        return Err(SpotFault::Misshapen);
+    }
+    // Each axis has half of the lever.
+    let sd_px = noise * (0.5 * stencil.lever).sqrt() / sums.weight;
+    Ok(DarkSpot { at_px, contrast, area_px, spread_px2, sd_px, ground: level })
+}

@@ -1,0 +1,30 @@
+//! What is known of a mark.
+
+/// What is known of a mark in a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MarkState {
+    /// Seen and measured.
+    Ok,
+    /// Never seen since the start, where it should be.
+    #[default]
+    Missing,
+    /// Seen before, not now.
+    Lost,
+    /// Run together with another one.
+    Merged,
+    /// Outside of the mask or of the camera's view at this pose.
+    Hidden,
+}
+
+impl MarkState {
+    /// The name that files carry.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Missing => "missing",
+            Self::Lost => "lost",
+            Self::Merged => "merged",
+            Self::Hidden => "hidden",
+        }
+    }
+}

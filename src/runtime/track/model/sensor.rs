@@ -1,0 +1,63 @@
+//! The sensor that is looked for.
+
+use glam::DVec3;
+
+use super::dots::{DotModel, dots_of};
+use super::markers::MarkerModels;
+use crate::constants::Constants;
+use crate::track::error::TrackError;
+use crate::track::frame::{MAX_PIXELS, Mask};
+use domecast_optics::SensorOptics;
+use domecast_optics::pose::{PoseOptions, PoseSolver};
+
+/// Two poses both fit where they do so within this rms, px.
+const MAX_AMBIGUOUS_RMS_PX: f64 = 1.0;
+/// Farthest that the platform can be from rest where the constants do not give it, mm.
+const DEFAULT_MAX_SHIFT_MM: f64 = 5.0;
+/// Farthest that it can be pressed where the constants do not give it, mm.
+const DEFAULT_MAX_PRESS_MM: f64 = 3.0;
+
+/// The sensor that is looked for.
+#[derive(Debug, Clone)]
+pub(in crate::track) struct SensorModel {
+    /// At rest.
+    pub optics: SensorOptics,
+    pub dots: Vec<DotModel>,
+    pub markers: MarkerModels,
+    /// Farthest that the platform can be pressed, mm.
+    pub max_press_mm: f64,
+    pub solver: PoseSolver,
+    pub mask: Mask,
+}
+
+impl SensorModel {
+    /// From the constants; `max_residual_px`: largest rms of the markers' residuals that is a pose; `at_mm`: the point
+    /// that displacements are stated about.
+    pub fn new(constants: &Constants, max_residual_px: f64, at_mm: DVec3) -> Result<Self, TrackError> {
+        let camera = &constants.camera;
+        let pixels = (camera.width as usize).checked_mul(camera.height as usize);
+        if pixels.is_none_or(|n| n == 0 || n > MAX_PIXELS) {
+            let problem = format!("{} x {} is no frame", camera.width, camera.height);
+            return Err(TrackError::at("camera.width", problem));
+        }
+        let fault = |problem: String| TrackError::at("camera, optics:", problem);
+        let optics = constants.sensor().map_err(fault)?;
+        let mask = &constants.mask;
+        let matrix = camera.undistorted_matrix.as_flattened();
+        if !(mask.center_px.iter().chain(matrix).all(|v| v.is_finite()) && mask.radius_px > 0.0) {
+            return Err(TrackError::at("mask", "is no circle in the undistorted frame"));
+        }
+        let press_mm =
+            constants.springs.as_ref().and_then(|s| s.stiffness_at.last()).map(|e| e.compression_mm);
+        let max_shift_mm = press_mm.map_or(DEFAULT_MAX_SHIFT_MM, |press| press.clamp(0.5, 100.0) + 2.0);
+        // Eight residuals less six of the pose: the solver's gate lets 1.84 times its noise pass as rms.
+        let options = PoseOptions::new(max_residual_px.min(MAX_AMBIGUOUS_RMS_PX) / 1.84, max_shift_mm);
+        let solver = PoseSolver::new(&optics, &constants.markers(), options)
+            .map_err(|error| TrackError::at("white_markers", format!("are not usable: {error}")))?;
+        let dots = dots_of(constants, &optics)?;
+        let max_press_mm = press_mm.unwrap_or(DEFAULT_MAX_PRESS_MM).clamp(0.0, 100.0);
+        let markers = MarkerModels::new(constants, &optics, at_mm, max_press_mm)?;
+        let mask = Mask::new(optics.lens(), camera, mask);
+        Ok(Self { optics, dots, markers, max_press_mm, solver, mask })
+    }
+}

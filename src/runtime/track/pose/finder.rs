@@ -1,0 +1,258 @@
+//! The pose of one frame: where the last one puts the markers, or from anywhere.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::refine::{MarkerSighting, RefinedPose, refine};
+use super::residual_scale::ResidualScale;
+use crate::track::identities::{MarkerFrame, MarkerHypotheses, MarkerIdentities};
+use crate::track::marks::MarkerView;
+use crate::track::model::SensorModel;
+use domecast_optics::SensorOptics;
+use domecast_optics::numeric::Rigid;
+use domecast_optics::pose::Sighting;
+
+/// A pose farther from rest than this is none, mm.
+const MAX_TRANSLATION_MM: f64 = 20.0;
+/// Discs that fit within this part of the largest residual need no rivals.
+const CLEAR_PART: f64 = 0.25;
+/// Parts of the deepest press at which a marker is looked at before there is a pose.
+const PRESSED_PARTS: [f64; 3] = [0.0, 0.5, 1.0];
+
+/// A white marker against the pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::track) struct MarkerAtPose {
+    /// Centroid less where the pose puts it, px.
+    pub residual_px: DVec2,
+    /// Image of its centre: the centroid less what a disc has its centroid off, px.
+    pub image_px: DVec2,
+}
+
+/// What the white markers of a frame say of the platform.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::track) struct PoseEstimate<'a> {
+    /// The pose, where there is one.
+    pub refined: Option<&'a RefinedPose>,
+    /// By what the covariance is to be multiplied: markers scatter more than their own deviations say.
+    pub variance_factor: f64,
+    /// Whether another pose fits as well.
+    pub is_ambiguous: bool,
+    /// Markers that the pose rests on.
+    pub sightings: usize,
+    /// Each marker of the constants against the pose, where both are found.
+    pub markers: &'a [Option<MarkerAtPose>],
+}
+
+/// Finds the pose in frame after frame.
+#[derive(Debug, Clone)]
+pub(in crate::track) struct PoseFinder {
+    /// At the last pose.
+    optics: SensorOptics,
+    max_residual_px: f64,
+    sightings: Vec<MarkerSighting>,
+    residual_scale: ResidualScale,
+    markers: Vec<Option<MarkerAtPose>>,
+    /// The last pose that was found, and what this frame gave.
+    pose: Option<Rigid>,
+    refined: Option<RefinedPose>,
+    is_ambiguous: bool,
+}
+
+impl PoseFinder {
+    /// For a sensor; `max_residual_px`: largest rms of the residuals that is a pose.
+    pub fn new(model: &SensorModel, max_residual_px: f64) -> Self {
+        let count = model.markers.all.len();
+        Self {
+            optics: model.optics.clone(),
+            max_residual_px,
+            sightings: Vec::with_capacity(count),
+            residual_scale: ResidualScale::new(count),
+            markers: vec![None; count],
+            pose: None,
+            refined: None,
+            is_ambiguous: false,
+        }
+    }
+
+    /// The optics at the last pose.
+    pub fn optics(&self) -> &SensorOptics {
+        &self.optics
+    }
+
+    /// The last pose that was found.
+    pub fn last_pose(&self) -> Option<Rigid> {
+        self.pose
+    }
+
+    /// Forgets all frames.
+    pub fn restart(&mut self) {
+        self.pose = None;
+        self.refined = None;
+        self.residual_scale.restart();
+    }
+
+    /// The pose of the next frame, and the markers that it rests on.
+    pub fn find(&mut self, frame: &MarkerFrame<'_, '_>, model: &SensorModel, markers: &mut MarkerIdentities) {
+        self.is_ambiguous = false;
+        let followed = self.pose.and_then(|pose| self.follow(frame, markers, &pose));
+        self.refined = followed.or_else(|| self.find_anywhere(frame, model, markers));
+        match (&self.refined, self.pose) {
+            (Some(found), _) => self.pose = Some(found.pose),
+            (None, Some(pose)) => {
+                // It was movable a frame ago; if not, the optics stay where they are.
+                let _ = self.optics.move_to(&pose);
+            }
+            (None, None) => {}
+        }
+        self.compare(frame, markers);
+    }
+
+    /// What the last frame gave.
+    pub fn estimate(&self) -> PoseEstimate<'_> {
+        PoseEstimate {
+            refined: self.refined.as_ref(),
+            variance_factor: self.residual_scale.variance_factor(),
+            is_ambiguous: self.is_ambiguous,
+            sightings: self.sightings.len(),
+            markers: &self.markers,
+        }
+    }
+
+    /// The markers against the pose, and what is learnt from them.
+    fn compare(&mut self, frame: &MarkerFrame<'_, '_>, markers: &mut MarkerIdentities) {
+        self.markers.fill(None);
+        if self.refined.is_none() {
+            return;
+        }
+        let discs = markers.discs();
+        for ((to, marker), disc) in self.markers.iter_mut().zip(&frame.models.all).zip(discs) {
+            let Some(disc) = disc else { continue };
+            if let Ok(image) = marker.image(&self.optics) {
+                *to = Some(MarkerAtPose {
+                    residual_px: disc.centroid_px - image.centroid_px,
+                    image_px: disc.centroid_px - (image.centroid_px - image.center_px),
+                });
+            }
+        }
+        let seen = self.markers.iter().zip(discs);
+        self.residual_scale
+            .add(seen.map(|(at, disc)| Some((at.as_ref()?.residual_px, disc.as_ref()?.sd_px))));
+        markers.learn_shading();
+    }
+
+    /// From the discs that are found, from a pose nearby; the optics are left there.
+    fn refine(
+        &mut self,
+        frame: &MarkerFrame<'_, '_>,
+        markers: &MarkerIdentities,
+        start: &Rigid,
+    ) -> Option<RefinedPose> {
+        self.sightings.clear();
+        let found = frame.models.all.iter().zip(markers.discs());
+        self.sightings.extend(found.filter_map(|(marker, disc)| {
+            disc.map(|d| MarkerSighting { marker: *marker, centroid_px: d.centroid_px, sd_px: d.sd_px })
+        }));
+        let refined = refine(&mut self.optics, &self.sightings, start)?;
+        let near = refined.pose.translation_mm.length() < MAX_TRANSLATION_MM;
+        (refined.rms_px <= self.max_residual_px && near).then_some(refined)
+    }
+
+    /// From the last pose.
+    fn follow(
+        &mut self,
+        frame: &MarkerFrame<'_, '_>,
+        markers: &mut MarkerIdentities,
+        last: &Rigid,
+    ) -> Option<RefinedPose> {
+        if self.optics.move_to(last).is_err() {
+            markers.clear();
+            return None;
+        }
+        markers.follow(frame, &self.optics);
+        let found = self.refine(frame, markers, last)?;
+        if markers.are_all_found() || self.optics.move_to(&found.pose).is_err() {
+            return Some(found);
+        }
+        let refound = markers.find_again(frame, &self.optics);
+        if refound.is_empty() {
+            return Some(found);
+        }
+        let with_refound = self.refine(frame, markers, &found.pose);
+        if with_refound.is_some() {
+            return with_refound;
+        }
+        markers.drop_refound(&refound);
+        self.refine(frame, markers, &found.pose).or_else(|| {
+            // The optics stood at this pose before.
+            let _ = self.optics.move_to(&found.pose);
+            Some(found)
+        })
+    }
+
+    /// Without a pose to start from.
+    fn find_anywhere(
+        &mut self,
+        frame: &MarkerFrame<'_, '_>,
+        model: &SensorModel,
+        markers: &mut MarkerIdentities,
+    ) -> Option<RefinedPose> {
+        markers.clear();
+        if frame.models.all.len() != 4 {
+            // Other numbers than the paper's four: the nearest to rest, or to the last pose, will do.
+            let start = self.pose.unwrap_or(Rigid::identity());
+            self.optics.move_to(&start).ok()?;
+            markers.follow(frame, &self.optics);
+            return self.refine(frame, markers, &start);
+        }
+        let mut views = [[None; 4]; 3];
+        for (views, part) in views.iter_mut().zip(PRESSED_PARTS) {
+            let down = DVec3::new(0.0, 0.0, -part * model.max_press_mm);
+            if self.optics.move_to(&Rigid::new(DMat3::IDENTITY, down)).is_ok() {
+                for (view, marker) in views.iter_mut().zip(&frame.models.all) {
+                    *view = MarkerView::new(&self.optics, marker);
+                }
+            }
+        }
+        let hypotheses = markers.find_anywhere(frame, &views);
+        if !hypotheses.is_complete() {
+            return None;
+        }
+        let coarse = self.best_of(frame, &hypotheses, markers)?;
+        // Fitted again as they look from there; and asked whether another pose fits as well.
+        self.optics.move_to(&coarse.pose).ok()?;
+        markers.refit(frame, &self.optics);
+        let refined = self.refine(frame, markers, &coarse.pose)?;
+        let mut sightings = [Sighting { id: 0, centroid_px: DVec2::ZERO }; 4];
+        for (to, from) in sightings.iter_mut().zip(&self.sightings) {
+            *to = Sighting { id: from.marker.id, centroid_px: from.centroid_px };
+        }
+        self.is_ambiguous = model.solver.solve(&sightings).is_ok_and(|estimate| estimate.is_ambiguous());
+        Some(refined)
+    }
+
+    /// The combination of discs that a pose explains best; it is taken as found, or the likeliest if none is explained.
+    fn best_of(
+        &mut self,
+        frame: &MarkerFrame<'_, '_>,
+        hypotheses: &MarkerHypotheses,
+        markers: &mut MarkerIdentities,
+    ) -> Option<RefinedPose> {
+        let mut best: Option<(RefinedPose, [usize; 4])> = None;
+        let mut last_rank = 0;
+        for (rank, choice) in hypotheses.combinations() {
+            // The first choices fitting well need no rivals.
+            let clear = best.as_ref().is_some_and(|(b, _)| b.rms_px < CLEAR_PART * self.max_residual_px);
+            if rank > last_rank && clear {
+                break;
+            }
+            last_rank = rank;
+            markers.choose(hypotheses, choice);
+            if let Some(refined) = self.refine(frame, markers, &Rigid::identity())
+                && best.as_ref().is_none_or(|(b, _)| refined.rms_px < b.rms_px)
+            {
+                best = Some((refined, choice));
+            }
+        }
+        markers.choose(hypotheses, best.as_ref().map_or([0; 4], |(_, choice)| *choice));
+        best.map(|(refined, _)| refined)
+    }
+}

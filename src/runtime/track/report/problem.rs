@@ -1,0 +1,109 @@
+//! What is wrong with a frame.
+
+/// What is wrong with a frame, the gravest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Problem {
+    /// The file or the stream gave no frame.
+    Unreadable,
+    /// The frame does not have the camera's size.
+    WrongSize,
+    /// Too little light to separate marks from the ground.
+    Dark,
+    /// Most of the frame is at the largest value.
+    Saturated,
+    /// Nothing that could be this sensor's marks.
+    NoMarks,
+    /// Too few white markers are seen for a pose.
+    MarkersMissing,
+    /// White markers are seen, but no pose within reach puts them there.
+    MarkersDoNotFit,
+    /// The dots are not where pose and constants put them: the constants are those of another camera or sensor.
+    ForeignConstants,
+    /// The pose is one that the springs cannot have (bound, torn off their magnets): damage, or constants of another
+    /// sensor. There is no wrench where their law ends.
+    BeyondSprings,
+    /// Two poses explain the white markers.
+    AmbiguousPose,
+    /// Marks are much wider than they should be.
+    Blurred,
+    /// The frame is the last one again, bit by bit.
+    Frozen,
+    /// Frames are missing before this one.
+    Gap,
+    /// The pose rests on three white markers: nothing checks it.
+    ThreeMarkers,
+    /// A twentieth or more of the dots that should be seen are not.
+    DotsLost,
+}
+
+impl Problem {
+    /// All of them, the gravest first.
+    pub const ALL: [Self; 15] = [
+        Self::Unreadable,
+        Self::WrongSize,
+        Self::Dark,
+        Self::Saturated,
+        Self::NoMarks,
+        Self::MarkersMissing,
+        Self::MarkersDoNotFit,
+        Self::ForeignConstants,
+        Self::BeyondSprings,
+        Self::AmbiguousPose,
+        Self::Blurred,
+        Self::Frozen,
+        Self::Gap,
+        Self::ThreeMarkers,
+        Self::DotsLost,
+    ];
+
+    /// The name that files carry.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Unreadable => "unreadable",
+            Self::WrongSize => "wrong_size",
+            Self::Dark => "dark",
+            Self::Saturated => "saturated",
+            Self::NoMarks => "no_marks",
+            Self::MarkersMissing => "markers_missing",
+            Self::MarkersDoNotFit => "markers_do_not_fit",
+            Self::ForeignConstants => "foreign_constants",
+            Self::BeyondSprings => "beyond_springs",
+            Self::AmbiguousPose => "ambiguous_pose",
+            Self::Blurred => "blurred",
+            Self::Frozen => "frozen",
+            Self::Gap => "gap",
+            Self::ThreeMarkers => "three_markers",
+            Self::DotsLost => "dots_lost",
+        }
+    }
+}
+
+/// A set of problems.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Problems(u32);
+
+impl Problems {
+    pub(in crate::track) fn add(&mut self, problem: Problem) {
+        self.0 |= 1 << problem as u32;
+    }
+
+    /// Whether one is among them.
+    pub fn has(self, problem: Problem) -> bool {
+        self.0 & (1 << problem as u32) != 0
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// All of them, the gravest first.
+    pub fn iter(self) -> impl Iterator<Item = Problem> {
+        Problem::ALL.into_iter().filter(move |problem| self.has(*problem))
+    }
+
+    /// `ok`, or the name of the gravest.
+    pub fn status(self) -> &'static str {
+        self.iter().next().map_or("ok", Problem::as_str)
+    }
+}

@@ -1,0 +1,96 @@
+//! What the reference frames showed, to be taken off.
+
+use glam::DVec3;
+
+use super::result::Tracked;
+use domecast_springs::Wrench;
+
+/// Means over the reference frames.
+#[derive(Debug, Clone)]
+pub(super) struct ReferenceMean {
+    /// Frames that make the reference; 0: the constants' rest.
+    wanted: u32,
+    frames: u32,
+    wrench: Wrench,
+    displacement: Vec<(DVec3, u32)>,
+}
+
+impl ReferenceMean {
+    /// Over the first `wanted` good frames with so many dots.
+    pub fn new(wanted: u32, dots: usize) -> Self {
+        Self { wanted, frames: 0, wrench: Wrench::default(), displacement: vec![(DVec3::ZERO, 0); dots] }
+    }
+
+    /// Forgets all frames.
+    pub fn restart(&mut self) {
+        self.frames = 0;
+        self.wrench = Wrench::default();
+        self.displacement.fill((DVec3::ZERO, 0));
+    }
+
+    /// Takes in a frame while the reference is not full, and takes the mean off it; `good`: nothing is wrong with it.
+    pub fn apply(&mut self, result: &mut Tracked, good: bool) {
+        if self.frames < self.wanted {
+            if !good {
+                return;
+            }
+            self.frames += 1;
+            if let Some(wrench) = result.wrench {
+                self.wrench = self.wrench + wrench;
+            }
+            for (dot, (to, count)) in result.black_dots.iter().zip(&mut self.displacement) {
+                if let Some(displacement) = dot.displacement_mm {
+                    *to += displacement;
+                    *count += 1;
+                }
+            }
+        }
+        if self.frames == 0 {
+            return;
+        }
+        if let Some(wrench) = &mut result.wrench {
+            let frames = f64::from(self.frames);
+            let mean =
+                Wrench { force_n: self.wrench.force_n / frames, moment_nmm: self.wrench.moment_nmm / frames };
+            *wrench = *wrench - mean;
+        }
+        for (dot, (sum, count)) in result.black_dots.iter_mut().zip(&self.displacement) {
+            if let Some(displacement) = dot.displacement_mm.as_mut().filter(|_| *count > 0) {
+                *displacement -= *sum / f64::from(*count);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::report::DotResult;
+
+    fn frame(force: f64, moved: f64) -> Tracked {
+        let dot = DotResult { displacement_mm: Some(DVec3::X * moved), ..DotResult::default() };
+        Tracked {
+            wrench: Some(Wrench { force_n: DVec3::Z * force, ..Wrench::default() }),
+            black_dots: vec![dot],
+            ..Tracked::default()
+        }
+    }
+
+    #[test]
+    fn the_mean_of_good_frames_is_taken_off() {
+        let mut reference = ReferenceMean::new(2, 1);
+        let mut bad = frame(9.0, 9.0);
+        reference.apply(&mut bad, false);
+        assert_eq!(bad, frame(9.0, 9.0));
+        reference.apply(&mut frame(1.0, 0.1), true);
+        reference.apply(&mut frame(3.0, 0.3), true);
+        let mut later = frame(5.0, 0.5);
+        reference.apply(&mut later, false);
+        assert_eq!(later.wrench.unwrap().force_n, DVec3::Z * 3.0);
+        assert!((later.black_dots[0].displacement_mm.unwrap().x - 0.3).abs() < 1e-12);
+        reference.restart();
+        let mut again = frame(5.0, 0.5);
+        reference.apply(&mut again, false);
+        assert_eq!(again, frame(5.0, 0.5));
+    }
+}

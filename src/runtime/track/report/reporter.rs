@@ -1,0 +1,206 @@
+//! Fills the result of each frame from what the stages found.
+
+use glam::DVec3;
+
+use super::checks::DotChecks;
+use super::problem::{Problem, Problems};
+use super::reference::ReferenceMean;
+use super::result::{DotResult, MarkerResult, Tracked};
+use crate::track::frame::Exposure;
+use crate::track::identities::{DotsFound, MAX_FALSE_DOTS};
+use crate::track::marks::{FittedDisc, MarkState};
+use crate::track::model::SensorModel;
+use crate::track::options::{Reference, TrackOptions};
+use crate::track::pose::PoseEstimate;
+use crate::track::wrench::WrenchEstimate;
+
+/// A sharp edge takes at least this part of a frame's contrast in four pixels.
+const MIN_SHARPNESS: f64 = 0.45;
+/// A larger part of the dots that should be seen, lost, is a problem.
+const MAX_LOST_PART: f64 = 0.05;
+/// Fewest dots that must be expected before the missing ones are held against the constants.
+const MIN_EXPECTED_DOTS: usize = 8;
+
+/// What all stages found in one frame.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::track) struct FrameFindings<'a> {
+    /// The disc of each white marker.
+    pub discs: &'a [Option<FittedDisc>],
+    pub pose: PoseEstimate<'a>,
+    /// Where there is a pose.
+    pub wrench: Option<WrenchEstimate>,
+    pub dots: DotsFound<'a>,
+    /// Of each dot, mm; where there is a pose.
+    pub displacements_mm: Option<&'a [Option<DVec3>]>,
+    /// Sharpness of the frame, measured where neither a pose nor a dot is found.
+    pub sharpness: Option<f64>,
+}
+
+/// Makes the results; keeps what goes from frame to frame.
+#[derive(Debug, Clone)]
+pub(in crate::track) struct Reporter {
+    result: Tracked,
+    last_number: Option<u64>,
+    checks: DotChecks,
+    reference: ReferenceMean,
+    max_misplaced: f64,
+}
+
+impl Reporter {
+    /// For a sensor.
+    pub fn new(model: &SensorModel, options: &TrackOptions) -> Self {
+        let wanted = match options.reference {
+            Reference::Constants => 0,
+            Reference::Frames(wanted) => wanted,
+        };
+        let marker = |id| MarkerResult { id, ..MarkerResult::default() };
+        let dot = |id| DotResult { id, ..DotResult::default() };
+        Self {
+            result: Tracked {
+                black_dots: model.dots.iter().map(|d| dot(d.id)).collect(),
+                white_markers: model.markers.all.iter().map(|m| marker(m.id)).collect(),
+                false_dots: Vec::with_capacity(MAX_FALSE_DOTS),
+                ..Tracked::default()
+            },
+            last_number: None,
+            checks: DotChecks::new(model.dots.len()),
+            reference: ReferenceMean::new(wanted, model.dots.len()),
+            max_misplaced: options.max_misplaced,
+        }
+    }
+
+    /// The last frame's result.
+    pub fn result(&self) -> &Tracked {
+        &self.result
+    }
+
+    /// Forgets all frames.
+    pub fn restart(&mut self) {
+        self.last_number = None;
+        self.reference.restart();
+        for marker in &mut self.result.white_markers {
+            marker.state = MarkState::Missing;
+        }
+    }
+
+    /// Begins a frame; whether frames are missing before it.
+    pub fn begin(&mut self, number: u64) -> bool {
+        let result = &mut self.result;
+        result.frame = number;
+        result.problems = Problems::default();
+        (result.pose, result.pose_sd, result.pose_rms_px) = (None, None, None);
+        (result.wrench, result.wrench_sd) = (None, None);
+        for marker in &mut result.white_markers {
+            let seen = marker.state != MarkState::Missing;
+            let state = if seen { MarkState::Lost } else { MarkState::Missing };
+            *marker = MarkerResult { id: marker.id, state, ..MarkerResult::default() };
+        }
+        let has_gap = self.last_number.is_some_and(|last| number != last.wrapping_add(1));
+        if has_gap {
+            self.problem(Problem::Gap);
+        }
+        self.last_number = Some(number);
+        has_gap
+    }
+
+    /// Something is wrong with the frame.
+    pub fn problem(&mut self, problem: Problem) {
+        self.result.problems.add(problem);
+    }
+
+    fn problem_if(&mut self, is_so: bool, problem: Problem) {
+        if is_so {
+            self.problem(problem);
+        }
+    }
+
+    /// What the frame's levels say.
+    pub fn exposure(&mut self, exposure: &Exposure) {
+        self.problem_if(exposure.is_repeated, Problem::Frozen);
+        self.problem_if(exposure.is_dark(), Problem::Dark);
+        self.problem_if(exposure.is_saturated(), Problem::Saturated);
+        if exposure.is_flat() {
+            self.problem_if(self.result.problems.is_empty(), Problem::NoMarks);
+        }
+    }
+
+    /// The dots of a frame, also of one in which nothing was looked for; `displacements_mm`: where there is a pose.
+    pub fn dots(&mut self, dots: &DotsFound<'_>, displacements_mm: Option<&[Option<DVec3>]>) {
+        self.result.searched = dots.searched;
+        self.result.false_dots.clear();
+        self.result.false_dots.extend_from_slice(dots.false_dots);
+        for (index, (track, to)) in dots.tracks.iter().zip(&mut self.result.black_dots).enumerate() {
+            *to = DotResult {
+                id: to.id,
+                state: track.state,
+                image_px: track.center_px(),
+                centroid_px: track.now_px(),
+                sd_px: track.spot.map(|spot| spot.sd_px),
+                undeformed_px: None,
+                motion_px: track.motion_px,
+                displacement_mm: None,
+            };
+            if let Some(displacements_mm) = displacements_mm {
+                to.displacement_mm = displacements_mm[index];
+                if track.is_wanted() {
+                    to.undeformed_px = track.expected_px.map(|p| p - track.offset_px);
+                }
+            }
+        }
+    }
+
+    fn markers(&mut self, discs: &[Option<FittedDisc>], pose: &PoseEstimate<'_>) {
+        let found = discs.iter().zip(pose.markers);
+        for ((disc, at_pose), to) in found.zip(&mut self.result.white_markers) {
+            let Some(disc) = disc else { continue };
+            to.state = MarkState::Ok;
+            to.centroid_px = Some(disc.centroid_px);
+            to.sd_px = Some(disc.sd_px);
+            to.residual_px = at_pose.map(|at| at.residual_px);
+            to.image_px = at_pose.map(|at| at.image_px);
+        }
+        let are_all_found = discs.iter().all(Option::is_some);
+        self.problem_if(pose.is_ambiguous, Problem::AmbiguousPose);
+        if let Some(refined) = pose.refined {
+            self.result.pose = Some(refined.pose);
+            self.result.pose_rms_px = Some(refined.rms_px);
+            self.problem_if(pose.sightings == 3, Problem::ThreeMarkers);
+        } else {
+            self.problem(if are_all_found { Problem::MarkersDoNotFit } else { Problem::MarkersMissing });
+        }
+    }
+
+    fn wrench(&mut self, estimate: &WrenchEstimate) {
+        self.result.pose_sd = estimate.displacement_sd;
+        self.result.wrench = estimate.wrench;
+        self.result.wrench_sd = estimate.wrench_sd;
+        self.problem_if(estimate.is_beyond_springs, Problem::BeyondSprings);
+    }
+
+    /// Ends a frame in which marks were looked for.
+    pub fn finish(&mut self, findings: &FrameFindings<'_>, model: &SensorModel) {
+        self.markers(findings.discs, &findings.pose);
+        if let Some(wrench) = &findings.wrench {
+            self.wrench(wrench);
+        }
+        self.dots(&findings.dots, findings.displacements_mm);
+        let tracks = findings.dots.tracks;
+        let known = findings.pose.refined.is_some();
+        let is_blurred = self.checks.are_blurred(tracks)
+            || findings.sharpness.is_some_and(|sharpness| sharpness < MIN_SHARPNESS);
+        self.problem_if(is_blurred, Problem::Blurred);
+        let misplaced = known && self.checks.are_misplaced(tracks, &model.dots, self.max_misplaced);
+        let wanted = tracks.iter().filter(|t| t.is_wanted()).count();
+        let missing = self.result.count(MarkState::Missing);
+        let unknown = known && wanted >= MIN_EXPECTED_DOTS && 2 * missing > wanted;
+        let foreign = findings.pose.refined.is_some_and(|found| found.rms_px > model.markers.foreign_rms_px);
+        self.problem_if(misplaced || unknown || foreign, Problem::ForeignConstants);
+        let lost = self.result.count(MarkState::Lost) + self.result.count(MarkState::Merged);
+        self.problem_if(lost as f64 > (MAX_LOST_PART * wanted as f64).max(1.0), Problem::DotsLost);
+        let nothing =
+            findings.discs.iter().all(Option::is_none) && tracks.iter().all(|track| track.spot.is_none());
+        self.problem_if(!known && nothing, Problem::NoMarks);
+        let good = known && self.result.problems.iter().all(|p| p >= Problem::Frozen);
+        self.reference.apply(&mut self.result, good);
+    }
+}

@@ -168,11 +168,10 @@ fn page_warnings(page: &Path) -> String {
     page[start..].split("</section>").next().expect("its text").to_owned()
 }
 
-/// What is wrong with the answer to a case; empty if nothing is.
-fn faults(topic: &Topic, case: &Case, raw: Option<&Path>) -> Vec<String> {
-    let folder = tempfile::tempdir().expect("a folder");
+/// Lays out a case's files in a folder; returns the input's name.
+fn lay_out(topic: &Topic, case: &Case, raw: Option<&Path>, folder: &Path) -> String {
     for (name, value) in topic.files.iter().chain(&case.files) {
-        let path = folder.path().join(name);
+        let path = folder.join(name);
         if value.is_null() {
             fs::create_dir_all(&path).expect("made");
         } else {
@@ -180,21 +179,58 @@ fn faults(topic: &Topic, case: &Case, raw: Option<&Path>) -> Vec<String> {
             fs::write(&path, bytes_of(value)).expect("written");
         }
     }
+    let Some(name) = &topic.input else { return String::new() };
     let ending = raw.and_then(Path::extension).unwrap_or_default().to_string_lossy();
-    let input = topic.input.as_ref().map(|name| name.replace('*', &ending));
-    if let Some(name) = &input {
-        let base = match &topic.base {
-            Some(Value::String(path)) => fs::read(with_places(path)).expect("the base can be read"),
-            Some(json) => bytes_of_json(json),
-            None => Vec::new(),
-        };
-        let bytes = raw.map_or_else(|| changed(&base, case), |path| fs::read(path).expect("it can be read"));
-        fs::write(folder.path().join(name), bytes).expect("written");
+    let name = name.replace('*', &ending);
+    let base = match &topic.base {
+        Some(Value::String(path)) => fs::read(with_places(path)).expect("the base can be read"),
+        Some(json) => bytes_of_json(json),
+        None => Vec::new(),
+    };
+    let bytes = raw.map_or_else(|| changed(&base, case), |path| fs::read(path).expect("it can be read"));
+    fs::write(folder.join(&name), bytes).expect("written");
+    name
+}
+
+/// What is wrong with standard output.
+fn faults_of_output(case: &Case, printed: &str) -> Vec<String> {
+    let mut faults = Vec::new();
+    for part in &case.prints {
+        if !printed.contains(&with_places(part)) {
+            faults.push(format!("standard output lacks \"{part}\""));
+        }
     }
+    let mut compare = |json: &str, values: &Map<String, Value>| {
+        let json: Value = serde_json::from_str(json).unwrap_or_default();
+        for (pointer, value) in values {
+            match json.pointer(pointer) {
+                Some(found) if found == value => {}
+                Some(found) => faults.push(format!("{pointer} is {found}, not {value}")),
+                None => faults.push(format!("{pointer} is missing, and should be {value}")),
+            }
+        }
+    };
+    if !case.json.is_empty() {
+        compare(printed, &case.json);
+    }
+    if let Some(lines) = &case.json_lines {
+        for (line, values) in printed.lines().zip(lines) {
+            compare(line, values);
+        }
+        if printed.lines().count() != lines.len() {
+            faults.push(format!("not {} lines on standard output", lines.len()));
+        }
+    }
+    faults
+}
+
+/// What is wrong with the answer to a case; empty if nothing is.
+fn faults(topic: &Topic, case: &Case, raw: Option<&Path>) -> Vec<String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let input = lay_out(topic, case, raw, folder.path());
     let before = contents(folder.path());
 
     let run = case.run.as_ref().or(topic.run.as_ref()).expect("the topic or the case says what to run");
-    let input = input.unwrap_or_default();
     let run: Vec<String> =
         run.iter().map(|argument| with_places(&argument.replace("{input}", &input))).collect();
     let arguments: Vec<&str> = run.iter().map(String::as_str).collect();
@@ -203,38 +239,14 @@ fn faults(topic: &Topic, case: &Case, raw: Option<&Path>) -> Vec<String> {
     let printed = String::from_utf8(output.stdout).expect("UTF-8");
 
     let mut faults = Vec::new();
-    let mut expect = |holds: bool, fault: String| {
-        if !holds {
-            faults.push(fault);
-        }
-    };
+    let mut expect = |holds: bool, fault: String| faults.extend((!holds).then_some(fault));
     let exit = case.exit.unwrap_or(topic.exit);
     expect(output.status.code() == Some(exit), format!("exit code {:?}, not {exit}", output.status.code()));
     for part in case.says.iter().chain(topic.says.iter().filter(|_| exit == topic.exit)) {
         expect(message.contains(&with_places(part)), format!("the message does not say \"{part}\""));
     }
-    for part in &case.prints {
-        expect(printed.contains(&with_places(part)), format!("standard output lacks \"{part}\""));
-    }
-    let mut expect_values = |json: &str, values: &Map<String, Value>| {
-        let json: Value = serde_json::from_str(json).unwrap_or_default();
-        for (pointer, value) in values {
-            let found = json.pointer(pointer).cloned().unwrap_or_default();
-            expect(found == *value, format!("{pointer} is {found}, not {value}"));
-        }
-    };
-    if !case.json.is_empty() {
-        expect_values(&printed, &case.json);
-    }
-    if let Some(lines) = &case.json_lines {
-        for (line, values) in printed.lines().zip(lines) {
-            expect_values(line, values);
-        }
-        expect(
-            printed.lines().count() == lines.len(),
-            format!("not {} lines on standard output", lines.len()),
-        );
-    }
+    faults.extend(faults_of_output(case, &printed));
+    let mut expect = |holds: bool, fault: String| faults.extend((!holds).then_some(fault));
     if exit == 1 && run.iter().any(|argument| argument == "--json") {
         expect(message.is_empty(), "with --json, something stands on standard error".to_owned());
         let json: Value = serde_json::from_str(&printed).unwrap_or_default();

@@ -27,7 +27,7 @@ pub struct Inspection {
 }
 
 impl Inspection {
-    /// Number of handles of a single closed shell: `1 - euler/2`; `None` if
+    /// Number of holes through a single closed shell: `1 - euler/2`; `None` if
     /// the mesh is not one closed shell, where the formula has no meaning.
     pub fn genus(&self) -> Option<i64> {
         (self.is_closed() && self.shells == 1).then_some(1 - self.euler / 2)

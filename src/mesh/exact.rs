@@ -1,44 +1,65 @@
-//! Exact faces for parts that are a plate with upright features.
+//! Exact solids, on truck's topology, for parts that are a plate with upright features.
 //!
 //! What can be built: one extruded plate; pockets with upright walls that open
 //! at its top or bottom; turned holes and pins whose axes are upright. Features
 //! may stand on each other's floors but not cross each other's walls. Anything
 //! else is left to facets.
+//!
+//! Walls are swept, turned features revolved, flat faces attached with the
+//! loops of all that opens in them. truck's own booleans are not used: they
+//! fail on coplanar and tangent faces.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec2, DVec3};
+use truck_modeling::{
+    BoundedCurve, Curve, Edge, Face, Line, Matrix4, Plane, Point3, Processor, Rad, RevolutedCurve, Shell,
+    Surface, Sweep, Transformed, Vector3, Wire, builder,
+};
 
-use super::brep::{Brep, Curve, Surface, Turn};
-use super::{Construction, Piece, Profile, ProfileEdge, Shape};
+use crate::step::Circle;
+use crate::{Construction, Piece, Profile, ProfileEdge, Shape, TriMesh};
 
 /// A flat horizontal face under construction.
 struct Level {
     z: f64,
     up: bool,
     outline: Vec<DVec2>,
-    loops: Vec<Vec<Turn>>,
+    loops: Vec<Wire>,
 }
 
-impl Brep {
-    /// The construction with exact faces; `None` if it is not a plate with
-    /// upright, separate features.
-    pub fn exact(construction: &Construction) -> Option<Self> {
-        let mut out = Self::default();
-        let (plate, pins) = construction.added.split_first()?;
+impl Construction {
+    /// The part with exact faces; `None` if it is not a plate with upright, separate features. What is handed out
+    /// is closed, connected and consistently oriented.
+    ///
+    /// ```
+    /// use domecast_mesh::{Construction, Fit, Piece, Shape};
+    /// use glam::DVec2;
+    /// let plate = Shape::rounded_plate(DVec2::splat(20.0), 2.0, 0.0, 4.0);
+    /// let bore = Shape::cylinder(3.0, -1.0, 5.0, Fit::Area);
+    /// let part = Construction { added: vec![Piece::new("plate", plate)], cut: vec![Piece::new("bore", bore)] };
+    /// let solid = part.exact_solid().expect("a plate with a bore");
+    /// // Eight walls, top, bottom, and the bore in thirds.
+    /// assert_eq!(solid.face_iter().count(), 8 + 2 + 3);
+    /// ```
+    pub fn exact_solid(&self) -> Option<truck_modeling::Solid> {
+        let mut out = Faces::default();
+        let (plate, pins) = self.added.split_first()?;
         let (outline, radius, z0, z1) = upright_prism(plate)?;
-        let mut levels = Vec::new();
-        out.walls(&mut levels, &outline, radius, (z0, z1), true)?;
+        out.walls(&outline, radius, (z0, z1), true)?;
 
         let turned: Vec<&Piece> =
-            construction.cut.iter().filter(|p| matches!(p.shape, Shape::Turned { .. })).collect();
-        for pocket in construction.cut.iter().filter(|p| matches!(p.shape, Shape::Prism { .. })) {
+            self.cut.iter().filter(|p| matches!(p.shape, Shape::Turned { .. })).collect();
+        for pocket in self.cut.iter().filter(|p| matches!(p.shape, Shape::Prism { .. })) {
             let (outline, radius, low, high) = upright_prism(pocket)?;
             // It must open at exactly one face of the plate and lie inside it.
             let (from_below, from_above) = (low < z0 && high < z1, high > z1 && low > z0);
-            if from_below == from_above || !levels.iter().take(2).all(|l| inside(&l.outline, &outline)) {
+            if from_below == from_above || !out.levels.iter().take(2).all(|l| inside(&l.outline, &outline)) {
                 return None;
             }
             let span = if from_below { (z0, high) } else { (low, z1) };
-            out.walls(&mut levels, &outline, radius, span, false)?;
+            out.walls(&outline, radius, span, false)?;
         }
         let mut done: Vec<DVec2> = Vec::new();
         for piece in &turned {
@@ -53,109 +74,110 @@ impl Brep {
                 .map(|p| if let Shape::Turned { profile, .. } = &p.shape { Some(profile) } else { None })
                 .collect();
             let profile = merged(&same_axis?)?;
-            out.turned(&mut levels, at, &profile, false)?;
+            out.turned(at, &profile, false)?;
         }
         for pin in pins {
             let Shape::Turned { profile, .. } = &pin.shape else { return None };
-            out.turned(&mut levels, upright_axis(pin)?, profile, true)?;
+            out.turned(upright_axis(pin)?, profile, true)?;
         }
-        for level in levels {
-            let normal = if level.up { DVec3::Z } else { DVec3::NEG_Z };
-            out.face(Surface::Plane { origin: DVec3::Z * level.z, normal }, true, level.loops);
+        for level in std::mem::take(&mut out.levels) {
+            out.flat(level.z, level.up, level.loops)?;
         }
-        Some(out)
+        truck_modeling::Solid::try_new(vec![out.shell]).ok()
     }
+}
 
+impl TriMesh {
+    /// The closed mesh as a solid with one flat face for each triangle: for what cannot be built with exact faces.
+    /// Triangles without an area are left out.
+    pub fn faceted_solid(&self) -> truck_modeling::Solid {
+        let vertices: Vec<_> = self.vertices_mm.iter().map(|p| builder::vertex(point(*p))).collect();
+        let mut edges: HashMap<(u32, u32), Edge> = HashMap::with_capacity(self.triangles.len() * 3 / 2);
+        let mut shell = Shell::with_capacity(self.triangles.len());
+        for (triangle, corners) in self.triangles.iter().zip(self.iter_mm()) {
+            let [a, b, c] = corners;
+            if (b - a).cross(c - a).try_normalize().is_none() {
+                continue;
+            }
+            let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {
+                let (from, to) = (triangle[i], triangle[j]);
+                let (low, high) = (from.min(to), from.max(to));
+                let edge = edges
+                    .entry((low, high))
+                    .or_insert_with(|| builder::line(&vertices[low as usize], &vertices[high as usize]));
+                if from == low { edge.clone() } else { edge.inverse() }
+            });
+            let [a, b, c] = corners.map(point);
+            shell.push(Face::new_unchecked(vec![Wire::from(sides.to_vec())], Plane::new(a, b, c).into()));
+        }
+        truck_modeling::Solid::new_unchecked(vec![shell])
+    }
+}
+
+fn point(p: DVec3) -> Point3 {
+    Point3::new(p.x, p.y, p.z)
+}
+
+/// Faces made so far, and the flat ones that still collect loops.
+#[derive(Default)]
+struct Faces {
+    shell: Shell,
+    levels: Vec<Level>,
+}
+
+impl Faces {
     /// Upright walls of an outline between two heights, and the flat faces at
     /// both: of a plate (`solid`), or of a pocket, whose open end becomes a
     /// hole in the plate's face there.
-    fn walls(
-        &mut self,
-        levels: &mut Vec<Level>,
-        outline: &[DVec2],
-        radius: f64,
-        (low, high): (f64, f64),
-        solid: bool,
-    ) -> Option<()> {
-        let path = fillets(outline, radius);
-        let n = path.len();
-        let mut rings = Vec::new();
-        for z in [low, high] {
-            let vertices: Vec<usize> = path.iter().map(|(p, _)| self.vertex(p.extend(z))).collect();
-            let edges: Vec<usize> = (0..n)
-                .map(|i| {
-                    let curve = match path[i].1 {
-                        None => Curve::Line,
-                        Some(center) => Curve::Circle { center: center.extend(z), axis: DVec3::Z, radius },
-                    };
-                    self.edge(vertices[i], vertices[(i + 1) % n], curve)
-                })
-                .collect();
-            rings.push((vertices, edges));
-        }
-        let posts: Vec<usize> =
-            (0..n).map(|i| self.edge(rings[0].0[i], rings[1].0[i], Curve::Line)).collect();
-        for i in 0..n {
-            let j = (i + 1) % n;
-            let mut path_round =
-                vec![(rings[0].1[i], true), (posts[j], true), (rings[1].1[i], false), (posts[i], false)];
-            let surface = match path[i].1 {
-                None => {
-                    let along = (path[j].0 - path[i].0).normalize_or_zero();
-                    let out = -along.perp().extend(0.0);
-                    let normal = if solid { out } else { -out };
-                    Surface::Plane { origin: path[i].0.extend(low), normal }
-                }
-                Some(center) => Surface::Cylinder { origin: center.extend(low), axis: DVec3::Z, radius },
-            };
-            if !solid {
-                reverse(&mut path_round);
-            }
-            let outward = solid || path[i].1.is_none();
-            self.face(surface, outward, vec![path_round]);
-        }
-        let ring = |k: usize| rings[k].1.iter().map(|&e| (e, true)).collect::<Vec<Turn>>();
-        let reversed = |mut turns: Vec<Turn>| {
-            reverse(&mut turns);
-            turns
-        };
+    fn walls(&mut self, outline: &[DVec2], radius: f64, (low, high): (f64, f64), solid: bool) -> Option<()> {
+        let bottom = wire_of_outline(&fillets(outline, radius), radius, low);
+        let rise = Vector3::unit_z() * (high - low);
+        let mut sides: Shell = bottom.sweep(
+            &|p| Point3::new(p.x, p.y, high),
+            &|curve| curve.transformed(Matrix4::from_translation(rise)),
+            &Surface::clone,
+            &|from, to| Curve::Line(Line(*from, *to)),
+            &|curve, _| wall_surface(curve, rise),
+        );
+        // The third edge of a swept face lies at the top, run backward.
+        let top: Wire = sides.iter().map(|face| face.boundaries()[0][2].inverse()).collect();
+        let outline = outline.to_vec();
         if solid {
-            levels.push(Level {
+            self.levels.push(Level {
                 z: low,
                 up: false,
-                outline: outline.to_vec(),
-                loops: vec![reversed(ring(0))],
+                outline: outline.clone(),
+                loops: vec![bottom.inverse()],
             });
-            levels.push(Level { z: high, up: true, outline: outline.to_vec(), loops: vec![ring(1)] });
-            return Some(());
-        }
-        // A pocket: its open end is the level of the plate at that height.
-        let below = levels.iter_mut().find(|l| l.z == low && !l.up);
-        if let Some(level) = below {
-            // Seen from below, a hole runs clockwise: counter-clockwise from above.
-            level.loops.push(ring(0));
-            levels.push(Level {
-                z: high,
-                up: false,
-                outline: outline.to_vec(),
-                loops: vec![reversed(ring(1))],
-            });
+            self.levels.push(Level { z: high, up: true, outline, loops: vec![top] });
         } else {
-            let level = levels.iter_mut().find(|l| l.z == high && l.up)?;
-            level.loops.push(reversed(ring(1)));
-            levels.push(Level { z: low, up: true, outline: outline.to_vec(), loops: vec![ring(0)] });
+            sides.face_iter_mut().for_each(|face| {
+                face.invert();
+            });
+            // The open end of a pocket is the level of the plate at that height.
+            if let Some(level) = self.levels.iter_mut().find(|l| l.z == low && !l.up) {
+                // Seen from below, a hole runs clockwise: counter-clockwise from above.
+                level.loops.push(bottom);
+                self.levels.push(Level { z: high, up: false, outline, loops: vec![top.inverse()] });
+            } else {
+                let level = self.levels.iter_mut().find(|l| l.z == high && l.up)?;
+                level.loops.push(top.inverse());
+                self.levels.push(Level { z: low, up: true, outline, loops: vec![bottom] });
+            }
         }
+        self.shell.append(&mut sides);
         Some(())
     }
 
     /// Faces of a hole (or a pin), clipped to the material (or to what stands
     /// out of it).
-    fn turned(&mut self, levels: &mut [Level], at: DVec2, profile: &Profile, pin: bool) -> Option<()> {
+    fn turned(&mut self, at: DVec2, profile: &Profile, pin: bool) -> Option<()> {
         // The flat faces of the plate above and below this place.
         let reach = profile.max_radius_mm();
-        let here = |l: &Level| covers(&l.outline, at, reach);
-        let floor = levels.iter().filter(|l| !l.up && here(l)).map(|l| l.z).fold(f64::NEG_INFINITY, f64::max);
-        let ceiling = levels.iter().filter(|l| l.up && here(l)).map(|l| l.z).fold(f64::INFINITY, f64::min);
+        let here = |l: &&Level| covers(&l.outline, at, reach);
+        let heights = |up: bool| self.levels.iter().filter(here).filter(move |l| l.up == up).map(|l| l.z);
+        let floor = heights(false).fold(f64::NEG_INFINITY, f64::max);
+        let ceiling = heights(true).fold(f64::INFINITY, f64::min);
         let (first, last) = (profile.points_mm.first()?, profile.points_mm.last()?);
         let clipped = if pin {
             if first.y < floor && last.y > floor && last.y < ceiling {
@@ -168,116 +190,112 @@ impl Brep {
         } else {
             clip(profile, floor, ceiling)?
         };
-        let points = &clipped.points_mm;
-        let rings: Vec<Ring> = points.iter().map(|p| self.ring(at, p.x, p.y)).collect();
-        for ((ends, pair), edge) in points.windows(2).zip(rings.windows(2)).zip(&clipped.edges) {
-            self.band(at, (ends[0], ends[1]), *edge, (&pair[0], &pair[1]), pin);
+        let (mut sides, low, high) = revolved(at, &clipped)?;
+        if pin {
+            sides.face_iter_mut().for_each(|face| {
+                face.invert();
+            });
         }
-        for (ring, p, is_low) in
-            [(rings.first()?, points.first()?, true), (rings.last()?, points.last()?, false)]
-        {
-            let Some(circle) = &ring.circle else { continue };
-            let forward: Vec<Turn> = circle.iter().map(|&e| (e, true)).collect();
-            let mut backward = forward.clone();
-            reverse(&mut backward);
-            let opening = levels.iter_mut().find(|l| l.z == p.y && covers(&l.outline, at, reach));
-            match opening {
+        self.shell.append(&mut sides);
+        let (first, last) = (clipped.points_mm.first()?, clipped.points_mm.last()?);
+        for (ring, z, is_low) in [(low, first.y, true), (high, last.y, false)] {
+            let Some(ring) = ring else { continue };
+            match self.levels.iter_mut().find(|l| l.z == z && covers(&l.outline, at, reach)) {
                 // A hole in that face, seen from its outside.
-                Some(level) => level.loops.push(if level.up { backward } else { forward }),
+                Some(level) => level.loops.push(if level.up { ring.inverse() } else { ring }),
                 // The end of a blind hole faces into the hole, of a pin away.
                 None => {
                     let up = is_low != pin;
-                    let normal = if up { DVec3::Z } else { DVec3::NEG_Z };
-                    let turns = if up { forward } else { backward };
-                    self.face(Surface::Plane { origin: at.extend(p.y), normal }, true, vec![turns]);
+                    self.flat(z, up, vec![if up { ring } else { ring.inverse() }])?;
                 }
             }
         }
         Some(())
     }
 
-    fn ring(&mut self, at: DVec2, radius: f64, z: f64) -> Ring {
-        if radius == 0.0 {
-            let pole = self.vertex(at.extend(z));
-            return Ring { ends: [pole, pole], circle: None };
-        }
-        let ends = [1.0, -1.0].map(|s| self.vertex((at + DVec2::X * (s * radius)).extend(z)));
-        let curve = Curve::Circle { center: at.extend(z), axis: DVec3::Z, radius };
-        let circle = [self.edge(ends[0], ends[1], curve), self.edge(ends[1], ends[0], curve)];
-        Ring { ends, circle: Some(circle) }
+    /// A horizontal face; loops run counter-clockwise seen from outside, the outer one first.
+    fn flat(&mut self, z: f64, up: bool, loops: Vec<Wire>) -> Option<()> {
+        let (x, y) = (Point3::new(1.0, 0.0, z), Point3::new(0.0, 1.0, z));
+        let (one, other) = if up { (x, y) } else { (y, x) };
+        let plane = Plane::new(Point3::new(0.0, 0.0, z), one, other);
+        self.shell.push(Face::try_new(loops, plane.into()).ok()?);
+        Some(())
     }
+}
 
-    /// The two half faces between neighbouring rings.
-    fn band(
-        &mut self,
-        at: DVec2,
-        (low, high): (DVec2, DVec2),
-        edge: ProfileEdge,
-        (a, b): (&Ring, &Ring),
-        pin: bool,
-    ) {
-        let surface = match edge {
-            ProfileEdge::Arc { center_z_mm } => {
-                let center = at.extend(center_z_mm);
-                Surface::Sphere { center, radius: (low - DVec2::new(0.0, center_z_mm)).length() }
-            }
-            ProfileEdge::Line if low.y == high.y => {
-                // A step: outside is up where the upper ring is narrower (of a pin).
-                let up = (high.x < low.x) == pin;
-                let normal = if up { DVec3::Z } else { DVec3::NEG_Z };
-                Surface::Plane { origin: at.extend(low.y), normal }
-            }
-            ProfileEdge::Line if low.x == high.x => {
-                Surface::Cylinder { origin: at.extend(low.y), axis: DVec3::Z, radius: low.x }
-            }
-            ProfileEdge::Line => {
-                let grows = high.x > low.x;
-                let axis = if grows { DVec3::Z } else { DVec3::NEG_Z };
-                let half_angle = ((high.x - low.x).abs() / (high.y - low.y)).atan();
-                let wide = if grows { low } else { high };
-                Surface::Cone { origin: at.extend(wide.y), axis, radius: wide.x, half_angle }
-            }
-        };
-        let flat = matches!(surface, Surface::Plane { .. });
-        let meridian = |out: &mut Self, side: usize| {
-            let curve = match edge {
-                ProfileEdge::Line => Curve::Line,
-                ProfileEdge::Arc { center_z_mm } => Curve::Circle {
-                    center: at.extend(center_z_mm),
-                    // From the lower to the upper end, on the +x or -x side.
-                    axis: if side == 0 { DVec3::NEG_Y } else { DVec3::Y },
-                    radius: (low - DVec2::new(0.0, center_z_mm)).length(),
-                },
-            };
-            out.edge(a.ends[side], b.ends[side], curve)
-        };
-        let sides = [meridian(self, 0), meridian(self, 1)];
-        for half in 0..2 {
-            let (start, end) = (sides[half], sides[1 - half]);
-            let mut turns = Vec::with_capacity(4);
-            turns.extend(a.circle.map(|c| (c[half], true)));
-            turns.push((end, true));
-            turns.extend(b.circle.map(|c| (c[half], false)));
-            turns.push((start, false));
-            if !pin {
-                reverse(&mut turns);
-            }
-            self.face(surface, pin || flat, vec![turns]);
+/// The closed path of a filleted outline at a height, counter-clockwise seen from above.
+fn wire_of_outline(path: &[(DVec2, Option<DVec2>)], radius: f64, z: f64) -> Wire {
+    let vertices: Vec<_> = path.iter().map(|(p, _)| builder::vertex(point(p.extend(z)))).collect();
+    let next = |i: usize| (i + 1) % path.len();
+    let edge = |i: usize| match path[i].1 {
+        None => builder::line(&vertices[i], &vertices[next(i)]),
+        Some(center) => {
+            let outward = (path[i].0 - center + path[next(i)].0 - center).normalize_or_zero();
+            let middle = center + outward * radius;
+            builder::circle_arc(&vertices[i], &vertices[next(i)], point(middle.extend(z)))
+        }
+    };
+    (0..path.len()).map(edge).collect()
+}
+
+/// The upright surface over a piece of an outline, its normal to the right of the piece's direction.
+fn wall_surface(curve: &Curve, rise: Vector3) -> Surface {
+    let (start, end) = (curve.front(), curve.back());
+    let arc = if matches!(curve, Curve::Line(_)) { None } else { Circle::of(curve) };
+    match arc {
+        None => Plane::new(start, end, start + rise).into(),
+        Some(circle) => {
+            // Run downward, so that the normal points away from the axis.
+            let ruling = Curve::Line(Line(start + rise, start));
+            let surface = RevolutedCurve::by_revolution(ruling, circle.center, Vector3::unit_z());
+            Surface::RevolutedCurve(Processor::new(surface))
         }
     }
 }
 
-struct Ring {
-    /// Vertices on the +x and the -x side.
-    ends: [usize; 2],
-    /// Half circles from +x over +y to -x, and back; `None` for a pole.
-    circle: Option<[usize; 2]>,
-}
-
-/// Runs a loop the other way.
-fn reverse(turns: &mut [Turn]) {
-    turns.reverse();
-    turns.iter_mut().for_each(|t| t.1 = !t.1);
+/// A profile revolved about an upright axis: its faces, their normals towards the axis, and the rings at its lower
+/// and upper end, counter-clockwise seen from above; `None` for an end on the axis.
+fn revolved(at: DVec2, profile: &Profile) -> Option<(Shell, Option<Wire>, Option<Wire>)> {
+    let place = |p: DVec2| Point3::new(at.x + p.x, at.y, p.y);
+    let vertices: Vec<_> = profile.points_mm.iter().map(|p| builder::vertex(place(*p))).collect();
+    let edge = |i: usize, edge: &ProfileEdge| match *edge {
+        ProfileEdge::Line => builder::line(&vertices[i], &vertices[i + 1]),
+        ProfileEdge::Arc { center_z_mm } => {
+            let center = DVec2::new(0.0, center_z_mm);
+            let (low, high) = (profile.points_mm[i] - center, profile.points_mm[i + 1] - center);
+            let middle = center + (low + high).normalize_or(DVec2::X) * low.length();
+            builder::circle_arc(&vertices[i], &vertices[i + 1], place(middle))
+        }
+    };
+    let wire: Wire = profile.edges.iter().enumerate().map(|(i, e)| edge(i, e)).collect();
+    let on_axis = |p: Option<&DVec2>| p.is_some_and(|p| p.x == 0.0);
+    let poles = (on_axis(profile.points_mm.first()), on_axis(profile.points_mm.last()));
+    let (axis, turn) = (Vector3::unit_z(), Rad(TAU));
+    // truck wants the pole first.
+    let is_reversed = poles == (false, true);
+    let mut shell = match poles {
+        (false, false) => builder::rsweep(&wire, point(at.extend(0.0)), axis, turn),
+        (true, _) => builder::cone(&wire, axis, turn),
+        (false, true) => builder::cone(&wire.inverse(), axis, turn),
+    };
+    let count = profile.edges.len();
+    let third = |face: usize, edge: usize| -> Option<Wire> {
+        shell.iter().skip(face).step_by(count).map(|f| f.boundaries().first()?.get(edge).cloned()).collect()
+    };
+    let (low, high) = match poles {
+        (false, false) => {
+            (Some(third(0, 3)?.iter().map(Edge::inverse).collect()), Some(third(count - 1, 1)?))
+        }
+        (true, false) => (None, Some(third(count - 1, 1)?)),
+        (false, true) => (Some(third(count - 1, 1)?), None),
+        (true, true) => (None, None),
+    };
+    if is_reversed {
+        shell.face_iter_mut().for_each(|face| {
+            face.invert();
+        });
+    }
+    Some((shell, low, high))
 }
 
 /// Outline, corner radius and heights of an upright, unturned prism.

@@ -18,7 +18,6 @@
 //! ([`TriMesh::rounding_mm`]) follows from the size of the numbers and decides
 //! what counts as equal. Neither ever stands in for the other.
 
-mod brep;
 mod check;
 mod chord;
 mod distance;
@@ -33,6 +32,7 @@ mod primitives;
 mod rays;
 mod shape;
 mod solid;
+mod step;
 mod stl;
 mod threemf;
 mod tree;
@@ -41,7 +41,6 @@ mod triangles;
 #[cfg(test)]
 mod tests;
 
-pub use brep::Brep;
 pub use check::{Inspection, inspect};
 pub use chord::{Chord, Fit};
 pub use dxf::{DxfFile, DxfText, DxfVertex};
@@ -51,7 +50,9 @@ pub use picture::{PictureItem, View, shade};
 pub use rays::RayTarget;
 pub use shape::{Construction, Piece, Profile, ProfileEdge, Shape};
 pub use solid::Solid;
+pub use step::{StepError, write_step};
 pub use stl::{read_stl, write_stl};
 pub use threemf::write_3mf;
 pub use tree::{BoxTree, Cornered};
 pub use triangles::{BoundingBox, TriMesh};
+pub use truck_modeling;

@@ -6,9 +6,9 @@ use super::SimError;
 use super::pipeline::Geometry;
 use super::scene::Scene;
 use domecast_design::DesignError;
-use domecast_optics::camera::{Lens, LensSpec, Model};
+use domecast_optics::camera::{Lens, LensModel, LensSpec};
 use domecast_optics::numeric::Rigid;
-use domecast_optics::{Channel, Limit, OpticsSpec, SensorOptics};
+use domecast_optics::{ColorChannel, OpticsSpec, RayLimit, SensorOptics};
 
 /// The camera over sheet and dome, with the geometric effects that are used and without the others.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ impl Eye {
         let real = scene.optics();
         let mut lens = real.lens().spec().clone();
         if !geometry.lens_distortion {
-            lens = LensSpec { model: Model::Pinhole, distortion: Vec::new(), ..lens };
+            lens = LensSpec { model: LensModel::Pinhole, distortion: Vec::new(), ..lens };
         }
         if !geometry.pupil_shift {
             lens.pupil_shift_mm.clear();
@@ -55,7 +55,7 @@ impl Eye {
             DesignError::at(fault.field, fault.value, "the optics cannot be", fault.allowed)
         })?;
         let optics = if geometry.dispersion && scene.planes() == 3 {
-            Channel::ALL.iter().map(|channel| green.for_channel(*channel)).collect()
+            ColorChannel::ALL.iter().map(|channel| green.for_channel(*channel)).collect()
         } else {
             vec![green]
         };
@@ -91,7 +91,7 @@ impl Eye {
 
     /// Which of them is the reference: green.
     pub fn reference(&self) -> usize {
-        if self.optics.len() == 3 { Channel::Green as usize } else { 0 }
+        if self.optics.len() == 3 { ColorChannel::Green as usize } else { 0 }
     }
 
     /// Where a point appears at rest in a channel: where its ray in air crosses the sheet's normal through it.
@@ -99,8 +99,8 @@ impl Eye {
     ///
     /// # Errors
     /// The limit that the point is past.
-    pub fn apparent(&self, channel: usize, point_mm: DVec3) -> Result<Apparent, Limit> {
-        let optics = self.optics.get(channel).ok_or(Limit::Unreachable)?;
+    pub fn apparent(&self, channel: usize, point_mm: DVec3) -> Result<Apparent, RayLimit> {
+        let optics = self.optics.get(channel).ok_or(RayLimit::Unreachable)?;
         let ray = optics.lens().unproject(optics.project(point_mm)?)?;
         let shift_mm = optics.lens().pupil_shift_mm(Lens::field_angle_rad(ray)).0;
         let pupil = optics.sensor_from_camera().point(DVec3::Z * shift_mm);
@@ -137,24 +137,24 @@ impl PlacedEye {
     ///
     /// # Errors
     /// The limit that the point is past.
-    pub fn project(&self, channel: usize, point_mm: DVec3) -> Result<DVec2, Limit> {
-        self.optics(channel).ok_or(Limit::Unreachable)?.project(point_mm)
+    pub fn project(&self, channel: usize, point_mm: DVec3) -> Result<DVec2, RayLimit> {
+        self.optics(channel).ok_or(RayLimit::Unreachable)?.project(point_mm)
     }
 
     /// The pixel of a point of the deformed dome.
     ///
     /// # Errors
     /// The limit that the point is past.
-    pub fn project_deformed(&self, channel: usize, point_mm: DVec3) -> Result<DVec2, Limit> {
-        self.optics(channel).ok_or(Limit::Unreachable)?.project_deformed(point_mm)
+    pub fn project_deformed(&self, channel: usize, point_mm: DVec3) -> Result<DVec2, RayLimit> {
+        self.optics(channel).ok_or(RayLimit::Unreachable)?.project_deformed(point_mm)
     }
 
     /// The pixel of an apparent point in a channel: one rigid motion and the lens.
     ///
     /// # Errors
     /// The limit that the ray is past.
-    pub fn project_apparent(&self, channel: usize, apparent: &Apparent) -> Result<DVec2, Limit> {
-        let optics = self.optics(channel).ok_or(Limit::Unreachable)?;
+    pub fn project_apparent(&self, channel: usize, apparent: &Apparent) -> Result<DVec2, RayLimit> {
+        let optics = self.optics(channel).ok_or(RayLimit::Unreachable)?;
         let camera = optics.sensor_from_camera();
         let ray = camera.rotation.transpose() * (apparent.point_mm - camera.translation_mm)
             - DVec3::Z * apparent.shift_mm;

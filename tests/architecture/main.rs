@@ -13,16 +13,17 @@ use modules::{Crate, Import};
 use tokens::{after_group, tokens, without_tests};
 
 /// The crates from the ground up; each may depend on those named beside it and on no others of ours.
-const CRATES: [(&str, &[&str]); 9] = [
+const CRATES: [(&str, &[&str]); 10] = [
+    ("files", &[]),
     ("optics", &[]),
     ("mesh", &[]),
     ("springs", &["optics"]),
     ("runtime", &["optics", "springs"]),
     ("design", &["mesh", "optics", "springs"]),
     ("contact", &["mesh", "optics", "springs"]),
-    ("sim", &["contact", "design", "mesh", "optics", "springs"]),
-    ("fab", &["design", "mesh", "optics", "runtime", "sim", "springs"]),
-    ("cli", &["contact", "design", "fab", "mesh", "optics", "runtime", "sim", "springs"]),
+    ("sim", &["contact", "design", "files", "mesh", "optics", "springs"]),
+    ("fab", &["design", "files", "mesh", "optics", "runtime", "sim", "springs"]),
+    ("cli", &["contact", "design", "fab", "files", "mesh", "optics", "runtime", "sim", "springs"]),
 ];
 
 const MAX_FILE_LINES: usize = 400;
@@ -146,6 +147,12 @@ fn crates_depend_only_on_those_below() {
         assert!(allowed.iter().all(|other| below.contains(other)), "CRATES is in order at {name}");
     }
     assert_none(&faults, "a crate depends only on crates that CRATES allows it");
+}
+
+#[test]
+fn the_library_shows_nothing_of_the_command_line() {
+    let facade = tokens(&text(&workspace().join("src/lib.rs")));
+    assert!(!facade.iter().any(|token| token.is("domecast_cli")), "src/lib.rs names domecast_cli");
 }
 
 /// Who imports whom: each file, or each module, with the names it takes from others.

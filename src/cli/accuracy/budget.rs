@@ -10,7 +10,7 @@ use super::pose::sightings;
 use domecast_design::Design;
 use domecast_design::layout::Layout;
 use domecast_design::layout::report::LayoutReport;
-use domecast_design::settings::{Off, off_by_tolerances};
+use domecast_design::settings::{TolerancedOptics, toleranced_optics};
 use domecast_design::{claims_of, suspension_of};
 use domecast_fab::constants::{markers_of, resolution_at};
 use domecast_optics::SensorOptics;
@@ -166,7 +166,7 @@ pub fn of_force(design: &Design, constants: &Constants, ladders: &[Ladder]) -> O
         add("centroid noise of one frame", "noise.white_centroid_px", false, sd);
     }
     let t = &sections.tolerances;
-    for Off { what, field, sensors } in off_by_tolerances(optics, t) {
+    for TolerancedOptics { what, field, sensors } in toleranced_optics(optics, t) {
         let squares: f64 = sensors.iter().map(|sensor| off(read(sensor, &markers)).powi(2)).sum();
         add(what, field, false, squares.sqrt());
     }

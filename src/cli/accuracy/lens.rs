@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::clock::{Patience, time};
 use super::ladder::{Ladder, Law, Rung};
 use domecast_design::layout::Layout;
-use domecast_optics::camera::{Lens, Model};
+use domecast_optics::camera::{Lens, LensModel};
 
 /// Newton steps of the ladder.
 const NEWTON_STEPS: [u32; 7] = [0, 1, 2, 3, 4, 5, 6];
@@ -14,7 +14,7 @@ const FIXED_POINT_ROUNDS: [u32; 6] = [2, 5, 10, 20, 40, 80];
 
 /// The ladder for the pixels of the dots; `None` for a lens without distortion, which has nothing to invert.
 pub fn ladder(lens: &Lens, layout: &Layout, asked_px: Option<f64>, patience: Patience) -> Option<Ladder> {
-    if lens.spec().model == Model::Pinhole {
+    if lens.spec().model == LensModel::Pinhole {
         return None;
     }
     let pixels: Vec<DVec2> = layout.dots.iter().map(|dot| dot.image_px).collect();

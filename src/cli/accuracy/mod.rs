@@ -161,7 +161,7 @@ pub fn measure(
     let layout = Layout::new(&spec).map_err(as_design)?;
     let judged = LayoutReport::new(design, &spec, &layout);
     let constants = constants::of(design, &layout)?;
-    let parts = parts::build(&parts::Measures::of(design)?, &layout.hits)?;
+    let parts = parts::build(&parts::Measures::of(design)?, &layout.passes)?;
 
     let (mut ladders, mut left_out) = (Vec::new(), Vec::new());
     let mut keep = |ladder: Option<Ladder>, otherwise: &str| match ladder {

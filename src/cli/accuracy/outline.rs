@@ -39,14 +39,14 @@ pub fn ladder(
     for &tolerance_mm in &tolerances {
         let (mut errors, mut pieces) = (Vec::new(), 0);
         for dot in &layout.dots {
-            let Some(hit) = layout.hits.get(dot.hit) else { continue };
-            let Ok(outline) = projector.plate_outline(dot, hit.hit_from_sensor, tolerance_mm) else {
+            let Some(hit) = layout.passes.get(dot.pass) else { continue };
+            let Ok(outline) = projector.plate_outline(dot, hit.pass_from_sensor, tolerance_mm) else {
                 errors.push(f64::NAN);
                 continue;
             };
             let count = outline.pieces().len();
             pieces += count;
-            let exact = |angle: f64| projector.plate_point(dot, hit.hit_from_sensor, angle).ok();
+            let exact = |angle: f64| projector.plate_point(dot, hit.pass_from_sensor, angle).ok();
             let mut from = outline.start();
             let mut worst = 0.0_f64;
             for (k, &[a, b, to]) in outline.pieces().iter().enumerate() {
@@ -66,7 +66,7 @@ pub fn ladder(
         let (max_error, rms_error, failed) = sizes(errors.iter().copied());
         let time = time(patience, || {
             let made = |dot: &&domecast_design::layout::Dot| {
-                let hit = layout.hits.get(dot.hit).map(|hit| hit.hit_from_sensor).unwrap_or_default();
+                let hit = layout.passes.get(dot.pass).map(|hit| hit.pass_from_sensor).unwrap_or_default();
                 projector.plate_outline(dot, hit, tolerance_mm).is_ok()
             };
             layout.dots.iter().filter(made).count()

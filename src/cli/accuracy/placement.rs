@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 use super::clock::{Patience, time};
 use super::ladder::{Ladder, Law, Rung};
 use domecast_design::layout::Layout;
-use domecast_optics::{Channel, SensorOptics};
+use domecast_optics::{ColorChannel, SensorOptics};
 
 /// Newton steps of the reference: it starts within a pixel and ends at rounding after three.
 const REFERENCE_STEPS: u32 = 6;
@@ -19,7 +19,7 @@ pub fn ladder(
     patience: Patience,
 ) -> Option<Ladder> {
     let mut spec = optics.spec();
-    let channels = Channel::ALL.map(|channel| optics.for_channel(channel));
+    let channels = ColorChannel::ALL.map(|channel| optics.for_channel(channel));
     for layer in &mut spec.layers {
         layer.index = [1.0; 3];
     }

@@ -31,27 +31,73 @@ pub(crate) struct Settled {
     pub work: f64,
 }
 
-/// A sum of products in eight lanes, in a fixed order.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a8.zip(b8) {
-        for k in 0..8 {
-            lanes[k] += x[k] * y[k];
+/// Lanes that sums of products are taken in, in a fixed order: what the compiler makes vectors of.
+const LANES: usize = 8;
+
+/// Adds eight products to a row's sums.
+#[inline(always)]
+fn add_products(sums: &mut [f64; LANES], row: &[f64], forces: &[f64; LANES]) {
+    if let Some(row) = row.first_chunk::<LANES>() {
+        for k in 0..LANES {
+            sums[k] += row[k] * forces[k];
         }
     }
-    lanes.iter().sum::<f64>() + rest
+}
+
+/// Three rows times the forces, by the chunks of [`LANES`] columns that are named; the columns after the last whole chunk
+/// are always taken.
+#[inline(always)]
+fn three_rows(rows: &[f64], forces: &[f64], chunks: impl Iterator<Item = usize>) -> DVec3 {
+    let width = forces.len();
+    let (x, rest) = rows.split_at(width);
+    let (y, z) = rest.split_at(width);
+    let mut sums = [[0.0; LANES]; 3];
+    for chunk in chunks {
+        let at = LANES * chunk;
+        let Some(part) = forces.get(at..).and_then(|part| part.first_chunk::<LANES>()) else { continue };
+        add_products(&mut sums[0], &x[at..], part);
+        add_products(&mut sums[1], &y[at..], part);
+        add_products(&mut sums[2], &z[at..], part);
+    }
+    let last = width - width % LANES;
+    let [x, y, z] = [x, y, z].map(|row| {
+        let tail = row[last..width].iter().zip(&forces[last..]);
+        tail.map(|(c, f)| c * f).sum::<f64>()
+    });
+    DVec3::new(
+        sums[0].iter().sum::<f64>() + x,
+        sums[1].iter().sum::<f64>() + y,
+        sums[2].iter().sum::<f64>() + z,
+    )
 }
 
 /// A node's displacement: its three rows of the compliance times all forces.
 pub(crate) fn displacement(rows: &[f64], forces: &[f64]) -> DVec3 {
-    let width = forces.len();
-    DVec3::new(
-        dot(&rows[..width], forces),
-        dot(&rows[width..2 * width], forces),
-        dot(&rows[2 * width..], forces),
-    )
+    three_rows(rows, forces, 0..forces.len() / LANES)
+}
+
+/// The chunks of columns with a force: the others add nothing to any sum.
+#[derive(Default)]
+struct Loaded {
+    /// Numbers of the chunks, in order.
+    chunks: Vec<usize>,
+}
+
+impl Loaded {
+    fn of(forces: &[f64]) -> Self {
+        let chunks = forces.chunks_exact(LANES).enumerate();
+        let loaded = chunks.filter(|(_, part)| part.iter().any(|f| *f != 0.0));
+        Self { chunks: loaded.map(|(chunk, _)| chunk).collect() }
+    }
+
+    /// A node's force at a place may no longer be zero.
+    fn add(&mut self, at: usize) {
+        for chunk in [at / LANES, (at + 2) / LANES] {
+            if let Err(place) = self.chunks.binary_search(&chunk) {
+                self.chunks.insert(place, chunk);
+            }
+        }
+    }
 }
 
 /// A node's own compliance: the block, along the plane's normal, and the larger one along the plane.
@@ -96,9 +142,13 @@ pub(crate) fn sweeps(
         ended.sweeps += 1;
         ended.work += (width * width) as f64;
         ended.change_mm = 0.0;
-        for (i, (node, own)) in nodes.iter().zip(&owns).enumerate() {
-            let change_mm = turn(rows(i), (node, own), friction, 3 * i, forces);
-            ended.change_mm = ended.change_mm.max(change_mm);
+        let mut loaded = Loaded::of(forces);
+        for (i, node) in nodes.iter().zip(&owns).enumerate() {
+            let u = three_rows(rows(i), forces, loaded.chunks.iter().copied());
+            if let Some(change_mm) = turn(u, node, friction, &mut forces[3 * i..3 * i + 3]) {
+                ended.change_mm = ended.change_mm.max(change_mm);
+                loaded.add(3 * i);
+            }
         }
         let bears = |i: &usize| forces[3 * i..3 * i + 3].iter().any(|f| *f != 0.0);
         bearing.clear();
@@ -123,8 +173,11 @@ pub(crate) fn sweeps(
             count += 1;
             ended.sweeps += 1;
             for ((k, &i), rows) in bearing.iter().enumerate().zip(few_blocks.chunks_exact(3 * few)) {
-                change_mm =
-                    change_mm.max(turn(rows, (&nodes[i], &owns[i]), friction, 3 * k, &mut few_forces));
+                let u = displacement(rows, &few_forces);
+                let node = (&nodes[i], &owns[i]);
+                if let Some(moved_mm) = turn(u, node, friction, &mut few_forces[3 * k..3 * k + 3]) {
+                    change_mm = change_mm.max(moved_mm);
+                }
             }
         }
         ended.work += f64::from(count + 1) * (few * few) as f64;
@@ -135,11 +188,10 @@ pub(crate) fn sweeps(
     ended
 }
 
-/// A node takes the force that its gap and slip ask for, the others held; how far that moves it, mm. `rows` are its
-/// three of the compliance, `at` is the place of its force.
-fn turn(rows: &[f64], (node, own): (&Node, &Own), friction: f64, at: usize, forces: &mut [f64]) -> f64 {
-    let old = DVec3::from_slice(&forces[at..at + 3]);
-    let mut u = displacement(rows, forces);
+/// A node takes the force that its gap and slip ask for, the others held; how far that moves it, mm, if the force changes.
+/// `u` is its displacement by all forces.
+fn turn(mut u: DVec3, (node, own): (&Node, &Own), friction: f64, force: &mut [f64]) -> Option<f64> {
+    let old = DVec3::from_slice(force);
     let pressed = old.dot(node.normal);
     let gap = node.rest_gap_mm + node.normal.dot(u);
     let press = (pressed - RELAXATION * gap / own.normal).max(0.0);
@@ -152,8 +204,8 @@ fn turn(rows: &[f64], (node, own): (&Node, &Own), friction: f64, at: usize, forc
     }
     let new = node.normal * press + rub;
     if new == old {
-        return 0.0;
+        return None;
     }
-    forces[at..at + 3].copy_from_slice(&new.to_array());
-    (own.block * (new - old)).length()
+    force.copy_from_slice(&new.to_array());
+    Some((own.block * (new - old)).length())
 }

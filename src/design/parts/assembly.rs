@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::measures::Measures;
-use super::{Part, PartError, bought};
+use super::{Part, PartError, purchased};
 use crate::spec::sections::LedColor;
 use domecast_mesh::{Chord, MeshError, Piece, Solid, TriMesh};
 use domecast_optics::numeric::Rigid;
@@ -68,19 +68,19 @@ impl Assembly {
                 .map(|mesh| mesh.transformed(&piece.part_from_shape))
                 .map_err(|error| PartError::Mesh { part: piece.name.clone(), error })
         };
-        a.push("camera", [0.12, 0.12, 0.13, 1.0], Body::Fixed, piece(&bought::camera(m))?, -0.35 * lift);
-        a.push("dome", [0.93, 0.93, 0.90, 0.55], Body::Moving, piece(&bought::dome(m))?, 1.4 * lift);
+        a.push("camera", [0.12, 0.12, 0.13, 1.0], Body::Fixed, piece(&purchased::camera(m))?, -0.35 * lift);
+        a.push("dome", [0.93, 0.93, 0.90, 0.55], Body::Moving, piece(&purchased::dome(m))?, 1.4 * lift);
         for i in 0..m.spring_axes_mm.len() {
-            let [upper, lower] = bought::magnets(m, i);
+            let [upper, lower] = purchased::magnets(m, i);
             a.push(&upper.name, STEEL, Body::Moving, piece(&upper)?, 0.25 * lift);
             a.push(&lower.name, STEEL, Body::Fixed, piece(&lower)?, -0.5 * lift);
             let coarse = Chord::new(m.chord.tolerance_mm().max(0.1 * m.spring_wire_mm));
-            let wire = coarse.and_then(|chord| bought::spring_wire(m, i, &Rigid::identity(), chord));
+            let wire = coarse.and_then(|chord| purchased::spring_wire(m, i, &Rigid::identity(), chord));
             let wire = wire.map_err(|error| PartError::Mesh { part: format!("spring {i}"), error })?;
             a.push(&format!("spring {i}"), STEEL, Body::Spring, wire, -0.1 * lift);
         }
         for (i, led) in m.leds.list.iter().enumerate() {
-            let [package, board] = bought::led(m, i);
+            let [package, board] = purchased::led(m, i);
             let color = match led.color {
                 LedColor::Red => [0.90, 0.15, 0.12, 1.0],
                 LedColor::Green => [0.15, 0.75, 0.25, 1.0],

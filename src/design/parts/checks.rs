@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::assembly::{Body, affine};
 use super::measures::Measures;
 use super::view::sight_lines;
-use super::{Assembly, Part, PartError, Pose, bought, process, undercut};
+use super::{Assembly, Part, PartError, Pose, process, purchased, undercut};
 use domecast_mesh::{BoundingBox, Chord, MeshError, Piece, RayTarget, Solid, TriMesh};
 use domecast_optics::numeric::Rigid;
 
@@ -70,7 +70,7 @@ fn field_of(name: &str) -> &'static str {
 
 /// The whole stack at rest, the membrane included, fits its envelope.
 fn envelope(m: &Measures, assembly: &Assembly) -> Result<(), PartError> {
-    let membrane = bought::membrane(m);
+    let membrane = purchased::membrane(m);
     let membrane = membrane.shape.triangulate("membrane", m.chord).map_err(|e| mesh_error("membrane", e))?;
     let all = assembly.items.iter().filter_map(|item| item.mesh.bounds()).chain(membrane.bounds());
     let Some(bounds) = all.reduce(|a, b| a.union(&b)) else { return Ok(()) };
@@ -186,7 +186,7 @@ struct Spring {
 
 impl Spring {
     fn new(m: &Measures, i: usize, rest_from_platform: &Rigid, chord: Chord) -> Result<Self, MeshError> {
-        let (tube, around) = bought::spring_tube(m, i, rest_from_platform, chord)?;
+        let (tube, around) = purchased::spring_tube(m, i, rest_from_platform, chord)?;
         let rings: Vec<BoundingBox> = tube.vertices_mm.chunks(around).filter_map(BoundingBox::of).collect();
         let stretches: Vec<BoundingBox> = rings.windows(2).map(|two| two[0].union(&two[1])).collect();
         let first = tube.vertices_mm.get(..around).unwrap_or_default();
@@ -223,8 +223,8 @@ impl Scene {
             Self { fixed: Vec::new(), moving: Vec::new(), upper: RayTarget::new(&TriMesh::default()) };
         for item in &assembly.items {
             let solid = match item.name.as_str() {
-                "dome" => coarse(&bought::dome(m))?,
-                "camera" => coarse(&bought::camera(m))?,
+                "dome" => coarse(&purchased::dome(m))?,
+                "camera" => coarse(&purchased::camera(m))?,
                 _ if item.body == Body::Spring => continue,
                 _ => item.solid().map_err(|e| mesh_error(&item.name, e))?,
             };

@@ -57,7 +57,7 @@ pub(crate) struct Blueprint {
     pub may_meet: &'static [(&'static str, &'static str)],
     /// Handles, by the count of holes.
     pub genus: i64,
-    /// Whether there may be more handles than that, which the mesh then tells.
+    /// Whether there may be more holes through the part than that, which the mesh then tells.
     pub genus_is_least: bool,
     /// Tolerance of ordinary faces.
     pub chord: Chord,

@@ -8,7 +8,9 @@ use super::assembly::{Assembly, Item};
 use super::measures::Measures;
 use super::{Part, PartError, bom, drawing};
 use crate::spec::Design;
-use domecast_mesh::{Brep, GlbItem, GlbScene, PictureItem, View, shade, write_3mf, write_glb};
+use domecast_mesh::{
+    GlbItem, GlbScene, PictureItem, StepError, View, shade, write_3mf, write_glb, write_step,
+};
 
 /// A file of a build.
 #[derive(Debug, Clone)]
@@ -23,11 +25,11 @@ pub struct PartFile {
 const PICTURE: (u32, u32) = (480, 360);
 const VIEW: View = View { azimuth_deg: -60.0, elevation_deg: 35.0 };
 
-/// Whether a part's STEP has exact faces or triangles.
-pub(super) fn step(part: &Part) -> (Brep, bool) {
-    match Brep::exact(&part.construction) {
-        Some(brep) => (brep, true),
-        None => (Brep::faceted(&part.mesh), false),
+/// A part's STEP: exact faces where they can be built, else its triangles, and `_faceted` in the title.
+fn step(part: &Part) -> Result<String, StepError> {
+    match part.exact_solid() {
+        Some(solid) => write_step(&solid, &part.name),
+        None => write_step(&part.mesh.faceted_solid(), &format!("{}_faceted", part.name)),
     }
 }
 
@@ -57,14 +59,14 @@ pub fn files(
         .par_iter()
         .map(|part| {
             let name = &part.name;
-            let (brep, is_exact) = step(part);
-            let title = if is_exact { name.clone() } else { format!("{name}_faceted") };
+            let step_path = format!("parts/{name}.step");
+            let step = step(part).map_err(|error| refused(&step_path, &error))?;
             let picture =
                 [PictureItem { mesh: &part.mesh, shift_mm: glam::DVec3::ZERO, color: [0.72, 0.79, 0.88] }];
             Ok(vec![
                 written(format!("parts/{name}.stl"), &|w| part.write_stl(w))?,
                 written(format!("parts/{name}.3mf"), &|w| write_3mf(&[(name, &part.mesh)], w))?,
-                PartFile { path: format!("parts/{name}.step"), bytes: brep.to_step(&title).into_bytes() },
+                PartFile { path: step_path, bytes: step.into_bytes() },
                 png(format!("report/{name}.png"), &picture, VIEW)?,
             ])
         })

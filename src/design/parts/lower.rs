@@ -97,7 +97,7 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
             let field = "platforms.lower.cable_exit.height_mm";
             return Err(b.infeasible("roof over the cable exit", roof, m.process.min_wall_mm, field));
         }
-        // Open below and joined to the bore: a notch, no handle.
+        // Open below and joined to the bore: a notch, no hole through the part.
         let w = 0.5 * exit.width_mm;
         let channel =
             Shape::cuboid(DVec3::new(0.0, -w, bottom - over), DVec3::new(reach, w, bottom + exit.height_mm));

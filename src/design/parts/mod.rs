@@ -3,7 +3,7 @@
 //! Every dimension comes from the resolved design through [`Measures`]; a part
 //! is first a [`Construction`] of exact shapes, then a mesh. What a part should
 //! be is stated beside it, from the count of its features and not from the
-//! mesh: the number of handles ([`Part::genus`]) is checked against the mesh by
+//! mesh: the number of holes through it ([`Part::genus`]) is checked against the mesh by
 //! [`Part::check`], and again by independent programs that read the written
 //! file.
 //!
@@ -13,7 +13,6 @@
 mod accessories;
 mod assembly;
 mod bom;
-mod bought;
 mod checks;
 mod drawing;
 mod error;
@@ -24,6 +23,7 @@ mod measures;
 mod mould;
 mod poses;
 mod process;
+mod purchased;
 mod sight;
 mod undercut;
 mod upper;
@@ -48,9 +48,9 @@ pub use poses::Pose;
 pub use sight::{EdgeRay, MarkerView, markers_of};
 pub use view::ViewCone;
 
-use crate::layout::Hit;
+use crate::layout::PrintPass;
 use crate::spec::sections::LedsSection;
-use domecast_mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, write_stl};
+use domecast_mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, truck_modeling, write_stl};
 
 /// One part, ready to be written.
 #[derive(Debug, Clone)]
@@ -70,7 +70,7 @@ pub struct Part {
     pub volume_mm3: f64,
     /// Surface, mm^2.
     pub area_mm2: f64,
-    /// Handles that the part has by the count of its holes.
+    /// Holes through the part, by the count of its features.
     pub genus: i64,
     /// Box of the mesh.
     pub bounds: BoundingBox,
@@ -115,7 +115,7 @@ impl Part {
         inspect(&self.mesh)
     }
 
-    /// One closed solid with the handles that were designed?
+    /// One closed solid with as many holes through it as were designed?
     ///
     /// # Errors
     /// [`PartError::Broken`] with what is wrong.
@@ -125,7 +125,7 @@ impl Part {
             let genus = found.genus()?;
             (genus != self.genus).then(|| {
                 format!(
-                    "its mesh has {genus} handles, its features make {}: features touch or miss",
+                    "its mesh has {genus} holes through the part, its features make {}: features touch or miss",
                     self.genus
                 )
             })
@@ -134,6 +134,12 @@ impl Part {
             None => Ok(()),
             Some(problem) => Err(PartError::Broken { part: self.name.clone(), problem }),
         }
+    }
+
+    /// The part with exact faces, to be measured, written or worked on with `truck-modeling`; `None` if it is no
+    /// plate with upright, separate features.
+    pub fn exact_solid(&self) -> Option<truck_modeling::Solid> {
+        self.construction.exact_solid()
     }
 
     /// Writes the mesh as binary STL.
@@ -164,7 +170,7 @@ pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
 ///
 /// # Errors
 /// The first part, in that order, that cannot be made.
-pub fn build(m: &Measures, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
+pub fn build(m: &Measures, hits: &[PrintPass]) -> Result<Vec<Part>, PartError> {
     let makers: [Maker; 7] = [
         upper::blueprint,
         lower::blueprint,

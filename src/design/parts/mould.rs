@@ -68,7 +68,7 @@ pub(super) fn cavity(m: &Measures) -> Result<Blueprint, PartError> {
         );
         b.cut.push(Feature::new("pin hole", "mould.pins", hole).numbered(i).at(at[0], at[1]));
     }
-    // Blind holes only: no handle.
+    // Blind holes only: none goes through.
     Ok(b)
 }
 

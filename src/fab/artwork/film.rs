@@ -56,12 +56,12 @@ pub fn film(
     pad_over_image: f64,
     label: &FilmLabel,
 ) -> Result<Drawing, NotFinite> {
-    let dots = layout.dots.iter().filter(|dot| dot.hit == hit);
+    let dots = layout.dots.iter().filter(|dot| dot.pass == hit);
     let marks: Vec<Mark<'_>> =
         dots.map(|dot| Mark { id: dot.id, plate_mm: dot.plate_mm, outline: &dot.plate_outline }).collect();
-    let films = layout.hits.len();
+    let films = layout.passes.len();
     let (tilt_deg, azimuth_deg) = layout
-        .hits
+        .passes
         .get(hit)
         .map_or((0.0, 0.0), |hit| (hit.tilt_rad.to_degrees(), hit.azimuth_rad.to_degrees()));
     let jig = if tilt_deg == 0.0 {

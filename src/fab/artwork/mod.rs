@@ -80,7 +80,7 @@ pub fn film_path(hit: usize, kind: &str) -> String {
 /// See [`RenderError`].
 pub fn files(spec: &LayoutSpec, layout: &Layout, label: &FilmLabel) -> Result<Vec<ArtworkFile>, RenderError> {
     let mut files = Vec::new();
-    for hit in 0..layout.hits.len() {
+    for hit in 0..layout.passes.len() {
         let drawing = film(layout, hit, spec.print.pad_over_image, label)?;
         files.extend(film_files(&drawing, |kind| film_path(hit, kind), spec)?);
     }

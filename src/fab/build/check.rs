@@ -147,7 +147,7 @@ fn check_constants(report: &mut CheckReport, dir: &Path, design: &Design, consta
     report.add("constants: dots and markers in the image", dots_in_image(design, constants));
     report.add("constants: neighbours", neighbors(constants));
     // one film for each hit of the pad; together they hold every dot once
-    let films = (0..layout.hits.len()).map(|hit| read(dir, &artwork::film_path(hit, "svg")));
+    let films = (0..layout.passes.len()).map(|hit| read(dir, &artwork::film_path(hit, "svg")));
     let films: Result<Vec<String>, String> = films.collect();
     report.add("artwork: films", films.and_then(|texts| check_svg(&texts.join("\n"), &layout, constants)));
 }
@@ -230,12 +230,12 @@ fn check_svg(text: &str, layout: &Layout, constants: &Constants) -> Result<Strin
         if std::mem::replace(seen, true) {
             return Err(format!("dot {id} is drawn twice"));
         }
-        let on_hit = layout.transfer.dome_from_plate(DVec2::new(x_mm, y_mm));
-        let on_hit = on_hit.map_err(|limit| format!("dot {id} lies outside the transfer map ({limit})"))?;
-        let Some(hit) = layout.hits.get(laid_out.hit) else {
+        let on_pass = layout.transfer.dome_from_plate(DVec2::new(x_mm, y_mm));
+        let on_pass = on_pass.map_err(|limit| format!("dot {id} lies outside the transfer map ({limit})"))?;
+        let Some(hit) = layout.passes.get(laid_out.pass) else {
             return Err(format!("dot {id} belongs to no hit"));
         };
-        let surface = hit.hit_from_sensor.transpose() * on_hit;
+        let surface = hit.pass_from_sensor.transpose() * on_pass;
         let off_mm = surface.distance(DVec3::from_array(dot.surface_mm));
         if off_mm.is_nan() || off_mm > ARTWORK_TOLERANCE_MM {
             return Err(format!("dot {id} lands {off_mm:.3e} mm beside its surface_mm"));

@@ -270,7 +270,7 @@ fn make_parts(
     springs: &constants::DesignSprings,
 ) -> Result<MadeParts, PartError> {
     let measures = springs.sight.measures()?;
-    let made = parts::build(measures, &layout.hits)?;
+    let made = parts::build(measures, &layout.passes)?;
     let assembly = parts::Assembly::of(measures, &made)?;
     parts::check_assembly(measures, &made, &assembly)?;
     let files = parts::files(design, measures, &made, &assembly)?;

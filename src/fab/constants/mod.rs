@@ -19,7 +19,7 @@ pub use springs::{DesignSprings, claimed_loads, springs_of};
 
 use domecast_design::layout::Layout;
 use domecast_design::{Design, DesignError};
-use domecast_optics::Channel;
+use domecast_optics::ColorChannel;
 use domecast_runtime::constants::{
     BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants,
     OpticsConstants, VERSION, WhiteMarker,
@@ -75,8 +75,9 @@ pub fn with_springs(
                 .iter()
                 .map(|layer| LayerConstants {
                     name: layer.name.clone(),
-                    index: layer.index_for(Channel::Green),
-                    index_rgb: (layer.index != [layer.index_for(Channel::Green); 3]).then_some(layer.index),
+                    index: layer.index_for(ColorChannel::Green),
+                    index_rgb: (layer.index != [layer.index_for(ColorChannel::Green); 3])
+                        .then_some(layer.index),
                     thickness_mm: layer.thickness_mm,
                 })
                 .collect(),

@@ -8,7 +8,7 @@ use crate::html::{AsHtml, Html};
 use crate::numbers::typeset;
 use domecast_design::Design;
 use domecast_optics::camera::Lens;
-use domecast_optics::{Channel, SensorOptics};
+use domecast_optics::{ColorChannel, SensorOptics};
 
 /// Rays on either side of the axis.
 const RAYS_A_SIDE: u32 = 8;
@@ -29,7 +29,8 @@ pub fn ray_points(optics: &SensorOptics, pixel: DVec2) -> Option<Vec<DVec3>> {
         faces_mm.push(below);
     }
     faces_mm.reverse();
-    let indices: Vec<f64> = optics.layers().iter().map(|layer| layer.index_for(Channel::Green)).collect();
+    let indices: Vec<f64> =
+        optics.layers().iter().map(|layer| layer.index_for(ColorChannel::Green)).collect();
     for (face_mm, pair) in faces_mm.iter().zip(indices.windows(2)) {
         if along.z <= 0.0 {
             return None;

@@ -17,21 +17,21 @@ use super::shade::LitDome;
 use super::tables::{Prepared, Source, Ways};
 use crate::shading::Moved;
 use crate::{EffectName, Shading, SurfaceSample, Work};
-use domecast_optics::camera::{LensSpec, Model};
+use domecast_optics::camera::{LensModel, LensSpec};
 use domecast_optics::numeric::Rigid;
-use domecast_optics::{Layer, OpticsSpec, SensorOptics};
+use domecast_optics::{FlatLayer, OpticsSpec, SensorOptics};
 
 const WIDE: DVec2 = DVec2::splat(1e6);
 
 /// A sensor with a sheet of the given indices, 1 mm of each, and a dome of radius 10 mm.
 fn sensor(sheet: &[f64], dome: f64) -> SensorOptics {
-    let mut layers: Vec<Layer> = sheet
+    let mut layers: Vec<FlatLayer> = sheet
         .iter()
-        .map(|&n| Layer { name: "sheet".into(), index: [n; 3], thickness_mm: Some(1.0) })
+        .map(|&n| FlatLayer { name: "sheet".into(), index: [n; 3], thickness_mm: Some(1.0) })
         .collect();
-    layers.push(Layer { name: "dome".into(), index: [dome; 3], thickness_mm: None });
+    layers.push(FlatLayer { name: "dome".into(), index: [dome; 3], thickness_mm: None });
     let lens = LensSpec {
-        model: Model::Pinhole,
+        model: LensModel::Pinhole,
         width: 640,
         height: 480,
         matrix: [[200.0, 0.0, 319.5], [0.0, 200.0, 239.5], [0.0, 0.0, 1.0]],
@@ -648,14 +648,14 @@ fn irradiance_is_that_of_mitsuba() {
 fn dots_are_seen_where_mitsuba_sees_them() {
     let golden = golden();
     let focal = number(&golden["focal_px"]);
-    let layer = |n: &serde_json::Value, thickness_mm| Layer {
+    let layer = |n: &serde_json::Value, thickness_mm| FlatLayer {
         name: "layer".into(),
         index: [number(n); 3],
         thickness_mm,
     };
     let optics = SensorOptics::new(&OpticsSpec {
         lens: LensSpec {
-            model: Model::Pinhole,
+            model: LensModel::Pinhole,
             width: 640,
             height: 480,
             matrix: [[focal, 0.0, 319.5], [0.0, focal, 239.5], [0.0, 0.0, 1.0]],

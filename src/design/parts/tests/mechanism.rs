@@ -1,7 +1,7 @@
 //! Springs as they bend, the corners of the load envelope, and the mould as it opens.
 
 use super::*;
-use crate::parts::bought;
+use crate::parts::purchased;
 use crate::parts::undercut::{Undercut, undercut};
 use domecast_mesh::{Chord, Construction};
 use domecast_optics::numeric::Rigid;
@@ -57,9 +57,9 @@ fn bent_springs_stand_flat_on_both_seats() {
     let chord = Chord::new(0.01).unwrap();
     let tilt = Rigid::new(glam::DMat3::from_rotation_y(0.08), DVec3::new(0.5, -0.3, -0.9));
     for i in 0..m.spring_axes_mm.len() {
-        let (tube, _) = bought::spring_tube(&m, i, &tilt, chord).unwrap();
+        let (tube, _) = purchased::spring_tube(&m, i, &tilt, chord).unwrap();
         assert!(domecast_mesh::inspect(&tube).is_one_solid());
-        let [low, high] = bought::spring_ends_mm(&m, i, &tilt);
+        let [low, high] = purchased::spring_ends_mm(&m, i, &tilt);
         let up = tilt.vector(DVec3::Z);
         for &p in &tube.vertices_mm {
             assert!(p.z > low.z && (p - high).dot(up) < 0.0, "{p} digs into a seat");

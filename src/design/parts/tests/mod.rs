@@ -18,8 +18,8 @@ fn thumb24() -> Design {
     Design::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json"))).unwrap()
 }
 
-fn hits() -> Vec<Hit> {
-    vec![Hit::new(0.0, 0.0)]
+fn hits() -> Vec<PrintPass> {
+    vec![PrintPass::new(0.0, 0.0)]
 }
 
 fn solid(part: &Part) -> Solid {
@@ -103,7 +103,7 @@ fn window_lets_the_view_through() {
 
 /// The camera, the sheet and the dome as solids fit where the design says.
 #[test]
-fn bought_parts_fit_their_seats() {
+fn purchased_parts_fit_their_seats() {
     let design = thumb24();
     let m = Measures::of(&design).unwrap();
     let parts = build(&m, &hits()).unwrap();

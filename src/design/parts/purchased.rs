@@ -1,4 +1,4 @@
-//! Stand-ins for what is bought or cast, for pictures and interference checks.
+//! Stand-ins for what is purchased or cast, for pictures and interference checks.
 
 use std::f64::consts::{PI, TAU};
 

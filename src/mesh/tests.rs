@@ -249,3 +249,40 @@ fn rays_and_boxes_find_what_a_look_at_every_triangle_finds() {
     let nothing = RayTarget::new(&TriMesh::default());
     assert!(!nothing.is_hit(DVec3::ZERO, DVec3::ONE) && nothing.first_hit(DVec3::ZERO, DVec3::ONE).is_none());
 }
+
+/// Domes cut from above and from below, a counterbore, a cone and a pin: every kind of revolved face, with the axis'
+/// pole at either end.
+#[test]
+fn exact_solids_hold_every_kind_of_turned_feature() {
+    let dome = |low: f64, high: f64, center_z_mm: f64, poles_low: bool| {
+        let points = if poles_low { [(0.0, low), (3.0, high)] } else { [(3.0, low), (0.0, high)] };
+        Shape::Turned {
+            profile: Profile {
+                points_mm: points.map(|(r, z)| DVec2::new(r, z)).to_vec(),
+                edges: vec![ProfileEdge::Arc { center_z_mm }],
+            },
+            fit: Fit::Area,
+        }
+    };
+    let turned = |points: &[(f64, f64)]| Shape::Turned { profile: Profile::lines(points), fit: Fit::Area };
+    let plate = Shape::rounded_plate(DVec2::new(40.0, 20.0), 2.0, 0.0, 8.0);
+    let part = Construction {
+        added: vec![
+            Piece::new("plate", plate),
+            Piece::new("pin", turned(&[(1.0, 7.0), (1.0, 10.0), (0.5, 10.5)])).at(0.0, 7.0),
+        ],
+        cut: vec![
+            Piece::new("dome from above", dome(5.0, 8.0, 8.0, true)).at(-14.0, 0.0),
+            Piece::new("dome from below", dome(0.0, 3.0, 0.0, false)).at(14.0, 0.0),
+            Piece::new("counterbore", turned(&[(1.0, -1.0), (1.0, 4.0), (2.0, 4.0), (2.0, 9.0)]))
+                .at(-5.0, 0.0),
+            Piece::new("countersink", turned(&[(1.0, -1.0), (1.0, 6.0), (3.0, 8.0)])).at(5.0, 0.0),
+        ],
+    };
+    let solid = part.exact_solid().unwrap();
+    let step = write_step(&solid, "it's").unwrap();
+    assert_eq!(step.matches("=SPHERICAL_SURFACE(").count(), 2 * 3);
+    assert_eq!(step.matches("=CONICAL_SURFACE(").count(), 2 * 3);
+    assert_eq!(step.matches("=CYLINDRICAL_SURFACE(").count(), 4 + 4 * 3);
+    assert_eq!(step.matches("'it''s'").count(), 4);
+}

@@ -162,7 +162,7 @@ pub fn upper_platform(measures: &Measures) -> Result<Construction, PartError> {
 /// Pose of LED `i`: origin at the centre of its emitting face, x across the board, y up the board, z out of the
 /// emitting face; sensor frame.
 pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
-    upper::platform_from_led(leds, i)
+    measures::platform_from_led(leds, i)
 }
 
 /// Makes all parts, in a fixed order, and checks each against the process. One

@@ -11,8 +11,8 @@ use glam::DVec2;
 use pdf_writer::types::TextRenderingMode;
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 
-use super::RenderError;
 use super::drawing::{Drawing, Ink, Item, Path, Segment, Text};
+use super::error::RenderError;
 use super::strokes;
 
 /// PDF's unit is a point, 1/72 inch.

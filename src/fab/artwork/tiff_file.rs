@@ -12,7 +12,8 @@ use tiff::tags::{CompressionMethod, PhotometricInterpretation, ResolutionUnit, T
 use tiny_skia::{FillRule, Mask, PathBuilder, Stroke, Transform};
 
 use super::drawing::{Drawing, Ink, Item, Path, Segment, Shape};
-use super::{RenderError, strokes};
+use super::error::RenderError;
+use super::strokes;
 
 /// Rows of a band: also the rows of a strip.
 const BAND_ROWS: u32 = 256;

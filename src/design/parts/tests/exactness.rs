@@ -146,8 +146,11 @@ fn exact_volumes_by_opencascade(parts: &[Part]) -> Option<Vec<f64>> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("constructions.json");
     std::fs::write(&path, serde_json::to_vec(&all).unwrap()).unwrap();
-    let said =
-        std::process::Command::new(python).arg("scripts/exact_volumes.py").arg(&path).output().unwrap();
+    let said = std::process::Command::new(python)
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exact_volumes.py"))
+        .arg(&path)
+        .output()
+        .unwrap();
     if said.status.code() == Some(3) {
         println!("skipped: OpenCASCADE (cadquery-ocp) is not installed");
         return None;
@@ -235,18 +238,6 @@ fn step_keeps_exact_faces_where_it_can() {
     assert_eq!(exact, ["mould_cavity", "mould_base", "acrylic_sheet", "marker_stencil", "fit_coupon"]);
     // Block: 6 faces; cavity: the thirds of a half sphere and of a cylinder; three blind holes of three thirds of a
     // cylinder and a floor.
-    // TEMP
-    for part in &parts {
-        let (t, solid) = (std::time::Instant::now(), part.exact_solid());
-        let built = t.elapsed();
-        let text = match &solid {
-            Some(s) => write_step(s, &part.name),
-            None => write_step(&part.mesh.faceted_solid(), &format!("{}_faceted", part.name)),
-        }
-        .unwrap();
-        println!("{} {:?} {:?} {} bytes {} mm3", part.name, built, t.elapsed(), text.len(), part.volume_mm3);
-        std::fs::write(format!("/tmp/deps-step/{}.step", part.name), text).unwrap();
-    }
     let cavity = parts[2].exact_solid().unwrap();
     assert_eq!(cavity.face_iter().count(), 6 + 6 + 3 * 4);
     let step = write_step(&cavity, "mould_cavity").unwrap();

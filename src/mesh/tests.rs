@@ -9,7 +9,7 @@ fn chord(t: f64) -> Chord {
     Chord::new(t).unwrap()
 }
 
-const LADDER: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
+const SWEEP_MM: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 const FITS: [Fit; 3] = [Fit::Inside, Fit::Outside, Fit::Area];
 
 /// A dome on a cylinder: the shape of a mould's cavity.
@@ -32,7 +32,7 @@ fn dome_distance(p: DVec3) -> f64 {
 
 #[test]
 fn sides_keep_the_chord_tolerance_and_no_more() {
-    for tolerance in LADDER {
+    for tolerance in SWEEP_MM {
         for radius in [0.25, 3.0, 12.0, 200.0] {
             let sagitta = |n: f64| radius * (1.0 - (PI / n).cos());
             let n = f64::from(chord(tolerance).circle_segments(radius, Fit::Inside).unwrap());
@@ -48,7 +48,7 @@ fn sides_keep_the_chord_tolerance_and_no_more() {
 
 #[test]
 fn dome_stays_within_tolerance_and_on_the_promised_side() {
-    for tolerance in LADDER {
+    for tolerance in SWEEP_MM {
         for fit in FITS {
             let mesh = dome(fit).triangulate("dome", chord(tolerance)).unwrap();
             let report = inspect(&mesh.welded_f32());
@@ -236,10 +236,10 @@ fn rays_and_boxes_find_what_a_look_at_every_triangle_finds() {
     let (mut hits, mut near) = (0, 0);
     for _ in 0..300 {
         let (from, to) = (point(), point());
-        let least = alone.iter().filter_map(|(one, _)| Some(one.first_hit(from, to)?.0)).reduce(f64::min);
-        assert_eq!(target.first_hit(from, to).map(|(t, _)| t), least, "{from} {to}");
-        assert_eq!(target.is_hit(from, to), least.is_some(), "{from} {to}");
-        hits += usize::from(least.is_some());
+        let nearest = alone.iter().filter_map(|(one, _)| Some(one.first_hit(from, to)?.0)).reduce(f64::min);
+        assert_eq!(target.first_hit(from, to).map(|(t, _)| t), nearest, "{from} {to}");
+        assert_eq!(target.is_hit(from, to), nearest.is_some(), "{from} {to}");
+        hits += usize::from(nearest.is_some());
         let bounds = BoundingBox::of(&[from, from.lerp(to, 0.1)]).unwrap();
         let touched = alone.iter().any(|(_, own)| !own.is_apart_from(&bounds));
         assert_eq!(target.comes_near(&bounds), touched, "{bounds:?}");

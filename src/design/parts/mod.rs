@@ -38,7 +38,7 @@ use std::io::{self, Write};
 use glam::DAffine3;
 use rayon::prelude::*;
 
-pub use assembly::{Assembly, Item};
+pub use assembly::{Assembly, AssemblyItem};
 pub use checks::check_assembly;
 pub use error::PartError;
 use feature::{Blueprint, Feature};
@@ -90,7 +90,7 @@ impl Blueprint {
         let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
         let genus = match inspect(&mesh).genus() {
-            Some(found) if self.genus_is_least => found.max(self.genus),
+            Some(found) if self.genus_is_min => found.max(self.genus),
             _ => self.genus,
         };
         let part = Part {

@@ -87,7 +87,7 @@ fn holes(m: &Measures) -> Result<(), PartError> {
 fn gaps(m: &Measures) -> Result<(), PartError> {
     let limit = m.process.min_gap_mm;
     let gaps = [
-        ("mould_base", "gap round the register pins", pins.clearance_mm, "mould.pins.clearance_mm"),
+        ("mould_base", "gap round the register pins", m.mould.pins.clearance_mm, "mould.pins.clearance_mm"),
         (
             "lower_platform",
             "gap round the camera",

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::measures::{Measures, polar};
+use super::measures::Measures;
 use super::{Blueprint, Feature, PartError};
 use domecast_mesh::{Fit, Profile, Shape};
 

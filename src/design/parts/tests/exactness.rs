@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::*;
 use domecast_mesh::{Chord, Construction, TriMesh, write_step};
 
-const LADDER: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
+const SWEEP_MM: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 
 /// Distance from the surface of united material less united tools, near it.
 fn distance_mm(c: &Construction, p: DVec3) -> f64 {
@@ -98,8 +98,8 @@ fn meshes_stay_within_the_tolerance_of_the_exact_shapes() {
 
 #[test]
 fn long_every_part_is_sound_at_every_tolerance() {
-    let finest = at_tolerance(LADDER[4]);
-    for tolerance in LADDER {
+    let finest = at_tolerance(SWEEP_MM[4]);
+    for tolerance in SWEEP_MM {
         for (part, reference) in at_tolerance(tolerance).iter().zip(&finest) {
             // `build` has looked at the welded mesh; the volume belongs to it.
             let found = part.inspect();
@@ -159,17 +159,17 @@ fn exact_volumes_by_opencascade(parts: &[Part]) -> Option<Vec<f64>> {
     Some(serde_json::from_slice(&said.stdout).unwrap())
 }
 
-/// Every part's volume goes to that of the exact solid, at least as fast as the tolerance: no step of the ladder
+/// Every part's volume goes to that of the exact solid, at least as fast as the tolerance: no step of the sweep
 /// is worse, for its tolerance, than the coarse ones.
 #[test]
 fn long_every_volume_converges_to_the_exact_solid() {
-    let Some(exact) = exact_volumes_by_opencascade(&at_tolerance(LADDER[0])) else { return };
+    let Some(exact) = exact_volumes_by_opencascade(&at_tolerance(SWEEP_MM[0])) else { return };
     let m = Measures::of(&thumb24()).unwrap();
     for (i, closed_form) in [(2, exact_volumes(&m)[0]), (3, exact_volumes(&m)[1])] {
         assert!((exact[i] / closed_form - 1.0).abs() < 1e-9, "{}: {} {closed_form}", i, exact[i]);
     }
     let mut off = vec![Vec::new(); exact.len()];
-    for tolerance in LADDER {
+    for tolerance in SWEEP_MM {
         for ((part, volume), list) in at_tolerance(tolerance).iter().zip(&exact).zip(&mut off) {
             let error = (part.volume_mm3 - volume).abs();
             assert!(error <= tolerance * part.area_mm2, "{} at {tolerance}: {error}", part.name);
@@ -183,7 +183,7 @@ fn long_every_volume_converges_to_the_exact_solid() {
         let floor = 1e-8 * volume;
         let worst = |part: &[(String, f64, f64)]| part.iter().map(|(_, t, e)| e / t).fold(0.0, f64::max);
         let (coarse, fine) = (worst(&steps[..3]), worst(&steps[3..]));
-        let allowed = coarse * 1.5 + floor / LADDER[4];
+        let allowed = coarse * 1.5 + floor / SWEEP_MM[4];
         assert!(
             fine <= allowed,
             "{i} {}: {fine} mm2 of error by tolerance, coarse ones {coarse}",

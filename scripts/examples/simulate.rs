@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let image = drawn.image.ok_or("the scene draws no frames")?;
         let frame = Frame::new(image.width, image.height, image.channels, &image.bytes)?;
         let tracked = tracker.track(u64::from(number), &frame);
-        let [felt, sd] = [tracked.wrench, tracked.wrench_sd].map(|w| w.map_or(f64::NAN, |w| w[2]));
+        let [felt, sd] = [tracked.wrench, tracked.wrench_sd].map(|w| w.map_or(f64::NAN, |w| w.force_n.z));
         println!("{number:5}  {:10.4}  {felt:10.4}  {sd:5.3}  {}", drawn.truth.wrench[2], tracked.status());
     }
     Ok(())

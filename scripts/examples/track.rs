@@ -29,8 +29,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let tracked = tracker.track(number as u64, &Frame::new(width, height, channels, &bytes)?);
         print!("{path}: {}", tracked.status());
         // a frame without pose or wrench says why in its status
-        if let (Some(pose), Some([fx, fy, fz, ..])) = (tracked.pose, tracked.wrench) {
-            print!(", force {fx:.3} {fy:.3} {fz:.3} N, platform moved {:.3} mm", pose.translation_mm);
+        if let (Some(pose), Some(wrench)) = (tracked.pose, tracked.wrench) {
+            print!(", force {:.3} N, platform moved {:.3} mm", wrench.force_n, pose.translation_mm);
         }
         println!();
     }

@@ -4,9 +4,9 @@ use std::str::FromStr;
 use glam::DVec2;
 use proptest::prelude::*;
 
-use super::coverage::{Coverage, area_moment, clip};
-use super::outline::RimFit;
 use super::*;
+use crate::raster::coverage::{Coverage, area_moment, clip};
+use crate::raster::outline::RimFit;
 use domecast_design;
 
 fn scene(name: &str) -> Scene {

@@ -60,7 +60,7 @@ fn write_films(layout: &Layout, label: &FilmLabel) -> usize {
     let films = (
         to_svg(&drawing),
         to_pdf(&drawing).expect("PDF"),
-        to_dxf(&drawing, 0.0005).expect("DXF"),
+        to_dxf(&drawing, 0.0005),
         to_tiff(&drawing, 2400).expect("TIFF"),
     );
     let films = black_box(films);

@@ -4,7 +4,7 @@
     scripts/compare_opencv.py [--points N] [--crates] [--json FILE]
 
 Needs numpy and opencv-python; the Rust side is benches/peer.rs, built and run
-from here, and with --crates the separate project in scripts/compare_crates. Both sides use one thread. The lenses are tests/cases/published_lenses.json.
+from here, and with --crates the separate project in scripts/compare_crates. Both sides use one thread. The lenses are those of tests/cases/lenses.
 
 The truth of each pixel is known before it exists: rays are drawn first, evenly
 in field angle, and projected with the lens formula in extended precision
@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-LENSES = ROOT / "tests" / "cases" / "published_lenses.json"
+LENSES = ROOT / "tests" / "cases" / "lenses"
 WRONG_DEG = 0.01
 # Timed in pieces of which each counts with the median of its rounds: a piece is
 # shorter than a scheduler's slice, so a busy machine does not blur the comparison.
@@ -123,7 +123,7 @@ def main():
     parser.add_argument("--peer", type=Path, metavar="PROGRAM", help="benches/peer.rs where it is built already")
     args = parser.parse_args()
     cv2.setNumThreads(1)
-    lenses = json.loads(LENSES.read_text())
+    lenses = [json.loads(path.read_text()) for path in sorted(LENSES.glob("*.json"))]
     rng = np.random.default_rng(1)
     work = Path(tempfile.mkdtemp(prefix="compare-"))
 

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Golden values for lenses and refraction, in 50 digit arithmetic.
 
-    scripts/golden_optics.py > tests/cases/golden_optics.json
+    scripts/golden_optics.py            # writes tests/cases/golden-optics/<name>.json for every case
+    scripts/golden_optics.py --check    # compares with the files instead
 
-Needs mpmath only. Everything here is written from the formulas alone (OpenCV's
+A file in tests/cases/lenses is a case of its own. Needs mpmath only. Everything here is written from the formulas alone (OpenCV's
 lens models, Snell's law, a sphere); nothing is shared with the crate. Inputs are
 the exact doubles that the crate gets; outputs are printed with 34 digits, beside
 the error that is allowed: the larger of the fixed bound and 8 ulp of the input
@@ -11,6 +12,7 @@ times the condition number, which is found by differencing in the same arithmeti
 """
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -20,6 +22,7 @@ mp.dps = 50
 DIGITS = 34
 ULP = mpf(2) ** -52
 ROOT = Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "tests" / "cases" / "golden-optics"
 
 
 def exact(x):
@@ -334,7 +337,8 @@ def near_rim(radius, *heights):
 
 
 def cases():
-    lenses = {l["name"]: l for l in json.loads((ROOT / "tests/cases/published_lenses.json").read_text())}
+    files = sorted((ROOT / "tests" / "cases" / "lenses").glob("*.json"))
+    lenses = {path.stem: json.loads(path.read_text()) for path in files}
     thumb, t265, tum = lenses["thumb24"], lenses["t265"], lenses["tum-vi"]
     plain = {"model": "kannala_brandt", "matrix": [[229.18, 0, 319.5], [0, 229.18, 239.5], [0, 0, 1]],
              "distortion": [0, 0, 0, 0], "field_of_view_deg": 178, "width": 640, "height": 480}
@@ -392,13 +396,21 @@ def cases():
 
 
 def main():
-    done = []
+    check = sys.argv[1:] == ["--check"]
+    if sys.argv[1:] and not check:
+        sys.exit("usage: scripts/golden_optics.py [--check]")
+    wrong = []
     for case in cases():
         print(case["name"], file=sys.stderr)
         inputs = {k: v for k, v in case.items() if k not in ("rays", "beside_axis_px", "beyond", "points_mm")}
-        done.append(dict(inputs, **checks(case)))
-    json.dump(done, sys.stdout, indent=1)
-    print()
+        text = json.dumps(dict(inputs, **checks(case)), indent=1) + "\n"
+        path = FOLDER / (re.sub("[^a-z0-9]+", "-", case["name"]) + ".json")
+        if not check:
+            path.write_text(text)
+        elif not path.exists() or path.read_text() != text:
+            wrong.append(path.name)
+    if wrong:
+        sys.exit("not as computed: " + ", ".join(wrong))
 
 
 if __name__ == "__main__":

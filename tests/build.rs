@@ -244,3 +244,25 @@ fn results_are_told_as_json_on_request() {
     let reach = constants["camera"]["max_field_angle_rad"].as_f64().expect("a number");
     assert!((reach.to_degrees() - 61.08).abs() < 0.01, "{}", reach.to_degrees());
 }
+
+#[cfg(unix)]
+#[test]
+fn a_disk_that_is_full_leaves_the_earlier_result() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let design = design_path("thumb24").display().to_string();
+    assert!(domecast(&["build", &design, "--out", "out"], folder.path()).status.success());
+    let listing = || domecast::build::list_files(folder.path()).expect("the folder can be read");
+    let before = listing();
+    // a limit on the size of files (in blocks of 512 bytes or 1 KiB) fails writes as a full disk does, without one
+    let program = env!("CARGO_BIN_EXE_domecast");
+    let script = format!("trap '' XFSZ; ulimit -f 40; exec '{program}' build '{design}' --out out");
+    let output =
+        Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output().expect("it runs");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    for part in ["out", "cannot write the file", "room on the disk"] {
+        assert!(message.contains(part), "\"{part}\" is missing in: {message}");
+    }
+    assert_eq!(listing(), before, "nothing is left behind");
+    assert!(domecast(&["check", "out"], folder.path()).status.success(), "the earlier result is whole");
+}

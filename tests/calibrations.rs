@@ -1,4 +1,4 @@
-//! The calibrating commands: what they write, and what they say of bad input.
+//! The calibrating commands: what they write. Bad tables stand in `tests/cases/tables`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -84,47 +84,4 @@ fn a_measured_stiffness_replaces_the_nominal_one() {
     assert!((plain(&measured) / plain(&nominal) - 1.1).abs() < 0.03);
     // The nominal file stays as it was.
     assert_eq!(fs::read_to_string(bench.path("constants.json")).expect("constants"), thumb24().to_json());
-}
-
-#[test]
-fn bad_tables_are_told_by_place_and_write_nothing() {
-    let bench = Bench::new();
-    let cases = [
-        ("calibrate-force", "tx,ty,tz,rx,ry,rz\n0,0,0,0,0,0\n", "Fx"),
-        ("calibrate-force", "Fz\n1\n", "tx,ty,tz"),
-        ("calibrate-force", "tx,ty,tz,rx,ry,rz,Fz\n0,0,oops,0,0,0,1\n", "line 2"),
-        ("calibrate-force", "tx,ty,tz,rx,ry,rz,Fz\n0,0,0,0,0,0,1\n", "varies"),
-        ("calibrate-force", "u0,v0,u1,v1,u2,v2,u3,v3,Fz\n1,2,3,4,5,6,7,8,1\n", "line 2"),
-        ("calibrate-force", "", "empty"),
-        ("calibrate-optics", "frame,kind,id,u\n", "column v"),
-        ("calibrate-optics", "frame,kind,id,u,v\n0,grey,0,1,1\n", "grey"),
-        ("calibrate-optics", "frame,kind,id,u,v\n0,white,77,1,1\n", "77"),
-        ("calibrate-optics", "frame,kind,id,u,v\n", "no observations"),
-        ("calibrate-optics", "frame,kind,id,u,v\n0.5,white,0,1,1\n", "whole number"),
-    ];
-    for (command, table, word) in cases {
-        let ran = bench.run(command, table);
-        let told = String::from_utf8_lossy(&ran.stdout).into_owned() + &String::from_utf8_lossy(&ran.stderr);
-        assert_eq!(ran.status.code(), Some(1), "{command} {table:?}: {told}");
-        assert!(told.contains(word), "{command} {table:?}: {told}");
-        assert!(!bench.path("constants.measured.json").exists());
-    }
-}
-
-#[test]
-fn frames_that_cannot_be_read_are_told() {
-    let bench = Bench::new();
-    let frames = bench.path("frames");
-    fs::create_dir(&frames).expect("a folder");
-    let constants = bench.path("constants.json").display().to_string();
-    let told = || {
-        let ran = run(&["calibrate-optics", &frames.display().to_string(), &constants]);
-        assert_eq!(ran.status.code(), Some(1));
-        String::from_utf8_lossy(&ran.stderr).into_owned()
-    };
-    assert!(told().contains("holds no PNG frame"));
-    fs::write(frames.join("frame_0000.png"), b"no picture").expect("a file");
-    let text = told();
-    assert!(text.contains("frame_0000.png") && text.contains("is not a PNG picture"), "{text}");
-    assert!(!bench.path("constants.measured.json").exists());
 }

@@ -1,7 +1,7 @@
 //! What touches: the dome's material and the object.
 
-use super::error::{ContactError, positive};
-use super::solid::Solid;
+use crate::error::{ContactError, positive};
+use crate::object::Solid;
 
 /// The dome as an elastic body: a solid hemisphere, bonded to the rigid sheet by its base.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -118,7 +118,7 @@ impl From<MechanicsError> for ContactError {
 }
 
 /// A finite number above zero, at most 1e6.
-pub(super) fn positive(field: &'static str, value: f64) -> Result<f64, ContactError> {
+pub(crate) fn positive(field: &'static str, value: f64) -> Result<f64, ContactError> {
     if value > 0.0 && value <= 1e6 {
         Ok(value)
     } else {

@@ -1,8 +1,7 @@
 //! How far a level may be from the reference, before anything is solved.
 
-use super::elastomer::{Elastomer, Indenter};
-use super::solid::Form;
-use super::{Level, elements_of};
+use crate::elastomer::{Elastomer, Indenter};
+use crate::level::{Level, MAX_ELEMENTS, elements_of};
 
 /// What a level costs and how far it may be off.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,10 +30,7 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
     let radius = elastomer.dome_radius_mm;
     let depth = if depth_mm > 0.0 { depth_mm.min(radius) } else { 0.0 };
     let deep = depth / radius;
-    let sharp = match indenter.solid.0 {
-        Form::Sphere { .. } => 0.0,
-        _ => 0.15,
-    };
+    let sharp = if indenter.solid.is_ball() { 0.0 } else { 0.15 };
     // Nodes that touch a plane, which touches most of all that is not hollow (Hertz: a^2 = R d), and half as many beside.
     let nodes = |h: f64| 4.0 + 1.5 * std::f64::consts::PI * radius * depth / (h * h);
     let large = 0.8 * deep * depth;
@@ -51,10 +47,10 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
             force_part: 0.15 + 2.0 * deep,
             work: 5e4,
             setup_work: 0.0,
-            applies: !matches!(indenter.solid.0, Form::Mesh(_)),
+            applies: !indenter.solid.is_mesh(),
         },
         Level::Linear { element_mm } => {
-            let elements = elements_of(elastomer, element_mm).unwrap_or(super::MOST_ELEMENTS) as f64;
+            let elements = elements_of(elastomer, element_mm).unwrap_or(MAX_ELEMENTS) as f64;
             let h = std::f64::consts::FRAC_PI_2 * radius / elements;
             let n = nodes(h);
             Estimate {
@@ -64,18 +60,6 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
                 work: 2500.0 * n * n + 2e4 * elements,
                 // Harmonics, times unknowns and their fill, times right-hand sides.
                 setup_work: 4.0 * elements * 55.0 * elements * 120.0 * 3.0 * elements,
-                applies: true,
-            }
-        }
-        Level::NeoHookean { element_mm } => {
-            let h = element_mm.clamp(0.05 * radius, radius);
-            let n = nodes(h);
-            let unknowns = 3.0 * 10.0 * (radius / h).powi(3);
-            Estimate {
-                displacement_mm: (0.1 + sharp) * h.min(4.0 * depth),
-                force_part: 0.1 + 0.1 * h / radius.min(h + depth),
-                work: 10.0 * (unknowns.powi(2) + 3.0 * n * unknowns.powf(4.0 / 3.0)),
-                setup_work: 100.0 * unknowns,
                 applies: true,
             }
         }
@@ -92,11 +76,10 @@ pub fn most_force_n(elastomer: &Elastomer, indenter: &Indenter, depth_mm: f64) -
     let (radius, nu) = (elastomer.dome_radius_mm, elastomer.poisson);
     let modulus = elastomer.young_mpa / (1.0 - nu * nu);
     let plate_n = 1.5 * 4.0 / 3.0 * modulus * radius.sqrt() * depth_mm.powf(1.5);
-    match indenter.solid.0 {
-        Form::Mesh(_) => {
-            let confined = elastomer.young_mpa * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
-            plate_n.max(confined * std::f64::consts::PI * radius * depth_mm)
-        }
-        _ => plate_n,
+    if indenter.solid.is_mesh() {
+        let confined = elastomer.young_mpa * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
+        plate_n.max(confined * std::f64::consts::PI * radius * depth_mm)
+    } else {
+        plate_n
     }
 }

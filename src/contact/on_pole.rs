@@ -5,14 +5,14 @@
 
 use glam::{DMat3, DVec3};
 
-use super::elastomer::{Elastomer, Indenter};
-use super::error::{ContactError, positive};
-use super::fem::{Parts, Revolved};
-use super::geometric::Placed;
-use super::local::DEEPEST;
-use super::solid::Solid;
-use super::state::{ContactState, Status};
-use super::touch::{Candidate, Spot, Touch, Way};
+use crate::elastomer::{Elastomer, Indenter};
+use crate::error::{ContactError, positive};
+use crate::fem::{Parts, Revolved};
+use crate::level::DEEPEST;
+use crate::linear::{Candidate, Spot, Touch, Way};
+use crate::object::{Placed, Solid};
+use crate::outcome::Status;
+use crate::state::ContactState;
 use domecast_optics::numeric::Rigid;
 
 /// Elements along the meridian: 4 times a power of two, from 8 to this.
@@ -113,8 +113,8 @@ fn blocks(revolved: &Revolved, count: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Contact, Level};
     use super::*;
+    use crate::{Contact, Level};
 
     #[test]
     fn the_linear_level_nears_the_ball_on_the_pole() {

@@ -2,69 +2,10 @@
 
 use glam::DVec3;
 
-use super::field::Field;
+use crate::field::Field;
+use crate::outcome::{Extent, History, Status, TouchedNode};
 use domecast_optics::numeric::{LengthMismatch, Rigid, batch};
 use domecast_springs::Wrench;
-
-/// How a solve ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Status {
-    /// Nothing touches.
-    Free,
-    /// Solved to its tolerance.
-    Solved,
-    /// The bound on iterations was reached, or no step gained any more; the state is the last one, its residuals say how
-    /// far it is off.
-    BoundReached,
-    /// The level's formulas do not cover this contact; the state is that of the geometric level.
-    NotApplicable(&'static str),
-}
-
-/// A node of the dome's surface that bears a force.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TouchedNode {
-    /// Its place on the undeformed dome, sensor frame, mm.
-    pub at_mm: DVec3,
-    /// The surface it stands for, mm2.
-    pub area_mm2: f64,
-    /// The force on the dome, sensor frame, N.
-    pub force_n: DVec3,
-    /// Its part along the contact normal, over the area, MPa.
-    pub pressure_mpa: f64,
-    /// Whether it sticks to the object.
-    pub sticks: bool,
-}
-
-/// Where the dome moves.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extent {
-    /// Direction from the base's centre to the middle of the touched region.
-    pub direction: DVec3,
-    /// Half angle of a cap about it, rad.
-    pub angle_rad: f64,
-    /// No point outside the cap moves by more than this, mm.
-    pub beyond_mm: f64,
-}
-
-/// What the next state must know of this one for friction.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct History {
-    /// Where the object was.
-    pub sensor_from_object: Option<Rigid>,
-    /// Friction force and moment about the normal of a level with one spring for the whole contact, N, N*mm.
-    pub tangential_n: DVec3,
-    pub torsion_nmm: f64,
-    /// Unknowns of the last solve, by node of the level's grid: force in the node's frame, tangential displacement.
-    pub nodes: Vec<NodeMemory>,
-}
-
-/// One node's part of [`History`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct NodeMemory {
-    pub node: u32,
-    pub force_n: DVec3,
-    pub displacement_mm: DVec3,
-}
 
 /// A dome touched by an object.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,20 +25,17 @@ pub struct ContactState {
     pub penetration_mm: f64,
     /// What the last iteration changed, mm.
     pub residual_mm: f64,
-    /// The largest force by which a free node of bricks is out of balance, N; `None` where the level has none to balance,
-    /// or no step could be taken.
-    pub imbalance_n: Option<f64>,
     /// Iterations of the outer loop.
     pub iterations: u32,
     /// Counted work, multiplications.
     pub work: f64,
-    pub(super) field: Field,
-    pub(super) history: History,
+    pub(crate) field: Field,
+    pub(crate) history: History,
 }
 
 impl ContactState {
     /// Nothing touches.
-    pub(super) fn free(sensor_from_object: &Rigid) -> Self {
+    pub(crate) fn free(sensor_from_object: &Rigid) -> Self {
         Self {
             status: Status::Free,
             wrench: Wrench::default(),
@@ -106,7 +44,6 @@ impl ContactState {
             peak_pressure_mpa: 0.0,
             penetration_mm: 0.0,
             residual_mm: 0.0,
-            imbalance_n: None,
             iterations: 0,
             work: 0.0,
             field: Field::Still,

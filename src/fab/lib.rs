@@ -2,6 +2,9 @@
 
 pub mod artwork;
 pub mod build;
+pub mod chart;
 pub mod compare;
 pub mod constants;
+pub mod html;
+pub mod numbers;
 pub mod report;

@@ -10,6 +10,7 @@ use std::fmt::Write as _;
 use glam::DVec3;
 
 use super::TriMesh;
+use super::number::step_real as real;
 
 /// The curve that an edge lies on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -184,20 +185,6 @@ fn list(ids: &[usize]) -> String {
         let _ = write!(out, "{comma}#{id}");
     }
     out
-}
-
-/// A real as STEP wants it: always with a point; the shortest digits that read
-/// back as the same number.
-fn real(x: f64) -> String {
-    // -0.0 and 0.0 are one number; an exponent is written with a capital.
-    let text = format!("{:?}", x + 0.0).replace('e', "E");
-    if text.contains('.') {
-        text
-    } else if let Some((mantissa, exponent)) = text.split_once('E') {
-        format!("{mantissa}.E{exponent}")
-    } else {
-        format!("{text}.")
-    }
 }
 
 struct Writer {

@@ -1,13 +1,16 @@
 //! The golden cases as the script wrote them, and what may be done to a case
 //! without changing its truth: turning, mirroring, scaling.
 
+use std::fs;
+use std::path::{Path, PathBuf};
+
 use domecast::camera::{LensSpec, Model};
 use domecast::numeric::Rigid;
 use domecast::optics::{Layer, OpticsSpec};
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct LensFile {
     pub model: String,
     pub width: u32,
@@ -133,10 +136,37 @@ fn read(file: CaseFile) -> Case {
     }
 }
 
-/// `tests/cases/golden_optics.json`, by `scripts/golden_optics.py`.
+/// The JSON files of a folder of `tests/cases`, by name; at least one.
+pub fn files(folder: &str) -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(folder);
+    let entries = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<PathBuf> = entries.collect();
+    paths.sort();
+    assert!(!paths.is_empty(), "{} is empty", folder.display());
+    let name = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();
+    paths.iter().map(|path| (name(path), fs::read_to_string(path).unwrap())).collect()
+}
+
+/// A golden case from its text.
+fn parsed((name, text): &(String, String)) -> CaseFile {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("golden-optics/{name}.json: {error}"))
+}
+
+/// `tests/cases/golden-optics`, by `scripts/golden_optics.py`.
 pub fn golden() -> Vec<Case> {
-    let files: Vec<CaseFile> = serde_json::from_str(include_str!("../cases/golden_optics.json")).unwrap();
-    files.into_iter().map(read).collect()
+    files("golden-optics").iter().map(|file| read(parsed(file))).collect()
+}
+
+#[test]
+fn every_published_lens_has_golden_values() {
+    let golden: Vec<CaseFile> = files("golden-optics").iter().map(parsed).collect();
+    for (name, text) in files("lenses") {
+        let lens: LensFile =
+            serde_json::from_str(&text).unwrap_or_else(|error| panic!("lenses/{name}.json: {error}"));
+        let case = golden.iter().find(|case| case.name == format!("published {name}"));
+        let case = case.unwrap_or_else(|| panic!("{name}: run scripts/golden_optics.py"));
+        assert_eq!(case.lens, lens, "{name}: run scripts/golden_optics.py");
+    }
 }
 
 impl Case {

@@ -3,177 +3,20 @@
 //! A fixed seed per lens makes every failure a one-line rerun: the message names
 //! the seed, and `DOMECAST_FUZZ_SEED=seed` starts the test at it.
 
-use domecast::numeric::SeededRandom;
 use std::f64::consts::PI;
 
-use domecast::camera::{Lens, LensLimit, LensSpec, Model};
-use domecast::numeric::Rigid;
-use domecast::optics::{Channel, Layer, Limit, OpticsSpec, SensorOptics};
-use glam::{DMat3, DVec2, DVec3};
-use nalgebra::Matrix2x3;
+use domecast::camera::Model;
+use domecast::camera::{Lens, LensLimit};
+use domecast::numeric::SeededRandom;
+use domecast::optics::{Channel, Limit, SensorOptics};
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::bounds::{EPS, Iterations, LAST, Seen, condition, pixel_ulps, ray_ulps, ulp};
 use super::dd::{Dd, dd};
-use super::reference::{self, distance, field_angle, unit, v3};
-
-pub fn lens_spec(r: &mut SeededRandom) -> LensSpec {
-    let (model, distortion, widest) = match r.next_u64() % 8 {
-        0 => (Model::Pinhole, vec![], 179.9),
-        // Like published ones, then anything.
-        1 | 2 => {
-            let p = if r.next_u64().is_multiple_of(2) { 0.0 } else { 0.005 };
-            let k = vec![
-                r.between(-0.35, 0.1),
-                r.between(-0.05, 0.12),
-                p * r.between(-1.0, 1.0),
-                p * r.between(-1.0, 1.0),
-                r.between(-0.02, 0.02),
-            ];
-            (Model::BrownConrady, k, 179.9)
-        }
-        3 => {
-            let size = 10f64.powf(r.between(-2.0, 2.0));
-            let mut k: Vec<f64> = (0..5).map(|_| size * r.between(-1.0, 1.0)).collect();
-            k[2] *= 0.02;
-            k[3] *= 0.02;
-            (Model::BrownConrady, k, 179.9)
-        }
-        4 => {
-            let mut k: Vec<f64> = (0..8).map(|_| r.between(-1.0, 1.0)).collect();
-            k[2] *= 0.01;
-            k[3] *= 0.01;
-            (Model::BrownConrady, k, 179.9)
-        }
-        5 | 6 => {
-            let k = (0..4).map(|_| r.between(-0.06, 0.06)).collect();
-            (Model::KannalaBrandt, k, 260.0)
-        }
-        _ => {
-            let k = (0..4).map(|_| r.between(-0.5, 0.5)).collect();
-            (Model::KannalaBrandt, k, 360.0)
-        }
-    };
-    let fx = 10f64.powf(r.between(1.7, 3.3));
-    LensSpec {
-        model,
-        width: 640,
-        height: 480,
-        matrix: [
-            [fx, 0.0, r.between(200.0, 400.0)],
-            [0.0, fx * r.between(0.95, 1.05), r.between(100.0, 300.0)],
-            [0.0, 0.0, 1.0],
-        ],
-        distortion,
-        field_of_view_rad: r.between(20.0, widest).to_radians(),
-        pupil_shift_mm: vec![],
-    }
-}
-
-fn optics_spec(r: &mut SeededRandom, mut lens: LensSpec) -> OpticsSpec {
-    let radius = 10f64.powf(r.between(-1.0, 3.0));
-    let mut layers = Vec::new();
-    let mut last = 1.0;
-    for _ in 0..r.next_u64() % 5 {
-        let index = match r.next_u64() % 8 {
-            0 => last,
-            1 => 1.0,
-            _ => r.between(1.0, 2.5),
-        };
-        last = index;
-        let thickness = if r.next_u64().is_multiple_of(5) { 0.0 } else { radius * r.between(0.0, 0.3) };
-        layers.push(Layer {
-            name: "sheet".into(),
-            index: [index, (index * 1.002).min(2.5), index * 1.005],
-            thickness_mm: Some(thickness),
-        });
-    }
-    let fill = if r.next_u64().is_multiple_of(6) { 1.0 } else { r.between(1.0, 2.0) };
-    layers.push(Layer { name: "fill".into(), index: [fill; 3], thickness_mm: None });
-    let bottom: f64 = layers.iter().filter_map(|l| l.thickness_mm).sum();
-    let gap = match r.next_u64() % 8 {
-        0 => 0.0,
-        1 => radius * 1e-4,
-        _ => radius * r.between(0.01, 2.0),
-    };
-    let mut rotation = DMat3::IDENTITY;
-    let mut at = DVec3::new(0.0, 0.0, -bottom - gap);
-    if r.next_u64().is_multiple_of(2) {
-        rotation = DMat3::from_rotation_z(r.between(-PI, PI)) * DMat3::from_rotation_x(r.between(-0.5, 0.5));
-        at.x = radius * r.between(-0.5, 0.5);
-        at.y = radius * r.between(-0.5, 0.5);
-    }
-    if r.next_u64().is_multiple_of(4) && gap > 0.0 {
-        // A shift worth up to a fifth of the gap at the domain's end.
-        let half = (0.5 * lens.field_of_view_rad).min(PI);
-        lens.pupil_shift_mm = vec![0.2 * gap * r.between(-1.0, 1.0) / (half * half)];
-    }
-    OpticsSpec { lens, sensor_from_camera: Rigid::new(rotation, at), layers, dome_radius_mm: radius }
-}
-
-const EPS: f64 = f64::EPSILON;
-
-/// The last part of the domain: the bounds hold up to it. What is found in it
-/// must still map back to its pixel.
-const LAST: f64 = 1e-6;
-
-fn ulp(x: f64) -> f64 {
-    x.abs().next_up() - x.abs()
-}
-
-/// 8 ulp of a pixel. The lens takes its distance from the principal point, so
-/// where that is the larger number its ulp counts.
-fn pixel_ulps(lens: &Lens, pixel: DVec2) -> f64 {
-    let [[_, _, cx], [_, _, cy], _] = lens.spec().matrix;
-    8.0 * ulp(pixel.x.abs().max(cx.abs())).hypot(ulp(pixel.y.abs().max(cy.abs())))
-}
-
-/// How far 8 ulp of each of a ray's components move the pixel.
-fn ray_ulps(slope: &Matrix2x3<f64>, ray: DVec3) -> f64 {
-    (0..3).map(|j| slope.column(j).norm() * 8.0 * ulp(ray[j])).sum()
-}
-
-/// How far a pixel at most moves a ray, rad/px: the inverse of the smallest
-/// stretch of the ray's plane onto the image.
-fn condition(slope: &Matrix2x3<f64>, length: f64) -> f64 {
-    let gram = slope * slope.transpose();
-    let (half, det) = (0.5 * gram.trace(), gram.determinant());
-    let smallest = (det / (half + (half * half - det).max(0.0).sqrt())).max(0.0);
-    1.0 / (smallest.sqrt() * length)
-}
-
-/// What a run has seen.
-#[derive(Default, Clone, Copy)]
-pub struct Seen {
-    pub lenses: u64,
-    pub checks: u64,
-    pub ok: u64,
-    pub limits: u64,
-    pub most: Iterations,
-}
-
-/// The largest numbers of iterations met.
-#[derive(Default, Clone, Copy)]
-pub struct Iterations {
-    pub lens: u32,
-    pub climb: u32,
-    pub pupil: u32,
-}
-
-impl Seen {
-    fn plus(self, o: Self) -> Self {
-        Self {
-            lenses: self.lenses + o.lenses,
-            checks: self.checks + o.checks,
-            ok: self.ok + o.ok,
-            limits: self.limits + o.limits,
-            most: Iterations {
-                lens: self.most.lens.max(o.most.lens),
-                climb: self.most.climb.max(o.most.climb),
-                pupil: self.most.pupil.max(o.most.pupil),
-            },
-        }
-    }
-}
+use super::random::{lens_spec, optics_spec};
+use super::reference;
+use super::reference_lens::{distance, field_angle, unit, v3};
 
 /// One random lens and stack with everything that can be asked of them.
 struct Run<'a> {

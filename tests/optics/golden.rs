@@ -3,7 +3,7 @@
 use domecast::optics::SensorOptics;
 use glam::DVec3;
 
-use super::cases::{Case, golden};
+use super::cases::{Case, files, golden};
 
 fn angle(a: DVec3, b: DVec3) -> f64 {
     a.cross(b).length().atan2(a.dot(b))
@@ -70,9 +70,10 @@ fn numbers<'a>(value: &'a serde_json::Value, found: &mut Vec<&'a str>) {
 
 #[test]
 fn golden_values_have_thirty_digits() {
-    let file: serde_json::Value = serde_json::from_str(include_str!("../cases/golden_optics.json")).unwrap();
+    let values: Vec<serde_json::Value> =
+        files("golden-optics").iter().map(|(_, text)| serde_json::from_str(text).unwrap()).collect();
     let mut found = Vec::new();
-    numbers(&file, &mut found);
+    values.iter().for_each(|value| numbers(value, &mut found));
     assert!(found.len() > 1000);
     for text in found {
         let mantissa = text.split('e').next().unwrap().trim_start_matches(['-', '0', '.']);

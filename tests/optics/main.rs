@@ -8,8 +8,11 @@
 #![allow(clippy::unwrap_used)]
 
 mod batch;
+mod bounds;
 mod cases;
 mod dd;
 mod fuzz;
 mod golden;
+mod random;
 mod reference;
+mod reference_lens;

@@ -42,7 +42,7 @@ use domecast_design::parts::PartError;
 use domecast_design::{Design, DesignError};
 use domecast_design::{claims_of, suspension_of};
 use domecast_fab::constants;
-use domecast_fab::report::sparse;
+use domecast_fab::numbers::significant as sparse;
 use domecast_sim::Scene;
 
 /// What the measurement was made on.

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::clock::{Patience, time};
 use super::ladder::{Ladder, Law, Rung, sizes};
-use domecast_design::layout::dot::Carrier;
+use domecast_design::layout::dot::DotProjector;
 use domecast_design::layout::frame::EvenFrame;
 use domecast_design::layout::outline::CurvePoint;
 use domecast_design::layout::{Layout, LayoutSpec};
@@ -23,7 +23,7 @@ pub fn ladder(
     patience: Patience,
 ) -> Option<Ladder> {
     let frame = EvenFrame::new(spec.optics.lens(), spec.pattern.even_in, spec.undistorted);
-    let carrier = Carrier {
+    let projector = DotProjector {
         optics: &spec.optics,
         frame,
         transfer: &layout.transfer,
@@ -40,13 +40,13 @@ pub fn ladder(
         let (mut errors, mut pieces) = (Vec::new(), 0);
         for dot in &layout.dots {
             let Some(hit) = layout.hits.get(dot.hit) else { continue };
-            let Ok(outline) = carrier.plate_outline(dot, hit.hit_from_sensor, tolerance_mm) else {
+            let Ok(outline) = projector.plate_outline(dot, hit.hit_from_sensor, tolerance_mm) else {
                 errors.push(f64::NAN);
                 continue;
             };
             let count = outline.pieces().len();
             pieces += count;
-            let exact = |angle: f64| carrier.plate_point(dot, hit.hit_from_sensor, angle).ok();
+            let exact = |angle: f64| projector.plate_point(dot, hit.hit_from_sensor, angle).ok();
             let mut from = outline.start();
             let mut worst = 0.0_f64;
             for (k, &[a, b, to]) in outline.pieces().iter().enumerate() {
@@ -67,7 +67,7 @@ pub fn ladder(
         let time = time(patience, || {
             let made = |dot: &&domecast_design::layout::Dot| {
                 let hit = layout.hits.get(dot.hit).map(|hit| hit.hit_from_sensor).unwrap_or_default();
-                carrier.plate_outline(dot, hit, tolerance_mm).is_ok()
+                projector.plate_outline(dot, hit, tolerance_mm).is_ok()
             };
             layout.dots.iter().filter(made).count()
         });

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::chart::Chart;
 use super::{Accuracy, Budget, Ladder, Law};
-use domecast_fab::report::{duration, sparse};
+use domecast_fab::numbers::{duration, significant as sparse};
 
 /// Text that stands in HTML and SVG.
 pub fn escape(text: &str) -> String {

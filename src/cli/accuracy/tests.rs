@@ -201,7 +201,11 @@ fn settings_are_chosen_where_the_file_leaves_them_open() {
     assert_eq!(settings.outline_tolerance_mm.value, 0.002);
     assert_eq!(settings.chord_tolerance_mm.value, 0.02);
     assert!(settings.samples.chosen && settings.samples.value.is_power_of_two());
-    assert!(settings.lines().iter().all(|line| line.contains("2 times over")), "{:?}", settings.lines());
+    assert!(
+        settings.lines().iter().all(|line| line.contains("safety factor of 2")),
+        "{:?}",
+        settings.lines()
+    );
     // what the file gives stands, whatever is asked
     let explicit = design_from(|d| d["mesh"]["chord_tolerance_mm"] = 0.3.into()).unwrap();
     assert_eq!(explicit.settings().chord_tolerance_mm.value, 0.3);

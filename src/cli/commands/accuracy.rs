@@ -66,7 +66,7 @@ pub fn run(
             format!(
                 "{} leaves {} {} at {:.3e} s a {}",
                 rung.label,
-                domecast_fab::report::sparse(rung.max_error),
+                domecast_fab::numbers::significant(rung.max_error),
                 ladder.unit,
                 rung.per_item_s,
                 ladder.item
@@ -76,7 +76,7 @@ pub fn run(
         if let (Some(asked), Some(enough)) = (ladder.asked, rung(ladder.meets)) {
             output.say(&format!(
                 "  {} {} asked: {} is enough",
-                domecast_fab::report::sparse(asked),
+                domecast_fab::numbers::significant(asked),
                 ladder.unit,
                 enough.label
             ))?;
@@ -86,9 +86,9 @@ pub fn run(
         output.say(&format!(
             "{}: {} {} ({} worked out)",
             budget.title,
-            domecast_fab::report::sparse(budget.total),
+            domecast_fab::numbers::significant(budget.total),
             budget.unit,
-            domecast_fab::report::sparse(budget.computed)
+            domecast_fab::numbers::significant(budget.computed)
         ))?;
     }
     output.say(&format!(

@@ -6,10 +6,10 @@ use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Mat, Side};
 
-use super::super::sparse::lower_triangle;
 use super::element::{DOFS, stiffness};
 use super::mesh::Meridian;
-use crate::{ContactError, Elastomer};
+use crate::elastomer::Elastomer;
+use crate::error::ContactError;
 
 /// The swept dome: a mesh, and the pattern and values of K0, K1, K2.
 #[derive(Debug)]
@@ -206,4 +206,20 @@ fn pattern(mesh: &Meridian, masters: &[Vec<(usize, f64)>]) -> (Vec<usize>, Vec<u
         }
     }
     lower_triangle(neighbours)
+}
+
+/// Column starts and rows of the lower triangle, three unknowns a node, columns in order; `neighbours` are the nodes
+/// that each node shares an element with, itself among them. The diagonal is each column's first entry.
+fn lower_triangle(neighbours: Vec<Vec<usize>>) -> (Vec<usize>, Vec<usize>) {
+    let (mut columns, mut rows) = (vec![0], Vec::new());
+    for (node, mut list) in neighbours.into_iter().enumerate() {
+        list.sort_unstable();
+        list.dedup();
+        for direction in 0..3 {
+            let column = 3 * node + direction;
+            rows.extend(list.iter().flat_map(|n| 3 * n..3 * n + 3).filter(|row| *row >= column));
+            columns.push(rows.len());
+        }
+    }
+    (columns, rows)
 }

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use super::between::Places;
 use super::body::Body;
 use super::grid::{Grid, GridNode};
-use crate::{ContactError, Elastomer};
+use crate::elastomer::Elastomer;
+use crate::error::ContactError;
 
 /// Directions in a node's frame: r, z, phi.
 const AXES: usize = 3;

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 
 use super::compliance::Compliance;
 use super::element::quadratic;
-use crate::Extent;
+use crate::outcome::Extent;
 
 /// The displacement under given forces; worked out when it is first asked for.
 #[derive(Debug, Clone)]

@@ -14,11 +14,11 @@ mod grid;
 mod mesh;
 mod revolved;
 
-pub(super) use between::Parts;
-pub(super) use compliance::Compliance;
-pub(super) use field::SurfaceField;
-pub(super) use grid::GridNode;
-pub(super) use revolved::Revolved;
+pub(crate) use between::Parts;
+pub(crate) use compliance::Compliance;
+pub(crate) use field::SurfaceField;
+pub(crate) use grid::GridNode;
+pub(crate) use revolved::Revolved;
 
 #[cfg(test)]
 mod tests;

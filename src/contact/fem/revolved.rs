@@ -8,7 +8,8 @@ use super::body::Body;
 use super::compliance::{Spectrum, harmonic};
 use super::element::quadratic;
 use super::grid::{Grid, GridNode};
-use crate::{ContactError, Elastomer};
+use crate::elastomer::Elastomer;
+use crate::error::ContactError;
 
 /// The response of the surface to loads on rings about the pole.
 #[derive(Debug)]

@@ -8,7 +8,7 @@ use nalgebra::SVector;
 use super::compliance::Compliance;
 use super::element::{DOFS, stiffness};
 use super::*;
-use crate::Elastomer;
+use crate::elastomer::Elastomer;
 
 fn silicone(poisson: f64) -> Elastomer {
     Elastomer { dome_radius_mm: 10.0, young_mpa: 0.56, poisson, friction: 0.6 }

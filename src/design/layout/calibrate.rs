@@ -87,7 +87,7 @@ impl From<LayoutError> for CalibrateError {
 }
 
 /// Where each mark of an artwork stands: on the plate, and on the dome by the present map.
-struct Marks {
+struct KnownMarks {
     printed: Printed,
     /// By id: place on the plate, and the turn into the frame of its hit.
     places: Vec<Option<(DVec2, glam::DMat3)>>,
@@ -179,28 +179,28 @@ pub fn calibrate(
     })
 }
 
-fn target_marks(spec: &LayoutSpec, transfer: &TransferMap) -> Marks {
+fn target_marks(spec: &LayoutSpec, transfer: &TransferMap) -> KnownMarks {
     let mut places = Vec::new();
     for mark in print_target(transfer, &spec.print) {
         let index = mark.id as usize;
         places.resize(places.len().max(index + 1), None);
         places[index] = Some((mark.plate_mm, glam::DMat3::IDENTITY));
     }
-    Marks { printed: Printed::Target, places }
+    KnownMarks { printed: Printed::Target, places }
 }
 
-fn dot_marks(layout: &Layout) -> Marks {
+fn dot_marks(layout: &Layout) -> KnownMarks {
     let place = |dot: &super::Dot| Some((dot.plate_mm, layout.hits[dot.hit].hit_from_sensor));
-    Marks { printed: Printed::Dots, places: layout.dots.iter().map(place).collect() }
+    KnownMarks { printed: Printed::Dots, places: layout.dots.iter().map(place).collect() }
 }
 
 /// The artwork to which the table belongs.
 fn choose<'a>(
-    known: &'a [Marks],
+    known: &'a [KnownMarks],
     table: &MeasuredTable,
     transfer: &TransferMap,
-) -> Result<&'a Marks, TableError> {
-    let mut best: Option<(f64, &Marks)> = None;
+) -> Result<&'a KnownMarks, TableError> {
+    let mut best: Option<(f64, &KnownMarks)> = None;
     let mut unknown = None;
     for marks in known {
         let mut misses = Vec::with_capacity(table.rows.len());

@@ -2,28 +2,28 @@
 
 use glam::{DVec2, DVec3};
 
-use super::dot::{Carrier, Dot, plate_outline};
+use super::dot::{Dot, DotProjector, plate_outline};
 use super::lost::{LostDot, Reason, Zone};
 use super::outline::Outline;
 use super::passes::Hit;
 use super::spec::LayoutSpec;
 use super::zones::{self, ImageZone};
 
-/// Carries one dot from its place in the pattern to the dome and on to the plate of the hit nearest to it.
+/// Projects one dot from its place in the pattern to the dome, and on to the plate of the nearest print pass.
 pub(super) fn check_dot(
     spec: &LayoutSpec,
-    carrier: &Carrier<'_>,
+    projector: &DotProjector<'_>,
     hits: &[Hit],
     zones: &[ImageZone],
     even_px: DVec2,
 ) -> Result<Dot, LostDot> {
-    let image_px = carrier.frame.raw_from_even(even_px);
+    let image_px = projector.frame.raw_from_even(even_px);
     let lose = |reason: Reason| LostDot { id: 0, even_px, image_px: image_px.ok(), reason };
     let image_px = image_px.map_err(|limit| lose(Reason::Unseen(limit.into())))?;
     let surface = spec.optics.trace(image_px).map_err(|limit| lose(Reason::Unseen(limit)))?;
-    let curve = carrier.curve(even_px, surface.surface_mm);
-    let image_outline = carrier.image_outline(&curve).map_err(lose)?;
-    let diameter_mm = carrier.dome_diameter_mm(&curve).map_err(lose)?;
+    let curve = projector.curve(even_px, surface.surface_mm);
+    let image_outline = projector.image_outline(&curve).map_err(lose)?;
+    let diameter_mm = projector.dome_diameter_mm(&curve).map_err(lose)?;
     check_seen(spec, &image_outline).map_err(lose)?;
     zones::check(zones, &image_outline).map_err(lose)?;
     let (hit, wrap_rad) = nearest_hit(hits, surface.normal);
@@ -42,16 +42,16 @@ pub(super) fn check_dot(
         return Err(lose(Reason::BeyondWrap { wrap_rad: reach_rad, limit_rad }));
     }
     let hit_from_sensor = hits[hit].hit_from_sensor;
-    let plate_mm = carrier
+    let plate_mm = projector
         .transfer
         .plate_from_dome(hit_from_sensor * surface.surface_mm)
         .map_err(|limit| lose(Reason::BeyondTransfer(limit)))?;
     let plate_outline =
-        plate_outline(&curve, carrier.transfer, hit_from_sensor, carrier.outline_tolerance_mm)
+        plate_outline(&curve, projector.transfer, hit_from_sensor, projector.outline_tolerance_mm)
             .map_err(lose)?;
     let (width_mm, _) = plate_outline.widths();
     if width_mm < spec.print.min_dot_mm {
-        return Err(lose(Reason::TooSmall { width_mm, least_mm: spec.print.min_dot_mm }));
+        return Err(lose(Reason::TooSmall { width_mm, min_mm: spec.print.min_dot_mm }));
     }
     Ok(Dot {
         id: 0,
@@ -82,7 +82,7 @@ fn nearest_hit(hits: &[Hit], normal: DVec3) -> (usize, f64) {
     best
 }
 
-/// Whether the whole dot lies on the raster and inside the mask.
+/// Whether all of the dot is inside the image and the mask.
 fn check_seen(spec: &LayoutSpec, outline: &Outline) -> Result<(), Reason> {
     let lens = spec.optics.lens();
     let (low, high) = outline.bounds();

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::dot::{Carrier, Dot};
+use super::dot::{Dot, DotProjector};
 use super::frame::EvenFrame;
 use super::lost::Reason;
 use super::plan::Layout;
@@ -16,39 +16,39 @@ use super::window::Window;
 use super::zones::{ImageZone, check_corners, marker_zones};
 use domecast_optics::SensorOptics;
 
-/// Rings and points per ring at which the dome is looked at. Rings are at equal steps of height, so that every
+/// Rings and points per ring at which the dome is sampled. Rings are at equal steps of height, so that every
 /// point stands for the same area.
 const RINGS: u32 = 90;
 const AROUND: u32 = 72;
 
-/// Points on a dot's edge that are followed where something is near that may hide it.
+/// Points on a dot's outline that are checked where something near may hide it.
 const EDGE_POINTS: u32 = 16;
 
-/// What is this much nearer than a dot's own reach at rest is looked at closely: the image of a dot grows less
-/// between rest and full load, and less from the raw image to the undistorted one.
+/// A dot is checked point by point where something is nearer than this multiple of its radius at rest: the image of
+/// a dot grows less between rest and full load, and less from the raw image to the undistorted one.
 const NEAR: f64 = 6.0;
 
 /// How much of the dome is seen at one pose.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Coverage {
-    /// Share of the dome's area that the lens sees through the layers, on the raster or not.
+    /// Share of the dome's area that the lens sees through the layers, in the image or beyond its edges.
     pub seen_by_lens: f64,
-    /// Share that lies on the camera's raster.
+    /// Share inside the image.
     pub on_raster: f64,
-    /// Share that lies inside the runtime's mask as well.
+    /// Share inside the image and the runtime's mask.
     pub in_mask: f64,
-    /// Share of all that, less what white markers or the platform's window hide.
+    /// Share that is visible: of all that, less what white markers or the platform's window hide.
     pub in_sight: f64,
-    /// Polar angle up to which every point is in sight, degrees.
+    /// Polar angle up to which the dome is fully visible, degrees.
     pub whole_to_deg: f64,
     /// The nearest that the line of sight of a dot comes to the edge of the upper platform's window, mm sideways;
     /// null where the window is not known.
     pub window_gap_mm: Option<f64>,
-    /// Laid-out dots that are not seen whole at this pose.
+    /// Laid-out dots that are hidden in part or in full at this pose.
     pub unseen_dots: Vec<UnseenDot>,
 }
 
-/// A laid-out dot that is not seen whole.
+/// A laid-out dot that is hidden in part or in full.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UnseenDot {
     /// Its number.
@@ -59,14 +59,14 @@ pub struct UnseenDot {
     pub because: String,
 }
 
-/// Looks at the dome from one pose of the platform, which `optics` carries.
+/// The coverage at one pose of the platform, the pose of `optics`.
 pub fn coverage(
     spec: &LayoutSpec,
     layout: &Layout,
     optics: &SensorOptics,
     window: Option<&Window>,
 ) -> Coverage {
-    let sight = Sight { spec, optics, markers: marker_zones(optics, &spec.white_markers), window };
+    let visibility = Visibility { spec, optics, markers: marker_zones(optics, &spec.white_markers), window };
     let radius_mm = optics.dome_radius_mm();
     let (mut lens, mut raster, mut mask, mut free, mut whole) = (0u32, 0u32, 0u32, 0u32, true);
     let mut whole_to_rad = 0.0;
@@ -76,7 +76,7 @@ pub fn coverage(
         let before = free;
         for k in 0..AROUND {
             let azimuth_rad = TAU * f64::from(k) / f64::from(AROUND);
-            let reason = sight.point(dome_point(radius_mm, polar_rad, azimuth_rad)).err();
+            let reason = visibility.point(dome_point(radius_mm, polar_rad, azimuth_rad)).err();
             lens += u32::from(!matches!(reason, Some(Reason::Unseen(_))));
             raster += u32::from(!matches!(reason, Some(Reason::Unseen(_) | Reason::OutsideImage)));
             mask += u32::from(!matches!(
@@ -91,7 +91,7 @@ pub fn coverage(
         }
     }
     let all = f64::from(RINGS * AROUND);
-    let (window_gap_mm, unseen_dots) = sight.dots(layout);
+    let (window_gap_mm, unseen_dots) = visibility.dots(layout);
     Coverage {
         seen_by_lens: f64::from(lens) / all,
         on_raster: f64::from(raster) / all,
@@ -103,16 +103,16 @@ pub fn coverage(
     }
 }
 
-/// The camera's sight at one pose: everything that can end it.
-struct Sight<'a> {
+/// What the camera sees at one pose: everything that can hide a point.
+struct Visibility<'a> {
     spec: &'a LayoutSpec,
     optics: &'a SensorOptics,
     markers: Vec<ImageZone>,
     window: Option<&'a Window>,
 }
 
-/// A point that is in sight.
-struct Seen {
+/// A visible point.
+struct VisiblePoint {
     pixel: DVec2,
     /// Distance from the mask's edge in the undistorted frame, px; infinite without a mask.
     mask_px: f64,
@@ -120,11 +120,11 @@ struct Seen {
     window_mm: f64,
 }
 
-impl Sight<'_> {
-    /// A point of the dome: lens, raster, mask, markers and window, in this order.
-    fn point(&self, point_mm: DVec3) -> Result<Seen, Reason> {
+impl Visibility<'_> {
+    /// A point of the dome: lens, image, mask, markers and window, in this order.
+    fn point(&self, point_mm: DVec3) -> Result<VisiblePoint, Reason> {
         let pixel = self.optics.project(point_mm).map_err(Reason::Unseen)?;
-        if self.raster_px(pixel) < 0.0 {
+        if self.image_margin_px(pixel) < 0.0 {
             return Err(Reason::OutsideImage);
         }
         let mask_px = match &self.spec.mask {
@@ -137,50 +137,54 @@ impl Sight<'_> {
         check_corners(&self.markers, &[pixel])?;
         let window_mm =
             self.window.and_then(|window| window.gap_mm(self.optics, pixel)).unwrap_or(f64::INFINITY);
-        if window_mm < 0.0 { Err(Reason::HiddenByPlatform) } else { Ok(Seen { pixel, mask_px, window_mm }) }
+        if window_mm < 0.0 {
+            Err(Reason::HiddenByPlatform)
+        } else {
+            Ok(VisiblePoint { pixel, mask_px, window_mm })
+        }
     }
 
-    /// Distance from the edge of the raster, px; negative outside.
-    fn raster_px(&self, pixel: DVec2) -> f64 {
+    /// Distance from the edge of the image, px; negative outside.
+    fn image_margin_px(&self, pixel: DVec2) -> f64 {
         let lens = self.optics.lens().spec();
         let last = DVec2::new(f64::from(lens.width), f64::from(lens.height)) - 0.5;
         (pixel + 0.5).min_element().min((last - pixel).min_element())
     }
 
-    /// The narrowest gap of all dots to the window, and the dots that are not seen whole.
+    /// The narrowest gap of all dots to the window, and the dots that are not fully visible.
     fn dots(&self, layout: &Layout) -> (Option<f64>, Vec<UnseenDot>) {
-        let carrier = Carrier {
+        let projector = DotProjector {
             optics: &self.spec.optics,
             frame: EvenFrame::new(self.spec.optics.lens(), self.spec.pattern.even_in, self.spec.undistorted),
             transfer: &layout.transfer,
             size: layout.size,
             outline_tolerance_mm: self.spec.print.outline_mm(),
         };
-        let looked_at: Vec<Result<f64, Reason>> =
-            layout.dots.par_iter().map(|dot| self.dot(&carrier, dot)).collect();
-        let narrowest = looked_at.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        let unseen = layout.dots.iter().zip(&looked_at).filter_map(|(dot, looked_at)| {
-            let reason = looked_at.as_ref().err()?;
+        let gaps: Vec<Result<f64, Reason>> =
+            layout.dots.par_iter().map(|dot| self.dot(&projector, dot)).collect();
+        let narrowest = gaps.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let unseen = layout.dots.iter().zip(&gaps).filter_map(|(dot, gaps)| {
+            let reason = gaps.as_ref().err()?;
             Some(UnseenDot { id: dot.id, reason: reason.as_str(), because: reason.to_string() })
         });
         (narrowest.is_finite().then_some(narrowest), unseen.collect())
     }
 
-    /// A whole dot; its gap to the window's edge, mm. The edge of the dot is followed only where something is near.
-    fn dot(&self, carrier: &Carrier<'_>, dot: &Dot) -> Result<f64, Reason> {
+    /// The gap of a fully visible dot to the window's edge, mm. The dot's outline is checked only where something is near.
+    fn dot(&self, projector: &DotProjector<'_>, dot: &Dot) -> Result<f64, Reason> {
         let middle = self.point(dot.surface_mm)?;
         let (low, high) = dot.image_outline.bounds();
         let near_px = NEAR * 0.5 * low.distance(high);
         let (low, high) = (middle.pixel - near_px, middle.pixel + near_px);
         let square = [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)];
         let alone = middle.mask_px > near_px
-            && self.raster_px(middle.pixel) > near_px
+            && self.image_margin_px(middle.pixel) > near_px
             && middle.window_mm > NEAR * dot.diameter_mm
             && check_corners(&self.markers, &square).is_ok();
         if alone {
             return Ok(middle.window_mm);
         }
-        let curve = carrier.curve(dot.even_px, dot.surface_mm);
+        let curve = projector.curve(dot.even_px, dot.surface_mm);
         let mut window_mm = middle.window_mm;
         let mut corners = Vec::with_capacity(EDGE_POINTS as usize);
         for k in 0..EDGE_POINTS {

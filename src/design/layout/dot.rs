@@ -58,9 +58,9 @@ pub enum DotSize {
     OnDome(f64),
 }
 
-/// What is needed to carry dots between image, dome and plate.
+/// Projects dots between image, dome and plate.
 #[derive(Debug, Clone, Copy)]
-pub struct Carrier<'a> {
+pub struct DotProjector<'a> {
     /// Lens, layers and dome at rest.
     pub optics: &'a SensorOptics,
     /// The frame in which the pattern is even.
@@ -83,7 +83,7 @@ const AREA_POINTS: u32 = 16;
 /// A dot's closed curve, as a function of an angle.
 pub(super) enum DotCurve<'a> {
     /// A circle in the even frame.
-    Apparent { carrier: &'a Carrier<'a>, center_px: DVec2, radius_px: f64 },
+    Apparent { projector: &'a DotProjector<'a>, center_px: DVec2, radius_px: f64 },
     /// A circle on the dome: the centre of its plane, and its two radii.
     OnDome { optics: Option<&'a SensorOptics>, center: DVec3, side: DVec3, up: DVec3 },
 }
@@ -101,10 +101,10 @@ impl DotCurve<'_> {
     /// The point on the dome and its derivative, mm.
     pub(super) fn on_dome(&self, angle: f64) -> Result<(DVec3, DVec3), Reason> {
         match self {
-            Self::Apparent { carrier, .. } => {
+            Self::Apparent { projector, .. } => {
                 let pixel = self.in_image(angle)?;
                 let (surface, by_pixel) =
-                    carrier.optics.trace_with_jacobian(pixel.at).map_err(Reason::Unseen)?;
+                    projector.optics.trace_with_jacobian(pixel.at).map_err(Reason::Unseen)?;
                 let slope = by_pixel * Vector2::new(pixel.slope.x, pixel.slope.y);
                 Ok((surface.surface_mm, DVec3::new(slope.x, slope.y, slope.z)))
             }
@@ -118,9 +118,9 @@ impl DotCurve<'_> {
     /// The point in the raw image and its derivative, px.
     fn in_image(&self, angle: f64) -> Result<CurvePoint, Reason> {
         match self {
-            Self::Apparent { carrier, center_px, radius_px } => {
+            Self::Apparent { projector, center_px, radius_px } => {
                 let out = DVec2::from_angle(angle) * *radius_px;
-                let (at, slope) = carrier
+                let (at, slope) = projector
                     .frame
                     .raw_from_even_with_slope(*center_px + out, out.perp())
                     .map_err(|limit| Reason::Unseen(limit.into()))?;
@@ -137,7 +137,7 @@ impl DotCurve<'_> {
     }
 }
 
-impl Carrier<'_> {
+impl DotProjector<'_> {
     /// A dot's outline on the plate of a hit, as `hit_from_sensor` turns the dome under the pad, drawn as closely as
     /// `tolerance_mm` asks.
     ///
@@ -168,7 +168,7 @@ impl Carrier<'_> {
     pub(super) fn curve(&self, even_px: DVec2, surface_mm: DVec3) -> DotCurve<'_> {
         match self.size {
             DotSize::Apparent(diameter) => {
-                DotCurve::Apparent { carrier: self, center_px: even_px, radius_px: 0.5 * diameter }
+                DotCurve::Apparent { projector: self, center_px: even_px, radius_px: 0.5 * diameter }
             }
             DotSize::OnDome(diameter_mm) => {
                 let mut curve = DotCurve::on_dome_of(self.optics.dome_radius_mm(), surface_mm, diameter_mm);

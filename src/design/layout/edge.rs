@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::{DVec2, DVec3};
 
 use super::boundary::Boundary;
-use super::dot::{Carrier, DotSize};
+use super::dot::{DotProjector, DotSize};
 use super::error::LayoutError;
 use super::frame::EvenFrame;
 use super::region;
@@ -35,7 +35,7 @@ pub(super) fn center(spec: &LayoutSpec, frame: &EvenFrame<'_>) -> Result<DVec2, 
 /// Where the dots' centres may lie: the pattern's edge, drawn in so that no dot is cut.
 pub(super) fn edge(
     spec: &LayoutSpec,
-    carrier: &Carrier<'_>,
+    projector: &DotProjector<'_>,
     center_px: DVec2,
     warnings: &mut Vec<String>,
 ) -> Result<Boundary, LayoutError> {
@@ -53,13 +53,13 @@ pub(super) fn edge(
     if let Some(polar_deg) = pattern.polar_angle_deg {
         // A dot of equal size on the dome reaches over its centre by its own angle, one of equal apparent
         // size by its radius in the image.
-        let (own_rad, inset_px) = match carrier.size {
+        let (own_rad, inset_px) = match projector.size {
             DotSize::OnDome(mm) => ((0.5 * mm / radius_mm).asin(), 0.0),
             DotSize::Apparent(px) => (0.0, 0.5 * px),
         };
         let polar_rad = (polar_deg.to_radians() - own_rad).clamp(0.0, FRAC_PI_2);
         let parallel =
-            region::parallel(&spec.optics, &carrier.frame, center_px, polar_rad).map_err(|limit| {
+            region::parallel(&spec.optics, &projector.frame, center_px, polar_rad).map_err(|limit| {
                 LayoutError::new(
                     "pattern.polar_angle_deg",
                     polar_deg,
@@ -84,9 +84,9 @@ pub(super) fn edge(
         edge = Some(parallel.boundary.inset(inset_px));
     }
     if let Some(radius_px) = pattern.image_radius_px {
-        let inset = |direction: DVec2| match carrier.size {
+        let inset = |direction: DVec2| match projector.size {
             DotSize::Apparent(px) => 0.5 * px,
-            DotSize::OnDome(_) => apparent_radius_px(carrier, center_px + direction * radius_px),
+            DotSize::OnDome(_) => apparent_radius_px(projector, center_px + direction * radius_px),
         };
         let inner = edge.take();
         edge = Some(Boundary::new(|direction| {
@@ -101,14 +101,14 @@ pub(super) fn edge(
 
 /// How far a dot of equal size on the dome reaches in the even frame, px; zero where it is not seen, since
 /// then it is lost for that reason.
-fn apparent_radius_px(carrier: &Carrier<'_>, even_px: DVec2) -> f64 {
+fn apparent_radius_px(projector: &DotProjector<'_>, even_px: DVec2) -> f64 {
     let reach = || -> Result<f64, Limit> {
-        let point = carrier.optics.trace(carrier.frame.raw_from_even(even_px)?)?;
-        let curve = carrier.curve(even_px, point.surface_mm);
-        let outline = carrier.image_outline(&curve).map_err(|_| Limit::Unreachable)?;
+        let point = projector.optics.trace(projector.frame.raw_from_even(even_px)?)?;
+        let curve = projector.curve(even_px, point.surface_mm);
+        let outline = projector.image_outline(&curve).map_err(|_| Limit::Unreachable)?;
         let mut furthest: f64 = 0.0;
         for corner in outline.polygon(4) {
-            furthest = furthest.max(carrier.frame.even_from_raw(corner)?.distance(even_px));
+            furthest = furthest.max(projector.frame.even_from_raw(corner)?.distance(even_px));
         }
         Ok(furthest)
     };

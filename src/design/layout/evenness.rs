@@ -45,7 +45,7 @@ pub struct EvennessReport {
     pub plate_mm: Option<Evenness>,
 }
 
-/// The same pattern laid out as if nothing refracted, seen through the real stack.
+/// The same pattern laid out without refraction, seen through the real layers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PinholeComparison {
     /// Evenness that the camera would see, px.
@@ -109,8 +109,8 @@ pub(super) fn evenness_of<P: Copy>(
     let nearest = all.iter().filter(|(_, list)| !list.is_empty());
     let nearest =
         spread(nearest.map(|(_, list)| list.iter().map(|(_, d)| *d).fold(f64::INFINITY, f64::min)))?;
-    // Both ends of an edge tell of it; it counts where the lower one does, or always if only some dots are
-    // chosen and both ends rarely are.
+    // Both ends of an edge list it; it counts at the lower end, or at each if only some dots are chosen, where
+    // both ends rarely are.
     let some = all.len() < layout.dots.len();
     let edges = all.iter().flat_map(|(i, list)| list.iter().filter(move |(j, _)| some || *j > *i));
     Some(Evenness { nearest, edges: spread(edges.map(|(_, d)| *d))? })

@@ -25,28 +25,28 @@ const PRESSURE: f64 = 1.2;
 /// Share of the force by which a dot moves in one step; stable up to about 0.3.
 const STEP: f64 = 0.2;
 /// Bound on the steps. The motion has died down to the tolerance after 50 to 200.
-const MOST_STEPS: u32 = 400;
+const MAX_STEPS: u32 = 400;
 /// The dots are at rest when none moves by more than this share of the pitch in a step.
 const AT_REST: f64 = 2e-4;
-/// The triangulation is made anew when a dot has moved by this share of the pitch since the last one.
+/// The triangulation is updated when a dot has moved by this share of the pitch since the last one.
 const RETRIANGULATE: f64 = 0.1;
 /// Ways to start: lattice places nearer to the boundary than this share of the pitch give way to the boundary's own
 /// row, which has so many dots fewer than fit. Half a row's distance (0.433) on both sides would be even; the pressure
 /// evens out the rest.
 const STARTS: [Start; 5] = [
-    Start { give_way: 0.5, fewer: 0 },
-    Start { give_way: 0.5, fewer: 1 },
-    Start { give_way: 0.35, fewer: 0 },
-    Start { give_way: 0.35, fewer: 1 },
-    Start { give_way: 0.65, fewer: 1 },
+    Start { margin: 0.5, fewer: 0 },
+    Start { margin: 0.5, fewer: 1 },
+    Start { margin: 0.35, fewer: 0 },
+    Start { margin: 0.35, fewer: 1 },
+    Start { margin: 0.65, fewer: 1 },
 ];
 /// Larger patterns are started in the first way only: their rim is a small part of them.
-const MOST_TRIED: usize = 2000;
+const MAX_RESTARTED: usize = 2000;
 
 /// A way to start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Start {
-    give_way: f64,
+    margin: f64,
     fewer: usize,
 }
 
@@ -55,7 +55,7 @@ pub(super) fn relaxed(pattern: &Pattern, edge: &Boundary) -> Vec<DVec2> {
     let pitch = pattern.pitch_px;
     let first = seeds(pattern, edge);
     let mut starts = vec![first];
-    if starts[0].len() <= MOST_TRIED {
+    if starts[0].len() <= MAX_RESTARTED {
         for start in &STARTS[1..] {
             let places = seeds_of(pattern, edge, *start);
             // A number that is wanted is kept.
@@ -72,7 +72,7 @@ pub(super) fn relaxed(pattern: &Pattern, edge: &Boundary) -> Vec<DVec2> {
             CentredOn::Gap => None,
         };
         relax(&mut places, held, edge, pitch);
-        let uneven = if places.len() <= MOST_TRIED { unevenness(&places) } else { 0.0 };
+        let uneven = if places.len() <= MAX_RESTARTED { unevenness(&places) } else { 0.0 };
         (uneven, places)
     };
     let relaxed: Vec<(f64, Vec<DVec2>)> = starts.into_par_iter().map(rest).collect();
@@ -103,7 +103,7 @@ pub(super) fn seeds(pattern: &Pattern, edge: &Boundary) -> Vec<DVec2> {
 
 fn seeds_of(pattern: &Pattern, edge: &Boundary, start: Start) -> Vec<DVec2> {
     let pitch = pattern.pitch_px;
-    let inner = edge.inset(start.give_way * pitch);
+    let inner = edge.inset(start.margin * pitch);
     let mut places: Vec<DVec2> = pattern
         .unit_lattice(edge.largest_px() / pitch)
         .into_iter()
@@ -112,7 +112,7 @@ fn seeds_of(pattern: &Pattern, edge: &Boundary, start: Start) -> Vec<DVec2> {
         .collect();
     let row = row_on(edge, pitch, pattern.rotation_rad, start.fewer);
     if let Some(wanted) = pattern.wanted {
-        give_up(&mut places, (wanted.saturating_sub(row.len())).max(1), edge);
+        thin_edge(&mut places, (wanted.saturating_sub(row.len())).max(1), edge);
     }
     places.extend(row);
     places
@@ -120,7 +120,7 @@ fn seeds_of(pattern: &Pattern, edge: &Boundary, start: Start) -> Vec<DVec2> {
 
 /// Leaves `wanted` places, taking every third from those nearest to the edge, where the lattice meets the
 /// boundary's row and has to find new places anyway.
-fn give_up(places: &mut Vec<DVec2>, wanted: usize, edge: &Boundary) {
+fn thin_edge(places: &mut Vec<DVec2>, wanted: usize, edge: &Boundary) {
     let surplus = places.len().saturating_sub(wanted);
     let from_edge = |place: &DVec2| (1e6 * (edge.radius_px(*place) - place.length())).round() as i64;
     places.sort_by_cached_key(from_edge);
@@ -164,7 +164,7 @@ fn relax(places: &mut [DVec2], held: Option<usize>, edge: &Boundary, pitch: f64)
     let mut bars: Vec<[u32; 2]> = Vec::new();
     let mut triangulated: Vec<DVec2> = Vec::new();
     let mut force = vec![DVec2::ZERO; places.len()];
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let moved = |(now, then): (&DVec2, &DVec2)| now.distance(*then) > RETRIANGULATE * pitch;
         if triangulated.is_empty() || places.iter().zip(&triangulated).any(moved) {
             bars = delaunay_edges(places);

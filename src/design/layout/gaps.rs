@@ -16,13 +16,13 @@ const POLYGON_SHARE: f64 = 0.01;
 /// Dots are sorted into square cells as wide as the widest reach, so that only neighbouring cells are looked
 /// at and the time grows with the number of dots. The map is only asked, never walked through: its order
 /// does not matter.
-pub(super) fn keep_apart(dots: Vec<Result<Dot, LostDot>>, least_mm: f64) -> Vec<Result<Dot, LostDot>> {
+pub(super) fn keep_apart(dots: Vec<Result<Dot, LostDot>>, min_mm: f64) -> Vec<Result<Dot, LostDot>> {
     let widest = dots.iter().flatten().map(|dot| reach_mm(dot) * 2.0).fold(0.0, f64::max);
-    let cell_mm = widest + least_mm;
+    let cell_mm = widest + min_mm;
     if cell_mm <= 0.0 {
         return dots;
     }
-    let tolerance = (POLYGON_SHARE * least_mm).max(1e-6 * cell_mm);
+    let tolerance = (POLYGON_SHARE * min_mm).max(1e-6 * cell_mm);
     let mut cells: HashMap<(usize, i64, i64), Vec<Kept>> = HashMap::new();
     dots.into_iter()
         .map(|result| {
@@ -34,7 +34,7 @@ pub(super) fn keep_apart(dots: Vec<Result<Dot, LostDot>>, least_mm: f64) -> Vec<
             let mut polygon = Vec::new();
             for (di, dj) in near {
                 for other in cells.get(&(dot.hit, i + di, j + dj)).into_iter().flatten() {
-                    if center.distance(other.center) - reach - other.reach >= least_mm {
+                    if center.distance(other.center) - reach - other.reach >= min_mm {
                         continue;
                     }
                     if polygon.is_empty() {
@@ -42,8 +42,8 @@ pub(super) fn keep_apart(dots: Vec<Result<Dot, LostDot>>, least_mm: f64) -> Vec<
                     }
                     let gap_mm = gap(&polygon, &other.outline.polygon_within(tolerance));
                     // The chords cut corners on both sides.
-                    if gap_mm + 1e-9 * cell_mm < least_mm {
-                        let reason = Reason::TooClose { gap_mm, least_mm };
+                    if gap_mm + 1e-9 * cell_mm < min_mm {
+                        let reason = Reason::TooClose { gap_mm, min_mm };
                         let (even_px, image_px) = (dot.even_px, Some(dot.image_px));
                         return Err(LostDot { id: 0, even_px, image_px, reason });
                     }

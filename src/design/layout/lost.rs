@@ -25,16 +25,16 @@ pub struct LostDot {
 pub enum Reason {
     /// Lens, layers or dome give no ray for it.
     Unseen(Limit),
-    /// Part of it would lie outside the camera's raster.
+    /// Part of it would lie outside the image.
     OutsideImage,
     /// Part of it would lie outside the runtime's mask.
     OutsideMask,
-    /// A white marker stands in its line of sight.
+    /// A white marker is in its line of sight.
     HiddenByMarker {
         /// Number of the white marker.
         marker: u32,
     },
-    /// The edge of the upper platform's window stands in its line of sight.
+    /// The edge of the upper platform's window is in its line of sight.
     HiddenByPlatform,
     /// A keep-out zone of the design.
     KeepOut(Zone),
@@ -43,14 +43,14 @@ pub enum Reason {
         /// Its least width on the plate, mm.
         width_mm: f64,
         /// What can be printed, mm.
-        least_mm: f64,
+        min_mm: f64,
     },
     /// Closer to a dot nearer to the centre than the pad keeps apart.
     TooClose {
         /// Width of the gap on the plate, mm.
         gap_mm: f64,
         /// What can be printed, mm.
-        least_mm: f64,
+        min_mm: f64,
     },
     /// Further around the dome than the pad can wrap, from every hit.
     BeyondWrap {
@@ -135,7 +135,7 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unseen(limit) => write!(f, "the lens cannot see it ({limit})"),
-            Self::OutsideImage => write!(f, "part of it lies outside the camera's raster"),
+            Self::OutsideImage => write!(f, "part of it lies outside the image"),
             Self::OutsideMask => write!(f, "part of it lies outside the runtime's mask"),
             Self::HiddenByMarker { marker } => write!(f, "white marker {marker} hides it"),
             Self::HiddenByPlatform => write!(f, "the edge of the upper platform's window hides it"),
@@ -145,14 +145,11 @@ impl fmt::Display for Reason {
                 Zone::WhiteMarker(id) => write!(f, "it reaches into the keep-out zone of white marker {id}"),
                 Zone::ImageDisc(index) => write!(f, "it reaches into keep-out disc {index}"),
             },
-            Self::TooSmall { width_mm, least_mm } => {
-                write!(f, "it is {width_mm:.3} mm wide on the plate, {least_mm} mm can be printed")
+            Self::TooSmall { width_mm, min_mm } => {
+                write!(f, "it is {width_mm:.3} mm wide on the plate, {min_mm} mm can be printed")
             }
-            Self::TooClose { gap_mm, least_mm } => {
-                write!(
-                    f,
-                    "its gap to a neighbour is {gap_mm:.3} mm on the plate, {least_mm} mm can be printed"
-                )
+            Self::TooClose { gap_mm, min_mm } => {
+                write!(f, "its gap to a neighbour is {gap_mm:.3} mm on the plate, {min_mm} mm can be printed")
             }
             Self::BeyondWrap { wrap_rad, limit_rad } => write!(
                 f,

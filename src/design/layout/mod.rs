@@ -1,7 +1,7 @@
 //! From a pattern in the image to dots on the dome and on the plate.
 //!
 //! The pattern is laid out where it has to look even: in the raw image, or in the runtime's undistorted
-//! frame. Each dot is carried back along the camera's rays through the layers to the dome, and from there by
+//! frame. Each dot is projected along the camera's rays through the layers to the dome, and from there by
 //! the pad's map to the plate. What cannot be seen or printed is left out with its reason, or refused, as the
 //! design says.
 

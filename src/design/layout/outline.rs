@@ -30,7 +30,7 @@ pub struct OutlineFit {
 }
 
 /// Most pieces of one outline: a curve that needs more is no smooth closed curve.
-const MOST_PIECES: u32 = 256;
+const MAX_PIECES: u32 = 256;
 
 /// The largest distance over the largest that is seen.
 const SEEN: f64 = 1.1;
@@ -38,8 +38,8 @@ const SEEN: f64 = 1.1;
 impl Outline {
     /// The outline of a smooth closed curve, given as a function of an angle over a full turn.
     ///
-    /// The pieces meet the curve and its direction at their ends. Their handles are those of a circle's arc,
-    /// carried along by the curve's slope, so that an ellipse is met as well as a circle can be; their number
+    /// The pieces have the curve's point and direction at their ends. Their handles are those of a circle's arc,
+    /// scaled by the curve's slope, so that an ellipse is as close as a circle can be; their number
     /// doubles from four until the distance between, measured across the curve, is within the tolerance.
     ///
     /// # Errors
@@ -53,7 +53,7 @@ impl Outline {
             let (outline, error) = Self::of_curve_in(&mut curve, count)?;
             // between the places that are looked at it may be a little larger
             let reached = SEEN * error <= tolerance;
-            if reached || count >= MOST_PIECES {
+            if reached || count >= MAX_PIECES {
                 return Ok((outline, OutlineFit { error, reached }));
             }
             count *= 2;

@@ -26,7 +26,7 @@ impl Hit {
 }
 
 /// Most sectors: more films than any shop would print.
-const MOST_SECTORS: u32 = 12;
+const MAX_SECTORS: u32 = 12;
 
 /// Halvings in the search for the tilt.
 const HALVINGS: u32 = 60;
@@ -45,10 +45,10 @@ pub(super) fn split(polar_rad: f64, reach_rad: f64, max_tilt_rad: f64) -> Vec<Hi
         return vec![centre];
     }
     let steepest = max_tilt_rad.clamp(0.0, FRAC_PI_2);
-    let (count, tilt_rad) = (2..=MOST_SECTORS)
+    let (count, tilt_rad) = (2..=MAX_SECTORS)
         .map(|count| (count, best_tilt_rad(polar_rad, reach_rad, count).min(steepest)))
         .find(|(count, tilt)| furthest_rad(*tilt, polar_rad, reach_rad, *count) <= reach_rad)
-        .unwrap_or((MOST_SECTORS, best_tilt_rad(polar_rad, reach_rad, MOST_SECTORS).min(steepest)));
+        .unwrap_or((MAX_SECTORS, best_tilt_rad(polar_rad, reach_rad, MAX_SECTORS).min(steepest)));
     let sectors = (0..count).map(|k| Hit::new(tilt_rad, TAU * f64::from(k) / f64::from(count)));
     std::iter::once(centre).chain(sectors).collect()
 }

@@ -32,7 +32,7 @@ pub enum PatternError {
         /// Places that the pitch leads to, roughly.
         about: f64,
         /// The bound.
-        most: usize,
+        max: usize,
     },
     /// No dot fits between the centre and the edge.
     Empty,

@@ -10,7 +10,7 @@ use super::pattern::{Pattern, PatternError};
 use crate::spec::sections::{CentredOn, PatternKind};
 
 /// Bound on the number of places of one pattern: ten times what a camera of 100 megapixels could tell apart.
-const MOST_DOTS: usize = 4_000_000;
+const MAX_DOTS: usize = 4_000_000;
 
 impl Pattern {
     /// The places of all dots inside the edge, from the centre outwards and by angle.
@@ -19,8 +19,8 @@ impl Pattern {
     /// No dot fits, or far too many do.
     pub fn places(&self, edge: &Boundary) -> Result<Vec<DVec2>, PatternError> {
         let about = edge.area_px2() / (self.pitch_px * self.pitch_px);
-        if about.is_nan() || about > MOST_DOTS as f64 {
-            return Err(PatternError::TooMany { about, most: MOST_DOTS });
+        if about.is_nan() || about > MAX_DOTS as f64 {
+            return Err(PatternError::TooMany { about, max: MAX_DOTS });
         }
         let mut places = match self.kind {
             PatternKind::Square | PatternKind::Hexagonal => self.lattice(edge),
@@ -37,7 +37,7 @@ impl Pattern {
     /// How many places [`Self::places`] gives, without finding them exactly: relaxing moves places, but
     /// neither adds nor takes any.
     pub(super) fn count(&self, edge: &Boundary) -> usize {
-        if edge.area_px2() / (self.pitch_px * self.pitch_px) > MOST_DOTS as f64 {
+        if edge.area_px2() / (self.pitch_px * self.pitch_px) > MAX_DOTS as f64 {
             return usize::MAX;
         }
         match self.kind {
@@ -104,8 +104,8 @@ impl Pattern {
         if area <= 0.0 {
             return Err(PatternError::Empty);
         }
-        if wanted > MOST_DOTS {
-            return Err(PatternError::TooMany { about: wanted as f64, most: MOST_DOTS });
+        if wanted > MAX_DOTS {
+            return Err(PatternError::TooMany { about: wanted as f64, max: MAX_DOTS });
         }
         let guess = (area / wanted.max(1) as f64).sqrt();
         // Bracket: more than wanted at `fine`, no more than wanted at `coarse`.

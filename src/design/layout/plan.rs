@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::boundary::Boundary;
 use super::check::check_dot;
-use super::dot::{Carrier, Dot, DotSize};
+use super::dot::{Dot, DotProjector, DotSize};
 use super::edge::{center, edge};
 use super::error::LayoutError;
 use super::frame::EvenFrame;
@@ -81,7 +81,7 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
     let size = spec.size()?;
     let transfer = spec.transfer()?;
     let frame = EvenFrame::new(spec.optics.lens(), spec.pattern.even_in, spec.undistorted);
-    let carrier = Carrier {
+    let projector = DotProjector {
         optics: &spec.optics,
         frame,
         transfer: &transfer,
@@ -90,7 +90,7 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
     };
     let center_px = center(spec, &frame)?;
     let mut warnings = Vec::new();
-    let edge = edge(spec, &carrier, center_px, &mut warnings)?;
+    let edge = edge(spec, &projector, center_px, &mut warnings)?;
     let (pitch_px, places) = places(spec, &edge)?;
     if let DotSize::Apparent(diameter) = size
         && diameter >= pitch_px
@@ -102,10 +102,12 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
             format!("below the pitch, {pitch_px} px"),
         ));
     }
-    let hits = plan_hits(spec, &carrier, center_px, &places);
+    let hits = plan_hits(spec, &projector, center_px, &places);
     let zones = zones::image_zones(spec);
-    let checked: Vec<Result<Dot, LostDot>> =
-        places.par_iter().map(|place| check_dot(spec, &carrier, &hits, &zones, center_px + *place)).collect();
+    let checked: Vec<Result<Dot, LostDot>> = places
+        .par_iter()
+        .map(|place| check_dot(spec, &projector, &hits, &zones, center_px + *place))
+        .collect();
     let checked = gaps::keep_apart(checked, spec.print.min_gap_mm);
     let mut dots = Vec::with_capacity(checked.len());
     let mut lost = Vec::new();
@@ -146,17 +148,22 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
 }
 
 /// The hits that the dots of the pattern need, those left aside that the lens does not see.
-fn plan_hits(spec: &LayoutSpec, carrier: &Carrier<'_>, center_px: DVec2, places: &[DVec2]) -> Vec<Hit> {
+fn plan_hits(
+    spec: &LayoutSpec,
+    projector: &DotProjector<'_>,
+    center_px: DVec2,
+    places: &[DVec2],
+) -> Vec<Hit> {
     if spec.print.hits == Hits::Single {
         return vec![Hit::new(0.0, 0.0)];
     }
     let radius_mm = spec.optics.dome_radius_mm();
     let polar_and_own = |place: &DVec2| -> Option<(f64, f64)> {
         let even_px = center_px + *place;
-        let pixel = carrier.frame.raw_from_even(even_px).ok()?;
+        let pixel = projector.frame.raw_from_even(even_px).ok()?;
         let surface = spec.optics.trace(pixel).ok()?;
-        let curve = carrier.curve(even_px, surface.surface_mm);
-        let own_rad = (0.5 * carrier.dome_diameter_mm(&curve).ok()? / radius_mm).min(1.0).asin();
+        let curve = projector.curve(even_px, surface.surface_mm);
+        let own_rad = (0.5 * projector.dome_diameter_mm(&curve).ok()? / radius_mm).min(1.0).asin();
         Some((surface.normal.truncate().length().atan2(surface.normal.z), own_rad))
     };
     let (polar_rad, own_rad) = places
@@ -178,11 +185,11 @@ fn places(spec: &LayoutSpec, edge: &Boundary) -> Result<(f64, Vec<DVec2>), Layou
     };
     let fault = |field: &'static str, value: String| {
         move |error: PatternError| match error {
-            PatternError::TooMany { about, most } => LayoutError::new(
+            PatternError::TooMany { about, max } => LayoutError::new(
                 field,
                 value,
                 format!("it leads to about {about:.2e} dots"),
-                format!("a pattern of up to {most} dots"),
+                format!("a pattern of up to {max} dots"),
             ),
             PatternError::Empty => LayoutError::new(
                 field,

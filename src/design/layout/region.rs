@@ -8,7 +8,7 @@ use super::boundary::Boundary;
 use super::frame::EvenFrame;
 use domecast_optics::{Limit, SensorOptics};
 
-/// Points at which a circle of the dome is carried into the image.
+/// Points of a circle of the dome that are projected into the image.
 const AROUND: u32 = 720;
 
 /// Halvings of the search for the last point that the lens sees.
@@ -31,7 +31,7 @@ pub fn dome_point(radius_mm: f64, polar_rad: f64, azimuth_rad: f64) -> DVec3 {
     out.extend(cos) * radius_mm
 }
 
-/// Carries the parallel at `polar_rad` into the even frame, as a boundary around `center_px`. Where the lens
+/// Projects the parallel at `polar_rad` into the even frame, as a boundary around `center_px`. Where the lens
 /// does not reach the parallel, the boundary follows the end of what it sees.
 ///
 /// # Errors

@@ -112,21 +112,21 @@ impl LayoutReport {
 }
 
 impl LayoutReport {
-    /// What a person wants to know first: how even the pattern is, what the pinhole alone would have made of it, and
-    /// which tolerance hurts most.
+    /// The main figures in words: how even the pattern is, the same pattern without refraction, and the tolerance that
+    /// costs most.
     pub fn headlines(&self) -> Vec<String> {
-        let mut said = Vec::new();
+        let mut lines = Vec::new();
         let percent = |variation: f64| 100.0 * variation;
         if let Some(own) = &self.evenness {
-            said.push(format!(
+            lines.push(format!(
                 "distances to the nearest dot vary by {:.2} % in the image, {:.1} % on the dome",
                 percent(own.image_px.nearest.variation),
                 percent(own.dome_mm.nearest.variation)
             ));
         }
         if let Some(pinhole) = &self.pinhole_alone {
-            said.push(format!(
-                "laid out by the pinhole alone they would vary by {:.1} %, dots {:.2} mm off on average, {:.2} mm at most",
+            lines.push(format!(
+                "laid out without refraction they would vary by {:.1} %, dots {:.2} mm off on average, {:.2} mm at most",
                 percent(pinhole.image_px.nearest.variation),
                 pinhole.mean_shift_mm,
                 pinhole.max_shift_mm
@@ -135,14 +135,14 @@ impl LayoutReport {
         if let Some(tolerances) = &self.tolerances
             && let Some(worst) = tolerances.ranking.first()
         {
-            said.push(format!(
-                "within the tolerances 19 of 20 sensors vary by less than {:.1} %; {} hurts most ({:.1} % alone)",
+            lines.push(format!(
+                "within the tolerances 19 of 20 sensors vary by less than {:.1} %; {} costs most ({:.1} % alone)",
                 percent(tolerances.nearest_variation_p95),
                 worst.tolerance,
                 percent(worst.added_variation)
             ));
         }
-        said
+        lines
     }
 }
 
@@ -173,14 +173,14 @@ fn coverages(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<Coverag
     positions.into_iter().map(|(load, optics)| CoverageRecord { load, coverage: optics.map(look) }).collect()
 }
 
-/// What a person should know of the dots that a load takes out of sight.
+/// Warnings about dots that a load hides.
 fn lost_under_load(coverage: &[CoverageRecord]) -> Vec<String> {
     let lost = coverage.iter().filter_map(|record| {
         let unseen = &record.coverage.as_ref()?.unseen_dots;
         let first = unseen.first()?;
         let (count, load) = (unseen.len(), &record.load);
         Some(format!(
-            "{count} dots are not seen whole ({load}); the first, dot {}: {}",
+            "{count} dots are not fully visible ({load}); the first, dot {}: {}",
             first.id, first.because
         ))
     });

@@ -17,7 +17,7 @@ pub struct TargetMark {
     pub ring: u32,
     /// Its place on the ring, from +x.
     pub spoke: u32,
-    /// Where it shall land on the dome, frame of the hit, mm.
+    /// Where it should land on the dome, frame of the hit, mm.
     pub surface_mm: DVec3,
     /// Where it stands on the plate by the design's map, mm.
     pub plate_mm: DVec2,
@@ -28,7 +28,7 @@ pub struct TargetMark {
 }
 
 /// Most rings; eight make 217 marks, with which the fit's own error is a tenth of the scatter.
-const MOST_RINGS: u32 = 8;
+const MAX_RINGS: u32 = 8;
 /// Marks are this much wider on the dome than what can just be etched where the map is steepest.
 const SURELY_PRINTED: f64 = 1.15;
 /// The marks along +x are larger by this, so that a photograph shows which way round it is.
@@ -40,8 +40,8 @@ pub fn print_target(transfer: &TransferMap, print: &PrintSection) -> Vec<TargetM
     let radius_mm = transfer.dome_radius_mm();
     let reach_rad = print.wrap_limit_deg.to_radians().min(transfer.max_polar_rad());
     let mut marks = Vec::new();
-    for rings in (2..=MOST_RINGS).rev() {
-        // The outermost marks lie inside the limit with their whole size.
+    for rings in (2..=MAX_RINGS).rev() {
+        // The outermost marks are fully inside the limit.
         let mut diameter_mm = SURELY_PRINTED * print.min_dot_mm / reach_rad.cos().max(0.2);
         diameter_mm = diameter_mm.min(0.3 * radius_mm);
         let outer_rad = (reach_rad - 0.5 * BOLD * diameter_mm / radius_mm).max(0.1 * reach_rad);

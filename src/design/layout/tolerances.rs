@@ -16,7 +16,7 @@ use domecast_optics::numeric::SeededRandom;
 pub struct ToleranceReport {
     /// Sensors drawn.
     pub samples: usize,
-    /// Dots that were followed, with their neighbours: all, or an even choice of a large pattern.
+    /// Dots that were sampled, with their neighbours: all, or an even choice of a large pattern.
     pub dots: usize,
     /// Sensors of which a dot could not be seen; they count in no figure.
     pub blind: usize,
@@ -56,24 +56,24 @@ const TOLERANCES: [&str; 8] = [
 
 /// Patterns of more dots are judged by an even choice of about this many, so that the time does not grow with
 /// the pattern: the figures are means over dots, and a thousand of them are known to a few percent.
-const MOST_FOLLOWED: usize = 1500;
+const MAX_SAMPLED: usize = 1500;
 
 /// Sensors for each entry of the ranking, at most.
 const RANKING_SAMPLES: u32 = 48;
 
 /// A gap between layers that would be negative is closed; the pupil stays this far under the sheet, mm.
-const LEAST_AIR_MM: f64 = 1e-6;
+const MIN_AIR_MM: f64 = 1e-6;
 
-/// Draws sensors within the tolerances and tells what evenness to expect, and which tolerance hurts most.
+/// Draws sensors within the tolerances: the evenness to expect, and the tolerance that costs most.
 pub fn under_tolerances(
     spec: &LayoutSpec,
     layout: &Layout,
     tolerances: &TolerancesSection,
 ) -> Option<ToleranceReport> {
     let image: Vec<_> = layout.dots.iter().map(|dot| Some(dot.image_px)).collect();
-    let followed = Followed::new(layout);
-    let own = evenness_of(layout, followed.chosen(), &image, in_plane, |_, _| true)?.nearest.variation;
-    let draw = |only: Option<usize>, count: u32| draw(spec, layout, &followed, tolerances, only, count);
+    let sampled = SampledDots::new(layout);
+    let own = evenness_of(layout, sampled.chosen(), &image, in_plane, |_, _| true)?.nearest.variation;
+    let draw = |only: Option<usize>, count: u32| draw(spec, layout, &sampled, tolerances, only, count);
     let drawn = draw(None, tolerances.sensors());
     let mut variations: Vec<f64> = drawn.iter().flatten().map(|(variation, _)| *variation).collect();
     variations.sort_by(f64::total_cmp);
@@ -99,7 +99,7 @@ pub fn under_tolerances(
     ranking.sort_by(|a, b| b.added_variation.total_cmp(&a.added_variation));
     Some(ToleranceReport {
         samples: drawn.len(),
-        dots: followed.chosen().count(),
+        dots: sampled.chosen().count(),
         blind: drawn.iter().filter(|sample| sample.is_none()).count(),
         nearest_variation_median: at(0.5)?,
         nearest_variation_p95: at(0.95)?,
@@ -116,7 +116,7 @@ pub fn drawn_shifts_px(
     tolerances: &TolerancesSection,
     count: u32,
 ) -> Vec<Option<f64>> {
-    let drawn = draw(spec, layout, &Followed::new(layout), tolerances, None, count);
+    let drawn = draw(spec, layout, &SampledDots::new(layout), tolerances, None, count);
     drawn.into_iter().map(|sensor| sensor.map(|(_, shift_px)| shift_px)).collect()
 }
 
@@ -124,7 +124,7 @@ pub fn drawn_shifts_px(
 fn draw(
     spec: &LayoutSpec,
     layout: &Layout,
-    followed: &Followed,
+    sampled: &SampledDots,
     tolerances: &TolerancesSection,
     only: Option<usize>,
     count: u32,
@@ -134,21 +134,21 @@ fn draw(
         .into_par_iter()
         .map(|sample| {
             let mut random = SeededRandom::stream(tolerances.seed, stream + u64::from(sample));
-            sensor(spec, layout, followed, tolerances, only, &mut random)
+            sensor(spec, layout, sampled, tolerances, only, &mut random)
         })
         .collect()
 }
 
-/// The dots that are followed through the drawn sensors.
-struct Followed {
+/// The dots that are sampled through the drawn sensors.
+struct SampledDots {
     step: usize,
-    /// For each dot, whether its place is needed: because it is followed, or because a neighbour is.
+    /// For each dot, whether its place is needed: because it is sampled, or because a neighbour is.
     needed: Vec<bool>,
 }
 
-impl Followed {
+impl SampledDots {
     fn new(layout: &Layout) -> Self {
-        let step = layout.dots.len().div_ceil(MOST_FOLLOWED).max(1);
+        let step = layout.dots.len().div_ceil(MAX_SAMPLED).max(1);
         let mut needed = vec![false; layout.dots.len()];
         for (i, dot) in layout.dots.iter().enumerate().step_by(step) {
             needed[i] = true;
@@ -171,7 +171,7 @@ impl Followed {
 fn sensor(
     spec: &LayoutSpec,
     layout: &Layout,
-    followed: &Followed,
+    sampled: &SampledDots,
     tolerances: &TolerancesSection,
     only: Option<usize>,
     random: &mut SeededRandom,
@@ -196,11 +196,11 @@ fn sensor(
     }
     let place = &made.sensor_from_camera;
     let mut pupil_mm = place.translation_mm + shift;
-    pupil_mm.z = pupil_mm.z.min(-sheet_mm - LEAST_AIR_MM);
+    pupil_mm.z = pupil_mm.z.min(-sheet_mm - MIN_AIR_MM);
     made.sensor_from_camera = Rigid::new(turn * place.rotation, pupil_mm);
     let optics = spec.optics.rebuilt(&made).ok()?;
 
-    // Each hit is registered anew.
+    // Each print pass has its own registration.
     let moved: Vec<(DVec2, DVec2)> = layout
         .hits
         .iter()
@@ -214,7 +214,7 @@ fn sensor(
     let seen: Option<Vec<Option<DVec2>>> = layout
         .dots
         .iter()
-        .zip(&followed.needed)
+        .zip(&sampled.needed)
         .map(|(dot, needed)| {
             if !needed {
                 return Some(None);
@@ -228,8 +228,8 @@ fn sensor(
         })
         .collect();
     let seen = seen?;
-    let variation = evenness_of(layout, followed.chosen(), &seen, in_plane, |_, _| true)?.nearest.variation;
+    let variation = evenness_of(layout, sampled.chosen(), &seen, in_plane, |_, _| true)?.nearest.variation;
     let shift = |i: usize| Some(seen[i]?.distance(layout.dots[i].image_px));
-    let shifts: Vec<f64> = followed.chosen().filter_map(shift).collect();
+    let shifts: Vec<f64> = sampled.chosen().filter_map(shift).collect();
     Some((variation, shifts.iter().sum::<f64>() / shifts.len().max(1) as f64))
 }

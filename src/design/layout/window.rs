@@ -14,7 +14,7 @@ use crate::spec::Design;
 use domecast_optics::SensorOptics;
 use domecast_optics::camera::Lens;
 
-/// Directions in which the dome's rim is looked at.
+/// Azimuths at which the dome's rim is sampled.
 const DIRECTIONS: u32 = 72;
 /// Heights at which the opening is taken. Between them it is bounded by chords, which lie outside: the hull of
 /// straight lines narrows the faster the nearer it is to the pupil.
@@ -29,12 +29,12 @@ pub struct Window {
 
 /// A straight line of sight in air, in the platform's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct SightLine {
+struct ViewRay {
     pupil_mm: DVec3,
     direction: DVec3,
 }
 
-impl SightLine {
+impl ViewRay {
     /// The line that a pixel sees along; `None` if the lens has none or it does not lead up.
     fn of_pixel(optics: &SensorOptics, pixel: DVec2) -> Option<Self> {
         let ray = optics.lens().unproject(pixel).ok()?;
@@ -54,16 +54,16 @@ impl SightLine {
 
 impl Window {
     /// The opening that a design asks for. `positions` are the optics at the positions of the springs that count.
-    /// `None` if the lens sees the rim at none of them: then nothing can be said of the window.
+    /// `None` if the lens sees the rim at none of them: then the window is unknown.
     pub fn of_design<'a>(design: &Design, positions: impl Iterator<Item = &'a SensorOptics>) -> Option<Self> {
         let platforms = &design.sections().platforms;
         let (low_mm, high_mm) = (platforms.upper.underside_z_mm, design.sheet_underside_z_mm());
-        let rim: Vec<SightLine> = positions
+        let rim: Vec<ViewRay> = positions
             .flat_map(|optics| {
                 (0..DIRECTIONS).filter_map(move |k| {
                     let azimuth_rad = TAU * f64::from(k) / f64::from(DIRECTIONS);
                     let point = dome_point(optics.dome_radius_mm(), TAU / 4.0, azimuth_rad);
-                    SightLine::of_pixel(optics, optics.project(point).ok()?)
+                    ViewRay::of_pixel(optics, optics.project(point).ok()?)
                 })
             })
             .collect();
@@ -86,7 +86,7 @@ impl Window {
     /// Narrowest gap, sideways, between the window's edge and the line that a pixel sees along, mm; negative where
     /// the edge stands before it. `None` if the pixel sees along no line.
     pub(super) fn gap_mm(&self, optics: &SensorOptics, pixel: DVec2) -> Option<f64> {
-        let line = SightLine::of_pixel(optics, pixel)?;
+        let line = ViewRay::of_pixel(optics, pixel)?;
         let gaps = self.edge_mm.iter().map(|(height_mm, radius_mm)| radius_mm - line.off_axis_mm(*height_mm));
         Some(gaps.fold(f64::INFINITY, f64::min))
     }

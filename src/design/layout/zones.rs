@@ -41,7 +41,7 @@ impl ImageZone {
     }
 }
 
-/// The images of the white markers at the pose that `optics` carries. A marker that the lens does not see makes
+/// The images of the white markers at the pose of `optics`. A marker that the lens does not see makes
 /// none.
 pub(super) fn marker_zones(optics: &SensorOptics, markers: &[WhiteMarker]) -> Vec<ImageZone> {
     let zone = |marker: &WhiteMarker| {
@@ -93,7 +93,7 @@ pub(super) fn check_corners(zones: &[ImageZone], dot: &[DVec2]) -> Result<(), Re
 
 /// Distance between two polygons; zero where they overlap. A polygon of one corner is a point.
 pub(super) fn gap(a: &[DVec2], b: &[DVec2]) -> f64 {
-    // Every corner is asked: polygons that cross may have one corner in each other, and it need not be the first.
+    // Every corner is checked: polygons that cross may have one corner in each other, and it need not be the first.
     if a.iter().any(|p| inside(*p, b)) || b.iter().any(|p| inside(*p, a)) {
         return 0.0;
     }

@@ -10,6 +10,7 @@ use std::fmt::Write as _;
 use glam::DVec2;
 
 use super::measures::Measures;
+use domecast_mesh::{DxfFile, DxfText, DxfVertex};
 
 struct Drawing {
     half_mm: DVec2,
@@ -39,58 +40,32 @@ fn drawing(m: &Measures) -> Drawing {
     }
 }
 
-/// The cutter's drawing as DXF (R12, which every cutter reads; polylines with
-/// bulges for the arcs).
+/// The cutter's drawing as DXF; polylines with bulges for the arcs.
 pub(super) fn dxf(m: &Measures) -> String {
     let d = drawing(m);
-    let mut out = String::from(
-        "0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1009\n9\n$INSUNITS\n70\n4\n9\n$MEASUREMENT\n70\n1\n0\nENDSEC\n",
-    );
-    out.push_str("0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLAYER\n70\n3\n");
-    for (layer, color) in [("CUT", 1), ("MARK", 5), ("NOTES", 8)] {
-        let _ = write!(out, "0\nLAYER\n2\n{layer}\n70\n0\n62\n{color}\n6\nCONTINUOUS\n");
-    }
-    out.push_str("0\nENDTAB\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n");
+    let mut file = DxfFile::new(&[("CUT", 1), ("MARK", 5), ("NOTES", 8)]);
     let (h, r) = (d.half_mm, d.corner_mm);
     // Counter-clockwise; the bulge of a quarter circle is tan(90/4 degrees).
-    let bulge = if r > 0.0 { (std::f64::consts::PI / 8.0).tan() } else { 0.0 };
+    let arc = if r > 0.0 { (std::f64::consts::PI / 8.0).tan() } else { 0.0 };
     let path = [
         (DVec2::new(-h.x + r, -h.y), 0.0),
-        (DVec2::new(h.x - r, -h.y), bulge),
+        (DVec2::new(h.x - r, -h.y), arc),
         (DVec2::new(h.x, -h.y + r), 0.0),
-        (DVec2::new(h.x, h.y - r), bulge),
+        (DVec2::new(h.x, h.y - r), arc),
         (DVec2::new(h.x - r, h.y), 0.0),
-        (DVec2::new(-h.x + r, h.y), bulge),
+        (DVec2::new(-h.x + r, h.y), arc),
         (DVec2::new(-h.x, h.y - r), 0.0),
-        (DVec2::new(-h.x, -h.y + r), bulge),
+        (DVec2::new(-h.x, -h.y + r), arc),
     ];
-    out.push_str("0\nPOLYLINE\n8\nCUT\n66\n1\n10\n0.0\n20\n0.0\n30\n0.0\n70\n1\n");
-    for (p, bulge) in path {
-        let _ = write!(out, "0\nVERTEX\n8\nCUT\n10\n{:.6}\n20\n{:.6}\n30\n0.0\n42\n{bulge:.12}\n", p.x, p.y);
-    }
-    out.push_str("0\nSEQEND\n8\nCUT\n");
+    file.polyline("CUT", &path.map(|(at_mm, bulge)| DxfVertex { at_mm, bulge }), true, 0.0);
     for (at, radius) in &d.circles {
-        let _ =
-            write!(out, "0\nCIRCLE\n8\nMARK\n10\n{:.6}\n20\n{:.6}\n30\n0.0\n40\n{radius:.6}\n", at.x, at.y);
+        file.circle("MARK", *at, *radius);
     }
     let b = d.bar_from_mm;
-    let _ = write!(
-        out,
-        "0\nLINE\n8\nNOTES\n10\n{:.6}\n20\n{:.6}\n30\n0.0\n11\n{:.6}\n21\n{:.6}\n31\n0.0\n",
-        b.x,
-        b.y,
-        b.x + BAR_MM,
-        b.y
-    );
-    let _ = write!(
-        out,
-        "0\nTEXT\n8\nNOTES\n10\n{:.6}\n20\n{:.6}\n30\n0.0\n40\n1.5\n1\n{}\n",
-        b.x,
-        b.y - 3.0,
-        d.note
-    );
-    out.push_str("0\nENDSEC\n0\nEOF\n");
-    out
+    file.line("NOTES", b, b + DVec2::X * BAR_MM);
+    let at_mm = b - DVec2::Y * 3.0;
+    file.text("NOTES", &DxfText { at_mm, height_mm: 1.5, is_centered: false, words: &d.note });
+    file.finish()
 }
 
 /// The same as SVG, true to scale, with Inkscape layers.

@@ -1,4 +1,4 @@
-//! What a person is told when a design cannot be used.
+//! The error of a design that cannot be used.
 
 use std::fmt;
 use std::path::{Path, PathBuf};

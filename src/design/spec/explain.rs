@@ -57,7 +57,7 @@ pub fn explain(field: &str, design: &Value) -> Result<Explained, DesignError> {
     let mut path = String::new();
     for piece in pieces(field) {
         match piece {
-            Piece::Index(index) => {
+            PathPart::Index(index) => {
                 let Some(items) = items_of(root, schema) else {
                     return Err(unknown(&format!("{path}[{index}]"), &path, "is no list", &[]));
                 };
@@ -65,7 +65,7 @@ pub fn explain(field: &str, design: &Value) -> Result<Explained, DesignError> {
                 value = value.and_then(|value| value.get(index));
                 path = format!("{path}[{index}]");
             }
-            Piece::Key(key) => {
+            PathPart::Key(key) => {
                 // a list's items may be meant without an index
                 if property(root, schema, key).is_none()
                     && let Some(items) = items_of(root, schema)
@@ -121,20 +121,20 @@ pub fn explain(field: &str, design: &Value) -> Result<Explained, DesignError> {
     })
 }
 
-enum Piece<'a> {
+enum PathPart<'a> {
     Key(&'a str),
     Index(usize),
 }
 
 /// `optics.layers[0].index` in pieces; an empty path is the file itself.
-fn pieces(field: &str) -> Vec<Piece<'_>> {
+fn pieces(field: &str) -> Vec<PathPart<'_>> {
     let mut found = Vec::new();
     for part in field.split(['.', '/']).filter(|part| !part.is_empty()) {
         let mut rest = part.split('[');
         if let Some(key) = rest.next().filter(|key| !key.is_empty()) {
-            found.push(Piece::Key(key));
+            found.push(PathPart::Key(key));
         }
-        found.extend(rest.filter_map(|index| index.trim_end_matches(']').parse().ok()).map(Piece::Index));
+        found.extend(rest.filter_map(|index| index.trim_end_matches(']').parse().ok()).map(PathPart::Index));
     }
     found
 }
@@ -206,7 +206,7 @@ fn allowed(root: &Value, schema: &Value) -> String {
         if form.get("enum").is_none() {
             add(form.get("type").and_then(Value::as_str).unwrap_or_default().to_owned());
         }
-        for (key, said) in [
+        for (key, phrase) in [
             ("minimum", "at least"),
             ("exclusiveMinimum", "more than"),
             ("maximum", "at most"),
@@ -215,7 +215,7 @@ fn allowed(root: &Value, schema: &Value) -> String {
             ("maxItems", "items: at most"),
         ] {
             if let Some(limit) = form.get(key) {
-                add(format!("{said} {limit}"));
+                add(format!("{phrase} {limit}"));
             }
         }
     }

@@ -10,9 +10,9 @@ use super::sections::{DesignFile, ModelName};
 use domecast_optics::SensorOptics;
 
 /// Tangential coefficients of real lenses stay far below this; k3 in their place does not.
-const LARGEST_TANGENTIAL: f64 = 0.005;
+const MAX_TANGENTIAL: f64 = 0.005;
 /// Share of the stated field of view below which what the frame shows belongs to another lens model.
-const LEAST_OF_VIEW: f64 = 0.8;
+const MIN_SHARE_OF_VIEW: f64 = 0.8;
 /// A part of the sensor this many times smaller or larger than its neighbour is in another unit.
 const OTHER_UNIT: f64 = 50.0;
 
@@ -141,7 +141,7 @@ fn tangential(file: &DesignFile) -> Option<DesignWarning> {
     }
     let [_, _, p1, p2, k3, ..] = *file.camera.distortion.as_slice() else { return None };
     let largest = p1.abs().max(p2.abs());
-    (largest > LARGEST_TANGENTIAL && largest > k3.abs()).then(|| {
+    (largest > MAX_TANGENTIAL && largest > k3.abs()).then(|| {
         lint(
             "camera.distortion",
             format!(
@@ -169,7 +169,7 @@ fn other_model(file: &DesignFile, optics: &SensorOptics) -> Option<DesignWarning
         .filter_map(|&(u, v)| lens.unproject(glam::DVec2::new(u, v)).ok())
         .map(|ray| ray.z.clamp(-1.0, 1.0).acos().to_degrees())
         .fold(0.0, f64::max);
-    (seen_deg > 0.0 && seen_deg < LEAST_OF_VIEW * half_deg).then(|| {
+    (seen_deg > 0.0 && seen_deg < MIN_SHARE_OF_VIEW * half_deg).then(|| {
         lint(
             "camera.model",
             format!(

@@ -98,7 +98,7 @@ fn check_version(value: &Value) -> Result<(), DesignError> {
             "this release does not read that version of the design file",
             "1",
         )
-        .with_help("write the design anew from a current example, such as designs/thumb24.json")),
+        .with_help("start from a current example, such as designs/thumb24.json")),
         _ => Ok(()),
     }
 }

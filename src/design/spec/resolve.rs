@@ -43,7 +43,7 @@ pub(super) fn optics(
         dome_radius_mm: dome.radius_mm,
     };
     SensorOptics::new(&spec).map_err(|fault| {
-        // the optics speak of their own inputs; the writer knows the fields of the file
+        // the optics name their own inputs; the message names the fields of the file
         let field = match fault.field.split_once('.') {
             Some(("lens", rest)) => {
                 format!("camera.{}", rest.replace("field_of_view_rad", "field_of_view_deg"))
@@ -74,7 +74,7 @@ pub(super) fn resolve(mut sections: DesignFile, text: &str) -> Result<Design, De
     Ok(design)
 }
 
-/// A field of view that the lens model cannot reach is said, with the fold that ends it.
+/// A warning about a field of view that the lens model cannot reach, with the fold that ends it.
 fn field_of_view_warning(camera: &CameraSection, optics: &SensorOptics) -> Option<DesignWarning> {
     let wanted_deg = camera.field_of_view_deg / 2.0;
     let reached_deg = optics.lens().max_field_angle_rad().to_degrees();

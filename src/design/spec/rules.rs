@@ -11,7 +11,7 @@ use super::sections::{CameraSection, LayerSection, OpticsSection, SpringEnds};
 /// below anything that can be made.
 const ROUNDING_MM: f64 = 1e-6;
 
-/// Checks all of them; the first that does not hold is the answer.
+/// Checks all of them; the error is the first that does not hold.
 pub(super) fn check(design: &Design) -> Result<(), DesignError> {
     sizes(design)?;
     dome_on_platform(design)?;

@@ -85,7 +85,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Tagged alternatives are told apart by their tag, others by the kind of JSON value; so the
+    /// Tagged alternatives are distinguished by their tag, others by the kind of JSON value, so that the
     /// message speaks of the alternative that the writer meant.
     fn visit_alternatives(
         &self,
@@ -158,13 +158,13 @@ impl<'a> Walk<'a> {
         let whole = || Value::Array(items.to_vec());
         let bound =
             |name: &str| schema.get(name).and_then(Value::as_u64).and_then(|n| usize::try_from(n).ok());
-        let (least, most) = (bound("minItems"), bound("maxItems"));
-        if least.is_some_and(|least| items.len() < least) || most.is_some_and(|most| items.len() > most) {
-            let allowed = match (least, most) {
-                (Some(least), Some(most)) if least == most => format!("exactly {least}"),
-                (Some(least), Some(most)) => format!("{least} to {most}"),
-                (Some(least), None) => format!("at least {least}"),
-                (_, most) => format!("at most {}", most.unwrap_or(0)),
+        let (min, max) = (bound("minItems"), bound("maxItems"));
+        if min.is_some_and(|min| items.len() < min) || max.is_some_and(|max| items.len() > max) {
+            let allowed = match (min, max) {
+                (Some(min), Some(max)) if min == max => format!("exactly {min}"),
+                (Some(min), Some(max)) => format!("{min} to {max}"),
+                (Some(min), None) => format!("at least {min}"),
+                (_, max) => format!("at most {}", max.unwrap_or(0)),
             };
             return Err(DesignError::at(
                 at,

@@ -1,8 +1,8 @@
-//! From how exact the results shall be to the settings that make them so.
+//! Settings chosen from the accuracy that a design asks for.
 //!
-//! Each setting has a ladder of values with a bound on what it leaves; the cheapest value whose bound, times a safety
-//! factor, keeps the design's `accuracy` is taken. The bounds hold without running anything: a tolerance is kept by
-//! construction, and what a tolerance means in the image follows from the optics' derivatives.
+//! Each value of a setting has a bound on its error; the cheapest value whose bound, times a safety factor, meets the
+//! design's `accuracy` is chosen. The bounds need no test run: a tolerance is met by construction, and its effect in
+//! the image follows from the derivatives of the optics.
 
 use glam::{DMat3, DVec3};
 
@@ -11,10 +11,10 @@ use super::sections::{AccuracySection, DesignFile, TolerancesSection};
 use domecast_optics::numeric::Rigid;
 use domecast_optics::{OpticsSpec, SensorOptics};
 
-/// What is promised is kept this many times over.
+/// Safety factor between the accuracy that a design asks for and the bound of a setting.
 pub const SAFETY: f64 = 2.0;
 
-/// Polar angles and azimuths of the dome at which the optics are asked.
+/// Polar angles and azimuths of the dome at which the optics are sampled.
 const RINGS: u32 = 6;
 const AROUND: u32 = 8;
 
@@ -67,39 +67,42 @@ impl Settings {
     /// # Errors
     /// A setting that is neither given nor can be chosen.
     pub(super) fn of(file: &DesignFile, optics: &SensorOptics) -> Result<Self, DesignError> {
-        let asked = file.accuracy.as_ref();
-        // what the optics make of errors is asked only where something is to be chosen
+        let accuracy = file.accuracy.as_ref();
+        // the sensitivity of the optics is computed only where a setting is to be chosen
         let needed = file.mesh.optical_chord_tolerance_mm.is_none() || file.tolerances.samples.is_none();
-        let seen = if needed && asked.is_some() { Some(Seen::by(file, optics)?) } else { None };
+        let sensitivity =
+            if needed && accuracy.is_some() { Some(OpticalSensitivity::by(file, optics)?) } else { None };
         Ok(Self {
             outline_tolerance_mm: setting(
                 "print.outline_tolerance_mm",
                 file.print.outline_tolerance_mm,
-                asked.map(|asked| {
-                    let limit = asked.dot_placement_mm / SAFETY;
+                accuracy.map(|accuracy| {
+                    let limit = accuracy.dot_placement_mm / SAFETY;
                     let why = "an outline is kept to its tolerance";
-                    (fine(limit, 1e-5, 1.0), promise("dot_placement_mm", asked.dot_placement_mm, why))
+                    (fine(limit, 1e-5, 1.0), reason("dot_placement_mm", accuracy.dot_placement_mm, why))
                 }),
             )?,
             chord_tolerance_mm: setting(
                 "mesh.chord_tolerance_mm",
                 file.mesh.chord_tolerance_mm,
-                asked.map(|asked| {
+                accuracy.map(|accuracy| {
                     let why = "a mesh is kept to its tolerance";
-                    (fine(asked.mesh_mm / SAFETY, 1e-4, 10.0), promise("mesh_mm", asked.mesh_mm, why))
+                    (fine(accuracy.mesh_mm / SAFETY, 1e-4, 10.0), reason("mesh_mm", accuracy.mesh_mm, why))
                 }),
             )?,
             optical_chord_tolerance_mm: setting(
                 "mesh.optical_chord_tolerance_mm",
                 file.mesh.optical_chord_tolerance_mm,
-                asked.zip(seen.as_ref()).map(|(asked, seen)| optical(asked, seen)),
+                accuracy
+                    .zip(sensitivity.as_ref())
+                    .map(|(accuracy, sensitivity)| optical(accuracy, sensitivity)),
             )?,
             samples: setting(
                 "tolerances.samples",
                 file.tolerances.samples,
-                asked
-                    .zip(seen.as_ref().and_then(|seen| seen.spread_px))
-                    .map(|(asked, px)| samples(asked, px)),
+                accuracy
+                    .zip(sensitivity.as_ref().and_then(|sensitivity| sensitivity.spread_px))
+                    .map(|(accuracy, px)| samples(accuracy, px)),
             )?,
         })
     }
@@ -118,14 +121,14 @@ fn setting<T>(
         (None, None) => Err(DesignError::at(
             field,
             serde_json::Value::Null,
-            "how exact this shall be is not said",
-            "a value here, or a section `accuracy` from which it is chosen",
+            "no value is given",
+            "a value, or a section `accuracy` from which it is chosen",
         )),
     }
 }
 
-fn promise(field: &str, asked: f64, why: &str) -> String {
-    format!("chosen for accuracy.{field} = {asked}, {SAFETY} times over: {why}")
+fn reason(field: &str, value: f64, why: &str) -> String {
+    format!("chosen for accuracy.{field} = {value} with a safety factor of {SAFETY}: {why}")
 }
 
 /// The largest of 1, 2, 5 times a power of ten that is not above a limit, within bounds.
@@ -138,44 +141,48 @@ fn fine(limit: f64, least: f64, most: f64) -> f64 {
     ((step * decade * round).round() / round).clamp(least, most)
 }
 
-fn optical(asked: &AccuracySection, seen: &Seen) -> (f64, String) {
+fn optical(accuracy: &AccuracySection, sensitivity: &OpticalSensitivity) -> (f64, String) {
     let limits = [
-        ("mesh_mm", asked.mesh_mm, asked.mesh_mm),
-        ("image_px", asked.image_px, asked.image_px / seen.px_per_radius_mm),
-        ("dot_placement_mm", asked.dot_placement_mm, asked.dot_placement_mm / seen.mm_per_radius_mm),
+        ("mesh_mm", accuracy.mesh_mm, accuracy.mesh_mm),
+        ("image_px", accuracy.image_px, accuracy.image_px / sensitivity.px_per_radius_mm),
+        (
+            "dot_placement_mm",
+            accuracy.dot_placement_mm,
+            accuracy.dot_placement_mm / sensitivity.mm_per_radius_mm,
+        ),
     ];
     let tightest = limits.into_iter().min_by(|a, b| a.2.total_cmp(&b.2));
     let (field, value, limit) = tightest.unwrap_or(limits[0]);
     let why = format!(
         "a dome too large by 1 mm moves dots by up to {:.1} px, {:.2} mm",
-        seen.px_per_radius_mm, seen.mm_per_radius_mm
+        sensitivity.px_per_radius_mm, sensitivity.mm_per_radius_mm
     );
-    (fine(limit / SAFETY, 1e-4, 10.0), promise(field, value, &why))
+    (fine(limit / SAFETY, 1e-4, 10.0), reason(field, value, &why))
 }
 
-fn samples(asked: &AccuracySection, spread_px: f64) -> (u32, String) {
+fn samples(accuracy: &AccuracySection, spread_px: f64) -> (u32, String) {
     // the mean over n sensors is known to the spread of one over the root of n
-    let wanted = (spread_px * SAFETY / asked.image_px).powi(2).ceil();
+    let wanted = (spread_px * SAFETY / accuracy.image_px).powi(2).ceil();
     let mut count = 16_u32;
     while f64::from(count) < wanted && count < 65_536 {
         count *= 2;
     }
     let why = format!("the mean shift of one sensor's dots spreads by at most {spread_px:.2} px");
-    (count, promise("image_px", asked.image_px, &why))
+    (count, reason("image_px", accuracy.image_px, &why))
 }
 
-/// What the optics make of errors, the worst or the root mean square over the dome.
-struct Seen {
+/// How far dots move with errors of the optics: the worst, or the root mean square, over the dome.
+struct OpticalSensitivity {
     /// Most px that a dot moves for 1 mm of the dome's radius.
     px_per_radius_mm: f64,
-    /// The same on the dome: how far beside its place the pixel's ray then meets it.
+    /// The same on the dome, mm: by how much the pixel's ray then misses the dot.
     mm_per_radius_mm: f64,
     /// Upper bound of the spread of a sensor's mean shift, px: the root mean square shift, all tolerances together;
-    /// worked out only where the number of sensors is open, for it makes a dozen of them.
+    /// computed only where the number of sensors is to be chosen, since it takes a dozen of them.
     spread_px: Option<f64>,
 }
 
-impl Seen {
+impl OpticalSensitivity {
     fn by(file: &DesignFile, optics: &SensorOptics) -> Result<Self, DesignError> {
         let reach_rad = reach_deg(file).to_radians();
         let radius_mm = file.dome.radius_mm;
@@ -189,7 +196,7 @@ impl Seen {
             })
             .collect();
         let (mut px_per_radius_mm, mut mm_per_radius_mm, mut px_per_mm) = (0.0_f64, 0.0_f64, 0.0_f64);
-        let mut seen_points = Vec::new();
+        let mut visible_points = Vec::new();
         for &point in &points {
             let Ok((pixel, slope)) = optics.project_with_jacobian(point) else { continue };
             let normal = point / radius_mm;
@@ -200,9 +207,9 @@ impl Seen {
             px_per_mm = px_per_mm.max(by(side).norm()).max(by(up).norm());
             let back = nalgebra::Matrix2::from_columns(&[by(side), by(up)]).try_inverse();
             mm_per_radius_mm = mm_per_radius_mm.max(back.map_or(0.0, |back| (back * out).norm()));
-            seen_points.push((point, pixel));
+            visible_points.push((point, pixel));
         }
-        if seen_points.is_empty() || px_per_radius_mm <= 0.0 {
+        if visible_points.is_empty() || px_per_radius_mm <= 0.0 {
             return Err(DesignError::at(
                 "accuracy",
                 "",
@@ -214,8 +221,8 @@ impl Seen {
             .tolerances
             .samples
             .is_none()
-            .then(|| spread(file, optics, &seen_points, px_per_mm, px_per_radius_mm));
-        // a dome seen head-on hides its radius; its dots then still move by what the mesh leaves sideways
+            .then(|| spread(file, optics, &visible_points, px_per_mm, px_per_radius_mm));
+        // seen along its normal a dome does not show its radius; its dots still move sideways by the mesh error
         Ok(Self { px_per_radius_mm, mm_per_radius_mm: mm_per_radius_mm.max(0.1), spread_px })
     }
 }
@@ -258,7 +265,7 @@ fn spread(
     squares.sqrt()
 }
 
-/// One number of the optics off by its tolerance.
+/// The optics with one number off by its tolerance.
 #[derive(Debug, Clone)]
 pub struct Off {
     /// What it is, in words.

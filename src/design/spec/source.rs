@@ -10,7 +10,7 @@ use serde_json::{Map, Number, Value};
 use super::error::DesignError;
 
 /// No design is near this size; a larger file is a wrong file.
-const LARGEST_FILE_BYTES: u64 = 16 * 1024 * 1024;
+const MAX_FILE_BYTES: u64 = 16 * 1024 * 1024;
 
 /// Reads a text file that a person wrote.
 ///
@@ -26,7 +26,7 @@ pub fn read_text(path: &Path) -> Result<String, DesignError> {
         return Err(fault("this is a folder".into(), "the path of a JSON file")
             .with_help("name the design file inside it"));
     }
-    if about.len() > LARGEST_FILE_BYTES {
+    if about.len() > MAX_FILE_BYTES {
         return Err(fault(format!("the file has {} bytes", about.len()), "at most 16 MiB"));
     }
     let bytes = std::fs::read(path)

@@ -36,10 +36,10 @@ pub struct Correction {
 const FOLD_CHECK: (u32, u32) = (128, 72);
 
 /// Smallest slope and area ratio of a usable map: below it 0.01 mm on the plate would be 1 mm on the dome.
-const LEAST_SLOPE: f64 = 0.01;
+const MIN_SLOPE: f64 = 0.01;
 
 /// Bound on the steps of the inverse. A monotone map needs 4 to 8.
-const MOST_STEPS: u32 = 60;
+const MAX_STEPS: u32 = 60;
 
 /// Residual of the inverse on the plate, as a share of the dome's radius.
 const INVERSE_TOLERANCE: f64 = 4e-15;
@@ -92,7 +92,7 @@ impl Correction {
                 let at = Polar::new(polar_rad, TAU * f64::from(k) / f64::from(azimuth_steps));
                 let image = self.unit_plate(nominal, &at);
                 let least = image.d_radial_d_polar.min(image.area_ratio());
-                if least < LEAST_SLOPE {
+                if least < MIN_SLOPE {
                     return Err(TransferError {
                         field: "measured".into(),
                         value: format!(
@@ -100,7 +100,7 @@ impl Correction {
                             polar_rad.to_degrees()
                         ),
                         problem: "the map does not grow outwards there: it folds".into(),
-                        allowed: format!("a slope of {LEAST_SLOPE} or more up to measured.max_polar_deg"),
+                        allowed: format!("a slope of {MIN_SLOPE} or more up to measured.max_polar_deg"),
                     });
                 }
             }
@@ -146,7 +146,7 @@ impl Correction {
         let mut at = Polar::new(polar_rad, azimuth_rad);
         let mut image = self.unit_plate(nominal, &at);
         let mut miss = target - image.place(&at);
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             if miss.length() <= tolerance {
                 break;
             }
@@ -179,6 +179,6 @@ impl Correction {
         if polar_rad >= self.max_polar_rad - ANGLE_EPSILON_RAD {
             return Err(TransferLimit::BeyondMeasured { polar_rad, limit_rad: self.max_polar_rad });
         }
-        Err(TransferLimit::NotConverged { steps: MOST_STEPS, residual: miss.length() })
+        Err(TransferLimit::NotConverged { steps: MAX_STEPS, residual: miss.length() })
     }
 }

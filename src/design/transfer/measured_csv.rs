@@ -74,13 +74,6 @@ pub fn read(text: &str, dome_radius_mm: f64) -> Result<MeasuredTable, TableError
     let numbered = (1..).zip(text.lines());
     let mut lines =
         numbered.filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
-    let fault = |line: usize, column: &str, value: &str, problem: &str, allowed: &str| TableError {
-        line,
-        column: column.into(),
-        value: value.chars().take(60).collect(),
-        problem: problem.into(),
-        allowed: allowed.into(),
-    };
     let (head_line, head) = lines
         .next()
         .ok_or_else(|| fault(1, "", "", "the table is empty", "a line with the columns' names first"))?;
@@ -133,32 +126,50 @@ pub fn read(text: &str, dome_radius_mm: f64) -> Result<MeasuredTable, TableError
             let problem = format!("mark {id} stands already on line {first}");
             return Err(fault(line, "id", values[id_at], &problem, "each mark once in each print"));
         }
-        let landed = match measured_in {
-            MeasuredIn::View => {
-                let flat = DVec2::from_array(place) / dome_radius_mm;
-                let inside = 1.0 - flat.length_squared();
-                if inside < 0.0 {
-                    let problem = format!(
-                        "the point lies {:.4} mm from the pole's axis, beyond the dome",
-                        flat.length() * dome_radius_mm
-                    );
-                    let allowed = format!("up to the dome's radius, {dome_radius_mm} mm");
-                    return Err(fault(line, "x_mm, y_mm", content, &problem, &allowed));
-                }
-                flat.extend(inside.sqrt())
-            }
-            MeasuredIn::Dome => {
-                let [phi_deg, theta_deg] = place;
-                if !(0.0..=90.0).contains(&phi_deg) {
-                    return Err(fault(line, "phi_deg", content, "the point lies beyond the dome", "0 to 90"));
-                }
-                let (sin, cos) = phi_deg.to_radians().sin_cos();
-                (DVec2::from_angle(theta_deg.to_radians()) * sin).extend(cos)
-            }
-        };
+        let landed = direction(measured_in, place, dome_radius_mm)
+            .map_err(|(column, problem, allowed)| fault(line, column, content, &problem, &allowed))?;
         rows.push(MeasuredRow { line, id, print, landed });
     }
     Ok(MeasuredTable { measured_in, rows, prints })
+}
+
+fn fault(line: usize, column: &str, value: &str, problem: &str, allowed: &str) -> TableError {
+    TableError {
+        line,
+        column: column.into(),
+        value: value.chars().take(60).collect(),
+        problem: problem.into(),
+        allowed: allowed.into(),
+    }
+}
+
+/// The unit direction of a mark's place: x and y (mm) in the view from outside, or polar angle and azimuth (degrees).
+/// The error is the column at fault, the problem and what is allowed.
+fn direction(
+    measured_in: MeasuredIn,
+    place: [f64; 2],
+    dome_radius_mm: f64,
+) -> Result<DVec3, (&'static str, String, String)> {
+    match measured_in {
+        MeasuredIn::View => {
+            let flat = DVec2::from_array(place) / dome_radius_mm;
+            let inside = 1.0 - flat.length_squared();
+            if inside < 0.0 {
+                let off_mm = flat.length() * dome_radius_mm;
+                let problem = format!("the point lies {off_mm:.4} mm from the pole's axis, beyond the dome");
+                return Err(("x_mm, y_mm", problem, format!("up to the dome's radius, {dome_radius_mm} mm")));
+            }
+            Ok(flat.extend(inside.sqrt()))
+        }
+        MeasuredIn::Dome => {
+            let [phi_deg, theta_deg] = place;
+            if !(0.0..=90.0).contains(&phi_deg) {
+                return Err(("phi_deg", "the point lies beyond the dome".into(), "0 to 90".into()));
+            }
+            let (sin, cos) = phi_deg.to_radians().sin_cos();
+            Ok((DVec2::from_angle(theta_deg.to_radians()) * sin).extend(cos))
+        }
+    }
 }
 
 fn cells(line: &str) -> impl Iterator<Item = &str> {

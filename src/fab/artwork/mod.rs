@@ -102,7 +102,7 @@ fn film_files(
     Ok([
         file("svg", to_svg(drawing)),
         file("pdf", to_pdf(drawing)?),
-        file("dxf", to_dxf(drawing, spec.print.outline_mm())?),
+        file("dxf", to_dxf(drawing, spec.print.outline_mm())),
         file("tif", to_tiff(drawing, spec.print.dpi)?),
     ])
 }

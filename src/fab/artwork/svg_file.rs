@@ -15,6 +15,7 @@ use svg::node::{Node, Value};
 
 use super::drawing::{Drawing, Ink, Item, Layer, Path, Segment, Shape, Text};
 use super::strokes;
+use domecast_mesh::number::rounded;
 
 /// The drawing as an SVG file.
 pub fn to_svg(drawing: &Drawing) -> Vec<u8> {
@@ -123,7 +124,5 @@ fn path_data(path: &Path) -> Value {
 
 /// A number with as many digits as a nanometre needs, and no more.
 fn number(x: f64) -> String {
-    let rounded = (x * 1e6).round() / 1e6;
-    // No "-0".
-    format!("{}", rounded + 0.0)
+    rounded(x, 6)
 }

@@ -220,7 +220,7 @@ fn make(
     step("writing the page");
     let told: Vec<(String, String)> =
         warnings.iter().map(|warning| (warning.field.clone(), warning.message.clone())).collect();
-    let page = report::page(&report::Subject {
+    let page = report::page(&report::ReportSubject {
         design,
         layout: &layout,
         judged: &judged,

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::json;
 
+use super::envelope_picture::envelope_chart;
 use super::resolution::{design_choices, frames_to_average, resolution_at};
 use super::sight::markers_of;
 use super::springs::DesignSprings;
@@ -18,7 +19,7 @@ use domecast_springs::{
 /// Directions around the axis that the table has.
 const AZIMUTHS: u32 = 8;
 /// The largest load that the paper measured, N.
-pub(super) const PAPER_N: f64 = 17.0;
+const PAPER_N: f64 = 17.0;
 /// Mixes of push and press along the border in the picture.
 const BORDER_POINTS: u32 = 31;
 
@@ -201,7 +202,7 @@ impl ForceReport {
         vec![
             ("report/force.json".into(), json),
             ("report/load_envelope.csv".into(), self.csv()),
-            ("report/load_envelope.svg".into(), self.svg()),
+            ("report/load_envelope.svg".into(), envelope_chart(&self.border, PAPER_N).to_svg()),
         ]
     }
 }

@@ -2,8 +2,9 @@
 
 use serde_json::Value;
 
-use super::Subject;
-use super::html::{bar, escape, figure, number, percent, table};
+use super::subject::ReportSubject;
+use crate::html::{Html, bar, figure, html, table};
+use crate::numbers::{percent, typeset};
 
 fn at(value: &Value, path: &str) -> f64 {
     value.pointer(path).and_then(Value::as_f64).unwrap_or(f64::NAN)
@@ -17,15 +18,54 @@ fn list<'a>(value: &'a Value, path: &str) -> &'a [Value] {
     value.pointer(path).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
+fn is_held(value: &Value) -> bool {
+    value.get("held").and_then(Value::as_bool).unwrap_or(false)
+}
+
 /// A limit's name in words.
 fn words(name: &str) -> String {
-    escape(&name.replace('_', " "))
+    name.replace('_', " ")
 }
 
 /// The springs, each claim with how near it comes to its limits, the envelope, and other springs.
-pub fn loads(subject: &Subject<'_>) -> String {
+pub(super) fn loads(subject: &ReportSubject<'_>) -> Html {
     let json = &subject.forces.json;
-    let spring = [
+    let lines: Vec<Vec<Html>> = subject
+        .forces
+        .lines
+        .iter()
+        .map(|line| {
+            let size = typeset(line.size);
+            vec![
+                line.load.as_str().into(),
+                size.into(),
+                words(&line.ended_by).into(),
+                line.part.as_str().into(),
+            ]
+        })
+        .collect();
+    html!(
+        "<div class=\"row\">\n{}{}</div>\n{}<p>The 17 N of arXiv 2303.03093 on the pole: <strong>{}</strong>.</p>\n\
+         <details><summary>The whole envelope</summary>\n{}</details>\n{}",
+        figure(
+            &subject
+                .shown("report/load_envelope.svg", "Pushes and presses at the pole up to the first limit"),
+            "Push and press at the pole, up to the first limit.",
+        ),
+        springs(json),
+        claims(json),
+        if json.pointer("/press_17_n").is_some_and(is_held) { "carried" } else { "not carried" },
+        table(
+            "Each load grows until a limit ends it (N, or N·mm)",
+            &["load", "size", "ended by", "part"],
+            &lines,
+        ),
+        spring_choices(json),
+    )
+}
+
+fn springs(json: &Value) -> Html {
+    let rows = [
         ("axial stiffness of one spring", "/spring/axial_n_per_mm", "N/mm"),
         ("lateral stiffness of one, at rest", "/spring/lateral_n_per_mm", "N/mm"),
         ("torsion of one", "/spring/torsion_nmm_per_rad", "N·mm/rad"),
@@ -34,149 +74,101 @@ pub fn loads(subject: &Subject<'_>) -> String {
         ("solid height", "/spring/solid_height_mm", "mm"),
         ("compression at rest", "/spring/rest_compression_mm", "mm"),
     ]
-    .map(|(name, path, unit)| vec![name.to_owned(), format!("{} {unit}", number(at(json, path)))]);
-    let mut text = String::from("<div class=\"row\">\n");
-    text += &figure(
-        &subject.shown("report/load_envelope.svg", "Pushes and presses at the pole up to the first limit"),
-        "Push and press at the pole, up to the first limit.",
-    );
-    text += &table("The springs", &["", "value"], &spring);
-    text += "</div>\n";
-    let claims: Vec<Vec<String>> = list(json, "/claims")
-        .iter()
-        .map(|claim| {
-            let near = list(claim, "/checks").iter().max_by(|a, b| at(a, "/used").total_cmp(&at(b, "/used")));
-            let near = near.map_or_else(String::new, |check| {
-                let used = at(check, "/used");
-                // the bar escapes its own label
-                bar(used, &format!("{}: {}", text_at(check, "/limit").replace('_', " "), percent(used)))
-            });
-            let held = claim.get("held").and_then(Value::as_bool).unwrap_or(false);
-            vec![
-                escape(text_at(claim, "/name")),
-                if held { "held".into() } else { "<strong>not held</strong>".into() },
-                near,
-                format!("{} ×", number(at(claim, "/factor_to_first_limit"))),
-                words(text_at(claim, "/first_limit/limit")),
-            ]
-        })
-        .collect();
-    text += &table(
+    .map(|(name, path, unit)| vec![name.into(), format!("{} {unit}", typeset(at(json, path))).into()]);
+    table("The springs", &["", "value"], &rows)
+}
+
+fn claims(json: &Value) -> Html {
+    let row = |claim: &Value| {
+        let used = |check: &Value| at(check, "/used");
+        let nearest = list(claim, "/checks").iter().max_by(|a, b| used(a).total_cmp(&used(b)));
+        let nearest = nearest.map_or_else(Html::default, |check| {
+            bar(used(check), &format!("{}: {}", words(text_at(check, "/limit")), percent(used(check))))
+        });
+        vec![
+            text_at(claim, "/name").into(),
+            if is_held(claim) { "held".into() } else { html!("<strong>not held</strong>") },
+            nearest,
+            format!("{} ×", typeset(at(claim, "/factor_to_first_limit"))).into(),
+            words(text_at(claim, "/first_limit/limit")).into(),
+        ]
+    };
+    table(
         "Claimed loads",
-        &["load", "", "nearest limit", "grows until the first limit by", "which is"],
-        &claims,
-    );
-    let paper = json.pointer("/press_17_n/held").and_then(Value::as_bool).unwrap_or(false);
-    text += &format!(
-        "<p>The 17 N of arXiv 2303.03093 on the pole: <strong>{}</strong>.</p>\n",
-        if paper { "carried" } else { "not carried" }
-    );
-    let lines: Vec<Vec<String>> = subject
-        .forces
-        .lines
-        .iter()
-        .map(|line| vec![escape(&line.load), number(line.size), words(&line.ended_by), escape(&line.part)])
-        .collect();
-    text += "<details><summary>The whole envelope</summary>\n";
-    text += &table(
-        "Each load grows until a limit ends it (N, or N·mm)",
-        &["load", "size", "ended by", "part"],
-        &lines,
-    );
-    text += "</details>\n";
-    let choices: Vec<Vec<String>> = list(json, "/spring_choices")
-        .iter()
-        .map(|choice| {
-            let held = choice.get("held").and_then(Value::as_bool).unwrap_or(false);
-            vec![
-                format!("{} mm", number(at(choice, "/wire_diameter_mm"))),
-                number(at(choice, "/active_coils")),
-                format!("{} N/mm", number(at(choice, "/axial_n_per_mm"))),
-                if held { "holds".into() } else { "does not hold".into() },
-                format!(
-                    "{} ({})",
-                    words(text_at(choice, "/worst/limit")),
-                    percent(at(choice, "/worst/used"))
-                ),
-            ]
-        })
-        .collect();
-    if !choices.is_empty() {
-        text += "<details><summary>Other springs of the same outer size</summary>\n";
-        text += &table(
+        &["load", "", "nearest limit", "factor to the first limit", "first limit"],
+        &list(json, "/claims").iter().map(row).collect::<Vec<_>>(),
+    )
+}
+
+fn spring_choices(json: &Value) -> Html {
+    let row = |choice: &Value| {
+        let worst =
+            format!("{} ({})", words(text_at(choice, "/worst/limit")), percent(at(choice, "/worst/used")));
+        vec![
+            format!("{} mm", typeset(at(choice, "/wire_diameter_mm"))).into(),
+            typeset(at(choice, "/active_coils")).into(),
+            format!("{} N/mm", typeset(at(choice, "/axial_n_per_mm"))).into(),
+            if is_held(choice) { "holds".into() } else { "does not hold".into() },
+            worst.into(),
+        ]
+    };
+    let rows: Vec<Vec<Html>> = list(json, "/spring_choices").iter().map(row).collect();
+    if rows.is_empty() {
+        return Html::default();
+    }
+    html!(
+        "<details><summary>Other springs of the same outer size</summary>\n{}</details>\n",
+        table(
             "What they do under the hardest press",
             &["wire", "active coils", "axial stiffness in sum", "", "nearest limit"],
-            &choices,
-        );
-        text += "</details>\n";
-    }
-    text
+            &rows,
+        ),
+    )
+}
+
+/// A row of six numbers from `path` on.
+fn six(json: &Value, name: &str, path: &str) -> Vec<Html> {
+    let cell = |k: usize| typeset(at(json, &format!("{path}/{k}"))).into();
+    std::iter::once(Html::from(name)).chain((0..6).map(cell)).collect()
 }
 
 /// Standard deviations of pose and wrench, and what changes of the design do to them.
-pub fn resolution(subject: &Subject<'_>) -> String {
+pub(super) fn resolution(subject: &ReportSubject<'_>) -> Html {
+    const WRENCH: [&str; 7] = ["", "Fx, N", "Fy, N", "Fz, N", "Mx, N·mm", "My, N·mm", "Mz, N·mm"];
+    const POSE: [&str; 7] = ["", "tx, mm", "ty, mm", "tz, mm", "rx, °", "ry, °", "rz, °"];
     let json = &subject.forces.json;
-    let axes = ["Fx, N", "Fy, N", "Fz, N", "Mx, N·mm", "My, N·mm", "Mz, N·mm"];
-    let moves = ["tx, mm", "ty, mm", "tz, mm", "rx, °", "ry, °", "rz, °"];
-    let row = |name: &str, path: &str| {
-        std::iter::once(name.to_owned())
-            .chain((0..6).map(|k| number(at(json, &format!("{path}/{k}")))))
-            .collect::<Vec<_>>()
+    let rest_and_17_n = |what: &str| {
+        [
+            six(json, "at rest", &format!("/resolution_at_rest/{what}")),
+            six(json, "under 17 N", &format!("/resolution_at_17_n/{what}")),
+        ]
     };
-    let heads = |names: &[&'static str; 6]| {
-        let mut heads = vec![""];
-        heads.extend(names);
-        heads
-    };
-    let mut text = format!(
-        "<p>One standard deviation of a single frame, with white centroids known to {} px: no reading of the centroids does \
-         better (Cramér-Rao).</p>\n",
-        number(at(json, "/centroid_noise_px"))
-    );
-    text += &table(
-        "Wrench",
-        &heads(&axes),
-        &[
-            row("at rest", "/resolution_at_rest/wrench_sd"),
-            row("under 17 N", "/resolution_at_17_n/wrench_sd"),
-        ],
-    );
-    text += &table(
-        "Pose",
-        &heads(&moves),
-        &[row("at rest", "/resolution_at_rest/pose_sd"), row("under 17 N", "/resolution_at_17_n/pose_sd")],
-    );
-    let weak: Vec<String> =
-        list(json, "/resolution_at_rest/weak_axes").iter().filter_map(Value::as_str).map(escape).collect();
-    text += &format!(
-        "<p>Weak axes: {}. Condition number {} (with a lever of {} mm).</p>\n",
-        weak.join(", "),
-        number(at(json, "/resolution_at_rest/condition")),
-        number(at(json, "/resolution_at_rest/lever_mm"))
-    );
-    let choices: Vec<Vec<String>> = list(json, "/design_choices")
+    let weak: Vec<&str> =
+        list(json, "/resolution_at_rest/weak_axes").iter().filter_map(Value::as_str).collect();
+    let choices: Vec<Vec<Html>> = list(json, "/design_choices")
         .iter()
-        .map(|choice| {
-            let sd = |k: usize| number(at(choice, &format!("/resolution/wrench_sd/{k}")));
-            std::iter::once(escape(text_at(choice, "/change"))).chain((0..6).map(sd)).collect()
-        })
+        .map(|choice| six(choice, text_at(choice, "/change"), "/resolution/wrench_sd"))
         .collect();
-    text += &table("What a change of the design does to the wrench", &heads(&axes), &choices);
-    let bias = json.pointer("/plain_runtime_bias").unwrap_or(&Value::Null);
-    if !bias.is_null() {
-        let row = |name: &str, path: &str| {
-            std::iter::once(name.to_owned())
-                .chain((0..6).map(|k| number(at(bias, &format!("{path}/{k}")))))
-                .collect::<Vec<_>>()
-        };
-        text += &table(
+    let bias = json.pointer("/plain_runtime_bias").filter(|bias| !bias.is_null()).map(|bias| {
+        table(
             "Mean size of the bias of plain solvePnP over the load envelope, relative to rest",
-            &heads(&axes),
+            &WRENCH,
             &[
-                row("with true coordinates", "/naive/mean_wrench_size"),
-                row("with the apparent ones and springs.plain_runtime", "/left/mean_wrench_size"),
+                six(bias, "with true coordinates", "/naive/mean_wrench_size"),
+                six(bias, "with the apparent ones and springs.plain_runtime", "/left/mean_wrench_size"),
             ],
-        );
-    }
-    text
+        )
+    });
+    html!(
+        "<p>One standard deviation of a single frame, with white centroids known to {} px: no estimate from the centroids \
+         does better (Cramér-Rao).</p>\n{}{}<p>Weak axes: {}. Condition number {} (with a lever of {} mm).</p>\n{}{}",
+        typeset(at(json, "/centroid_noise_px")),
+        table("Wrench", &WRENCH, &rest_and_17_n("wrench_sd")),
+        table("Pose", &POSE, &rest_and_17_n("pose_sd")),
+        weak.join(", "),
+        typeset(at(json, "/resolution_at_rest/condition")),
+        typeset(at(json, "/resolution_at_rest/lever_mm")),
+        table("What a change of the design does to the wrench", &WRENCH, &choices),
+        bias.unwrap_or_default(),
+    )
 }

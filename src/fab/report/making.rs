@@ -2,8 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::Subject;
-use super::html::{escape, number};
+use super::subject::ReportSubject;
+use crate::html::{Html, html};
+use crate::numbers::typeset;
+use domecast_design::parts::Part;
 use domecast_design::sections::LedColor;
 
 /// Silicone that stays in cup, syringe and sprue, as a share of what is needed: an estimate for hand casting.
@@ -11,62 +13,68 @@ const WASTE: f64 = 1.0;
 
 /// One step.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Step {
+pub struct MakingStep {
     /// What is done.
     pub title: &'static str,
-    /// How, with the numbers; HTML.
-    pub text: String,
+    /// How, with the numbers.
+    pub text: Html,
 }
 
-fn step(title: &'static str, text: String) -> Step {
-    Step { title, text }
+fn step(title: &'static str, text: Html) -> MakingStep {
+    MakingStep { title, text }
 }
 
 /// A link to a file of the build, from the page.
-fn file(path: &str) -> String {
-    format!("<a href=\"../{0}\"><code>{0}</code></a>", escape(path))
+fn file(path: &str) -> Html {
+    html!("<a href=\"../{0}\"><code>{0}</code></a>", path)
 }
 
 /// The steps, in the order in which they are done.
-pub fn steps(subject: &Subject<'_>) -> Vec<Step> {
+pub fn making_steps(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
+    let mut steps = printing_and_casting(subject);
+    steps.extend(dots_and_assembly(subject));
+    if subject.design.sections().leds.list.is_empty() {
+        steps.retain(|step| step.title != "Lights");
+    }
+    steps
+}
+
+/// The steps as a list on the page.
+pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
+    let line = |step: MakingStep| html!("<li><strong>{}.</strong> {}</li>\n", step.title, step.text);
+    html!(
+        "<ol class=\"making\">\n{}</ol>\n<p>What to buy and print: <a href=\"../parts/bom.csv\"><code>parts/bom.csv\
+         </code></a>.</p>\n",
+        making_steps(subject).into_iter().map(line).collect::<Html>(),
+    )
+}
+
+fn printing_and_casting(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
     let s = subject.design.sections();
-    let radius = s.dome.radius_mm;
-    let dome_ml = 2.0 / 3.0 * PI * radius.powi(3) / 1000.0;
-    let skin_mm2 = 2.0 * PI * radius * radius;
-    let films = subject.layout.hits.len().max(1);
-    let n = number;
-    let printed: Vec<(String, f64)> = subject
-        .parts
-        .iter()
-        .filter(|part| part.name != "acrylic_sheet")
-        .map(|part| {
-            let grams = part.volume_mm3 / 1000.0 * s.process.density_g_per_cm3;
-            (
-                format!("{} ({} g)", escape(&part.name.replace('_', " ")), n((grams * 10.0).round() / 10.0)),
-                grams,
-            )
-        })
+    let n = typeset;
+    let dome_ml = 2.0 / 3.0 * PI * s.dome.radius_mm.powi(3) / 1000.0;
+    let printed = subject.parts.iter().filter(|part| part.name != "acrylic_sheet");
+    let grams = |part: &Part| part.volume_mm3 / 1000.0 * s.process.density_g_per_cm3;
+    let total_g: f64 = printed.clone().map(grams).sum();
+    let printed: Vec<String> = printed
+        .map(|part| format!("{} ({} g)", part.name.replace('_', " "), n((grams(part) * 10.0).round() / 10.0)))
         .collect();
-    let grams: f64 = printed.iter().map(|(_, grams)| grams).sum();
-    let printed: Vec<&str> = printed.iter().map(|(text, _)| text.as_str()).collect();
-    let markers = s.white_markers.positions_mm.len();
-    let magnets = 2 * s_springs(subject);
-    let mut steps = vec![
+    vec![
         step(
             "Print and clean",
-            format!(
+            html!(
                 "Print in {} at 1:1: {}. About {} g in all, without support. Print the fit coupon first, try magnets \
                  and camera in its holes, and put what fits into <code>magnet_pockets.diameter_clearance_mm</code> and \
                  <code>camera_body.bore_clearance_mm</code>. Wash, dry, and clear the small holes: they come out \
                  undersize.",
-                escape(&s.process.name),
+                s.process.name,
                 printed.join(", "),
-                n(grams.round()),
+                n(total_g.round()),
             ),
         ),
         step(
             "Cut the sheet",
-            format!(
+            html!(
                 "{} × {} mm, {} mm thick, from {}. The cut gives back {} mm on each edge (kerf), already in the outline.",
                 n(s.sheet.size_mm[0]),
                 n(s.sheet.size_mm[1]),
@@ -77,29 +85,30 @@ pub fn steps(subject: &Subject<'_>) -> Vec<Step> {
         ),
         step(
             "Paint the white markers",
-            format!(
-                "Lay the marker stencil on the bare sheet and paint its {markers} holes, {} mm across, white and opaque, \
+            html!(
+                "Lay the marker stencil on the bare sheet and paint its {} holes, {} mm across, white and opaque, \
                  on the face that will carry the dome.",
+                s.white_markers.positions_mm.len(),
                 n(s.white_markers.diameter_mm),
             ),
         ),
         step(
             "Seal the mould",
-            format!(
+            html!(
                 "Resin keeps platinum silicone from curing. Coat every face that touches silicone ({} mm² in the cavity) \
                  until the sealer is {} mm thick, dry it fully, then release agent. The cavity is made larger by the sealer and \
                  by {} % shrinkage.",
-                n(skin_mm2.round()),
+                n(skin_mm2(subject).round()),
                 n(s.mould.sealer_thickness_mm),
                 n(s.elastomer.shrinkage_percent),
             ),
         ),
         step(
             "Cast the dome",
-            format!(
+            html!(
                 "{}: the dome holds {} ml; mix {} ml, so that cup and sprue may keep the same again. Degas, close the mould \
                  on its {} pins, fill through the {} mm hole from the flat side until all {} vents run over.",
-                escape(&s.elastomer.material),
+                s.elastomer.material,
                 n(dome_ml),
                 n(dome_ml * (1.0 + WASTE)),
                 s.mould.pins.at_mm.len(),
@@ -109,30 +118,40 @@ pub fn steps(subject: &Subject<'_>) -> Vec<Step> {
         ),
         step(
             "Bond",
-            "Bond the dome's flat side to the painted face of the sheet with the same silicone, thin and without bubbles, \
+            html!(
+                "Bond the dome's flat side to the painted face of the sheet with the same silicone, thin and without bubbles, \
              centred by the stencil's marks."
-                .to_owned(),
+            ),
         ),
-        step("Print the dots", dots_text(subject, films)),
+    ]
+}
+
+fn dots_and_assembly(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
+    let s = subject.design.sections();
+    let n = typeset;
+    let springs = subject.design.springs_at_mm().len();
+    vec![
+        step("Print the dots", dots_text(subject)),
         step(
             "Coat the membrane",
-            format!(
+            html!(
                 "{} mm of reflective coat over the dots: {} ml on {} mm². It must hide the dots from outside and the light \
                  from inside.",
                 n(s.elastomer.membrane_thickness_mm),
-                n(skin_mm2 * s.elastomer.membrane_thickness_mm / 1000.0),
-                n(skin_mm2.round()),
+                n(skin_mm2(subject) * s.elastomer.membrane_thickness_mm / 1000.0),
+                n(skin_mm2(subject).round()),
             ),
         ),
         step(
             "Magnets and springs",
-            format!(
-                "Glue {magnets} magnets ({} × {} mm) into their pockets, every facing pair attracting; the holes behind them \
+            html!(
+                "Glue {} magnets ({} × {} mm) into their pockets, every facing pair attracting; the holes behind them \
                  let a wrong one out again. Set {} springs ({} mm wire, {} mm outside, {} mm long, {} active coils) on \
                  the lower magnets, lower the upper platform on to them.",
+                2 * springs,
                 n(s.magnets.diameter_mm),
                 n(s.magnets.thickness_mm),
-                s_springs(subject),
+                springs,
                 n(s.springs.wire_diameter_mm),
                 n(s.springs.outer_diameter_mm),
                 n(s.springs.free_length_mm),
@@ -142,7 +161,7 @@ pub fn steps(subject: &Subject<'_>) -> Vec<Step> {
         step("Lights", lights_text(subject)),
         step(
             "Camera",
-            format!(
+            html!(
                 "Push the camera in from below until its front stands {} mm above the entrance pupil's place at z = {} mm, and \
                  clamp it. Image axes are the sensor's axes.",
                 n(s.camera_body.front_from_pupil_mm),
@@ -151,48 +170,48 @@ pub fn steps(subject: &Subject<'_>) -> Vec<Step> {
         ),
         step(
             "Calibrate",
-            format!(
+            html!(
                 "Lens: a checkerboard in air, into <code>camera</code>. Then, with the sensor built: \
                  <code>domecast calibrate-optics</code> on what it sees at rest and under some loads, and <code>domecast \
                  calibrate-force</code> on pairs of pose and reference wrench. Both write measured constants that replace {}.",
                 file("constants/constants.json"),
             ),
         ),
-    ];
-    if s.leds.list.is_empty() {
-        steps.retain(|step| step.title != "Lights");
-    }
-    steps
+    ]
 }
 
-fn s_springs(subject: &Subject<'_>) -> usize {
-    subject.design.springs_at_mm().len()
+/// Area of the dome's surface, mm^2.
+fn skin_mm2(subject: &ReportSubject<'_>) -> f64 {
+    2.0 * PI * subject.design.sections().dome.radius_mm.powi(2)
 }
 
-fn dots_text(subject: &Subject<'_>, films: usize) -> String {
+fn dots_text(subject: &ReportSubject<'_>) -> Html {
+    let films = subject.layout.hits.len().max(1);
     let s = subject.design.sections();
-    let mut text = format!(
+    let mut text = html!(
         "{} dots from {} film{}: {} (or <code>.svg</code>, <code>.dxf</code>, <code>.tif</code> at {} dpi), true size, \
          positive. Measure the 10 mm bar on the film. The dome sits in its jig, the pad comes down along the stroke.",
         subject.layout.dots.len(),
         films,
         if films == 1 { "" } else { "s" },
         file("artwork/dots.pdf"),
-        number(s.print.dpi.into()),
+        typeset(s.print.dpi.into()),
     );
     for (index, hit) in subject.layout.hits.iter().enumerate().filter(|_| films > 1) {
-        text += &format!(
+        text += html!(
             " Film {}: tilt {}°, towards {}°.",
             index + 1,
-            number(hit.tilt_rad.to_degrees()),
-            number(hit.azimuth_rad.to_degrees())
+            typeset(hit.tilt_rad.to_degrees()),
+            typeset(hit.azimuth_rad.to_degrees())
         );
     }
-    text + " Use silicone ink. Better: print the target first, measure it, run <code>domecast calibrate-print</code>, and \
-            print from the corrected film."
+    text + html!(
+        " Use silicone ink. Better: print the target first, measure it, run <code>domecast calibrate-print</code>, and \
+         print from the corrected film."
+    )
 }
 
-fn lights_text(subject: &Subject<'_>) -> String {
+fn lights_text(subject: &ReportSubject<'_>) -> Html {
     let leds = &subject.design.sections().leds;
     let named = |color: LedColor| match color {
         LedColor::Red => "red",
@@ -200,19 +219,22 @@ fn lights_text(subject: &Subject<'_>) -> String {
         LedColor::Blue => "blue",
         LedColor::White => "white",
     };
-    let list: Vec<String> =
-        leds.list.iter().map(|led| format!("{} at {}°", named(led.color), number(led.azimuth_deg))).collect();
-    format!(
+    let list: Vec<String> = leds
+        .list
+        .iter()
+        .map(|led| format!("{} at {}°", named(led.color), typeset(led.azimuth_deg)))
+        .collect();
+    html!(
         "{} boards of {} × {} mm into their pits at {}° to the base: {}. Over each light a {} × {} mm piece of diffuser \
          tape, {} mm thick, of its colour. Wires leave through the {} mm holes.",
         leds.list.len(),
-        number(leds.board_mm[0]),
-        number(leds.board_mm[1]),
-        number(leds.tilt_deg),
+        typeset(leds.board_mm[0]),
+        typeset(leds.board_mm[1]),
+        typeset(leds.tilt_deg),
         list.join(", "),
-        number(leds.package_mm[0]),
-        number(leds.package_mm[1]),
-        number(leds.diffuser_thickness_mm),
-        number(leds.wire_hole_diameter_mm),
+        typeset(leds.package_mm[0]),
+        typeset(leds.package_mm[1]),
+        typeset(leds.diffuser_thickness_mm),
+        typeset(leds.wire_hole_diameter_mm),
     )
 }

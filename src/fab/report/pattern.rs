@@ -1,69 +1,69 @@
 //! Dots and coverage on the page.
 
-use super::Subject;
-use super::chart::{bars, histogram};
-use super::html::{bar, escape, figure, number, percent, table};
+use super::subject::ReportSubject;
+use crate::chart::histogram;
+use crate::html::{Html, bar, bars, figure, html, table};
+use crate::numbers::{percent, typeset};
 use domecast_design::layout::evenness::Evenness;
 
-/// Drawings of more dots than this stand beside the page, not in it: they would make it heavy.
-const MOST_INLINE_BYTES: usize = 1_500_000;
+/// Larger drawings of dots stand beside the page, not in it: they would make it heavy.
+const MAX_INLINE_BYTES: usize = 1_500_000;
+/// Dots left out that are listed one by one.
+const MAX_LISTED: usize = 200;
 
-/// Pictures, histograms, evenness, what a pinhole alone would have done, tolerances, lost dots.
-pub fn dots(subject: &Subject<'_>) -> String {
+/// Pictures, histograms, evenness, placement without refraction, tolerances, lost dots.
+pub(super) fn dots(subject: &ReportSubject<'_>) -> Html {
     let judged = subject.judged;
-    let mut text = String::from("<div class=\"row\">\n");
-    text += &figure(
-        &subject.shown("artwork/camera-view.png", "The dots and white markers in the camera's view"),
-        "In the camera's view (raw image).",
-    );
-    text += &figure(
-        &subject.shown("artwork/outside-view.png", "The dots on the dome from outside"),
-        "On the dome, from outside.",
-    );
-    let film = if subject.file("artwork/dots.svg").is_some_and(|bytes| bytes.len() <= MOST_INLINE_BYTES) {
+    let film = if subject.file("artwork/dots.svg").is_some_and(|bytes| bytes.len() <= MAX_INLINE_BYTES) {
         subject.shown("artwork/dots.svg", "The film for the pad printer")
     } else {
-        "<p>The film is large: <a href=\"../artwork/dots.svg\">artwork/dots.svg</a>.</p>".to_owned()
+        html!("<p>The film is large: <a href=\"../artwork/dots.svg\">artwork/dots.svg</a>.</p>")
     };
-    text += &figure(&film, "On the film, as the pad takes it.");
-    text += "</div>\n";
-    text += &format!(
-        "<p>{} dots, {} px apart, {} to {} mm across on the dome, from {} film{}.</p>\n",
-        judged.dots,
-        number(judged.pitch_px),
-        number(judged.dot_diameter_mm[0]),
-        number(judged.dot_diameter_mm[1]),
-        judged.hits.len(),
-        if judged.hits.len() == 1 { "" } else { "s" },
-    );
-    text += "<div class=\"row\">\n";
-    for chart in [
+    let charts = [
         histogram(&nearest(subject, Place::Image), "nearest dot in the image", "px"),
         histogram(&nearest(subject, Place::Dome), "nearest dot on the dome", "mm"),
         histogram(&nearest(subject, Place::Plate), "nearest dot on the film", "mm"),
-    ]
-    .into_iter()
-    .flatten()
-    {
-        text += &chart;
+    ];
+    html!(
+        "<div class=\"row\">\n{}{}{}</div>\n<p>{} dots, {} px apart, {} to {} mm across on the dome, from {} film{}.</p>\n\
+         <div class=\"row\">\n{}</div>\n{}{}{}",
+        figure(
+            &subject.shown("artwork/camera-view.png", "The dots and white markers in the camera's view"),
+            "In the camera's view (raw image).",
+        ),
+        figure(
+            &subject.shown("artwork/outside-view.png", "The dots on the dome from outside"),
+            "On the dome, from outside.",
+        ),
+        figure(&film, "On the film, as the pad takes it."),
+        judged.dots,
+        typeset(judged.pitch_px),
+        typeset(judged.dot_diameter_mm[0]),
+        typeset(judged.dot_diameter_mm[1]),
+        judged.hits.len(),
+        if judged.hits.len() == 1 { "" } else { "s" },
+        charts.iter().flatten().map(crate::chart::Chart::to_html).collect::<Html>(),
+        evenness(subject),
+        tolerances(subject),
+        lost(subject),
+    )
+}
+
+fn lost(subject: &ReportSubject<'_>) -> Html {
+    let lost = &subject.judged.lost;
+    if lost.is_empty() {
+        return Html::default();
     }
-    text += "</div>\n";
-    text += &evenness(subject);
-    text += &tolerances(subject);
-    if !judged.lost.is_empty() {
-        let rows: Vec<Vec<String>> = judged
-            .lost
-            .iter()
-            .take(200)
-            .map(|dot| vec![dot.id.to_string(), escape(dot.reason), escape(&dot.because)])
-            .collect();
-        text += &table(
-            &format!("{} dots left out (the first {})", judged.lost.len(), rows.len()),
-            &["id", "reason", "because"],
-            &rows,
-        );
-    }
-    text
+    let rows: Vec<Vec<Html>> = lost
+        .iter()
+        .take(MAX_LISTED)
+        .map(|dot| vec![html!("{}", dot.id), dot.reason.into(), dot.because.as_str().into()])
+        .collect();
+    table(
+        &format!("{} dots left out (the first {})", lost.len(), rows.len()),
+        &["id", "reason", "because"],
+        &rows,
+    )
 }
 
 #[derive(Clone, Copy)]
@@ -73,8 +73,8 @@ enum Place {
     Plate,
 }
 
-/// Distance of each dot to the nearest of its neighbours; on the film only within one hit.
-fn nearest(subject: &Subject<'_>, place: Place) -> Vec<f64> {
+/// Distance of each dot to the nearest of its neighbours; on the film only within one print pass.
+fn nearest(subject: &ReportSubject<'_>, place: Place) -> Vec<f64> {
     let dots = &subject.layout.dots;
     dots.iter()
         .filter_map(|dot| {
@@ -92,16 +92,16 @@ fn nearest(subject: &Subject<'_>, place: Place) -> Vec<f64> {
         .collect()
 }
 
-fn evenness(subject: &Subject<'_>) -> String {
-    let Some(report) = &subject.judged.evenness else { return String::new() };
+fn evenness(subject: &ReportSubject<'_>) -> Html {
+    let Some(report) = &subject.judged.evenness else { return Html::default() };
     let row = |name: &str, unit: &str, e: &Evenness| {
         vec![
-            format!("{name}, {unit}"),
-            number(e.nearest.min),
-            number(e.nearest.mean),
-            number(e.nearest.max),
-            percent(e.nearest.variation),
-            percent(e.edges.variation),
+            format!("{name}, {unit}").into(),
+            typeset(e.nearest.min).into(),
+            typeset(e.nearest.mean).into(),
+            typeset(e.nearest.max).into(),
+            percent(e.nearest.variation).into(),
+            percent(e.edges.variation).into(),
         ]
     };
     let mut rows = vec![
@@ -109,93 +109,83 @@ fn evenness(subject: &Subject<'_>) -> String {
         row("raw image", "px", &report.image_px),
         row("dome", "mm", &report.dome_mm),
     ];
-    if let Some(plate) = &report.plate_mm {
-        rows.push(row("film", "mm", plate));
-    }
-    if let Some(pinhole) = &subject.judged.pinhole_alone {
-        rows.push(row("image, had a pinhole alone placed the dots", "px", &pinhole.image_px));
-    }
-    let mut text = table(
+    rows.extend(report.plate_mm.as_ref().map(|plate| row("film", "mm", plate)));
+    let pinhole = subject.judged.pinhole_alone.as_ref();
+    rows.extend(pinhole.map(|pinhole| row("image, dots placed without refraction", "px", &pinhole.image_px)));
+    table(
         "Distance to the nearest neighbour, and its variation (standard deviation over mean)",
         &["", "smallest", "mean", "largest", "variation", "variation of all edges"],
         &rows,
-    );
-    if let Some(pinhole) = &subject.judged.pinhole_alone {
-        text += &format!(
-            "<p>Had nothing refracted in the reckoning, the same pattern would stand {} mm off on the dome \
-             ({} mm at worst), {} px in the image.</p>\n",
-            number(pinhole.mean_shift_mm),
-            number(pinhole.max_shift_mm),
-            number(pinhole.mean_shift_px),
-        );
-    }
-    text
+    ) + pinhole.map_or_else(Html::default, |pinhole| {
+        html!(
+            "<p>Without refraction in the model, the same pattern would lie {} mm off on the dome ({} mm at most), {} px \
+             in the image.</p>\n",
+            typeset(pinhole.mean_shift_mm),
+            typeset(pinhole.max_shift_mm),
+            typeset(pinhole.mean_shift_px),
+        )
+    })
 }
 
-fn tolerances(subject: &Subject<'_>) -> String {
-    let Some(report) = &subject.judged.tolerances else { return String::new() };
+fn tolerances(subject: &ReportSubject<'_>) -> Html {
+    let Some(report) = &subject.judged.tolerances else { return Html::default() };
     let rows: Vec<(String, f64, String)> = report
         .ranking
         .iter()
         .map(|share| {
             let label =
-                format!("{}, shifts {} px", percent(share.added_variation), number(share.mean_shift_px));
+                format!("{}, shifts {} px", percent(share.added_variation), typeset(share.mean_shift_px));
             (share.tolerance.to_owned(), share.added_variation, label)
         })
         .collect();
-    format!(
-        "<h3>What tolerances do to it</h3><p>Over {} sensors drawn from <code>tolerances</code>, half vary by at most {} in the \
-         image, 19 of 20 by at most {}. Each tolerance alone adds:</p>\n{}",
+    html!(
+        "<h3>What tolerances do to it</h3><p>Over {} sensors drawn from <code>tolerances</code>, the variation in the image \
+         is at most {} for half of them and at most {} for 19 of 20. Each tolerance alone adds:</p>\n{}",
         report.samples,
         percent(report.nearest_variation_median),
         percent(report.nearest_variation_p95),
-        bars(&rows)
+        bars(&rows),
     )
 }
 
 /// Coverage at rest and under each claimed load.
-pub fn coverage(subject: &Subject<'_>) -> String {
-    let rows: Vec<Vec<String>> = subject
+pub(super) fn coverage(subject: &ReportSubject<'_>) -> Html {
+    const HEADS: [&str; 8] = [
+        "load",
+        "by the lens",
+        "in the image",
+        "in the mask",
+        "visible",
+        "nearest to the window",
+        "fully visible up to",
+        "partly visible dots",
+    ];
+    let rows: Vec<Vec<Html>> = subject
         .judged
         .coverage
         .iter()
         .map(|record| {
-            let Some(found) = &record.coverage else {
-                return vec![
-                    escape(&record.load),
-                    "no balance".into(),
-                    "–".into(),
-                    "–".into(),
-                    "–".into(),
-                    "–".into(),
-                    "–".into(),
-                    "–".into(),
-                ];
-            };
-            vec![
-                escape(&record.load),
-                bar(found.seen_by_lens, &percent(found.seen_by_lens)),
-                bar(found.on_raster, &percent(found.on_raster)),
-                bar(found.in_mask, &percent(found.in_mask)),
-                bar(found.in_sight, &percent(found.in_sight)),
-                found.window_gap_mm.map_or_else(|| "–".into(), |gap| format!("{} mm", number(gap))),
-                format!("{}°", number(found.whole_to_deg)),
-                found.unseen_dots.len().to_string(),
-            ]
+            let mut row = vec![record.load.as_str().into()];
+            match &record.coverage {
+                Some(found) => row.extend([
+                    bar(found.seen_by_lens, &percent(found.seen_by_lens)),
+                    bar(found.on_raster, &percent(found.on_raster)),
+                    bar(found.in_mask, &percent(found.in_mask)),
+                    bar(found.in_sight, &percent(found.in_sight)),
+                    found
+                        .window_gap_mm
+                        .map_or_else(|| "–".into(), |gap| format!("{} mm", typeset(gap)))
+                        .into(),
+                    format!("{}°", typeset(found.whole_to_deg)).into(),
+                    html!("{}", found.unseen_dots.len()),
+                ]),
+                None => {
+                    row.push("no equilibrium".into());
+                    row.resize(HEADS.len(), "–".into());
+                }
+            }
+            row
         })
         .collect();
-    table(
-        "Share of the dome's area that is seen through the layers",
-        &[
-            "load",
-            "by the lens",
-            "on the raster",
-            "in the mask",
-            "in sight",
-            "nearest to the window",
-            "whole up to",
-            "dots not whole",
-        ],
-        &rows,
-    )
+    table("Share of the dome's area that is seen through the layers", &HEADS, &rows)
 }

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use glam::{DVec2, DVec3};
 
-use super::html::{escape, number};
+use crate::html::{AsHtml, Html};
+use crate::numbers::typeset;
 use domecast_design::Design;
 use domecast_optics::camera::Lens;
 use domecast_optics::{Channel, SensorOptics};
@@ -45,7 +46,7 @@ pub fn ray_points(optics: &SensorOptics, pixel: DVec2) -> Option<Vec<DVec3>> {
 }
 
 /// The picture: dome, sheet, platforms, springs, camera, white markers, and rays through the image's middle row.
-pub fn drawing(design: &Design) -> String {
+pub fn drawing(design: &Design) -> Html {
     let s = design.sections();
     let optics = design.optics();
     let radius = s.dome.radius_mm;
@@ -63,7 +64,7 @@ pub fn drawing(design: &Design) -> String {
             "<rect class=\"{class}\" x=\"{x:.3}\" y=\"{:.3}\" width=\"{width:.3}\" height=\"{height:.3}\">\
              <title>{}</title></rect>",
             -z_top,
-            escape(name)
+            AsHtml(name)
         )
     };
     // the platforms as blocks on either side of what they leave open
@@ -84,25 +85,14 @@ pub fn drawing(design: &Design) -> String {
         "camera",
         "camera",
     );
-    let (outer, coils) = (s.springs.outer_diameter_mm, s.springs.active_coils + 2.0);
-    // those beside the cut; the others would stand before camera and window
-    for place in design.springs_at_mm().into_iter().filter(|place| place.x.abs() >= place.y.abs()) {
-        let turns = (2.0 * coils).round().max(2.0) as u32;
-        let mut path = format!("M{:.3} {:.3}", place.x - 0.5 * outer, -lower_top);
-        for turn in 1..=turns {
-            let side = if turn % 2 == 1 { 0.5 } else { -0.5 };
-            let z = lower_top + (underside - lower_top) * f64::from(turn) / f64::from(turns);
-            let _ = write!(path, "L{:.3} {:.3}", place.x + side * outer, -z);
-        }
-        let _ = write!(art, "<path class=\"spring\" d=\"{path}\"><title>spring</title></path>");
-    }
+    art += &springs(design);
     art += &rect(-sheet_half, 0.0, 2.0 * sheet_half, -sheet_bottom, "sheet", "acrylic sheet");
     let _ = write!(
         art,
         "<path class=\"dome\" d=\"M{:.3} 0A{radius:.3} {radius:.3} 0 0 1 {radius:.3} 0Z\"><title>silicone dome, \
          radius {} mm</title></path>",
         -radius,
-        number(radius)
+        typeset(radius)
     );
     for marker in design.white_markers_mm() {
         let width = s.white_markers.diameter_mm;
@@ -115,17 +105,36 @@ pub fn drawing(design: &Design) -> String {
             "<text x=\"{x:.2}\" y=\"{:.2}\" font-size=\"{:.2}\">{}</text>",
             -z,
             0.035 * height,
-            escape(text)
+            AsHtml(text)
         )
     };
-    art += &label(-half, top - 0.03 * height, &format!("{} mm", number(top - bottom)));
+    art += &label(-half, top - 0.03 * height, &format!("{} mm", typeset(top - bottom)));
     art += &label(-half, 0.45 * lower_top + 0.55 * underside, "air");
-    format!(
+    Html::trusted(format!(
         "<svg class=\"section\" viewBox=\"{:.3} {:.3} {width:.3} {height:.3}\" role=\"img\" aria-label=\"The \
          sensor cut along its x axis, with rays from the camera through the sheet to the dome\">{art}</svg>",
         -half - margin,
         -top - margin,
-    )
+    ))
+}
+
+/// The springs beside the cut; the others would stand before camera and window.
+fn springs(design: &Design) -> String {
+    let s = design.sections();
+    let (underside, lower_top) = (s.platforms.upper.underside_z_mm, design.lower_top_z_mm());
+    let mut art = String::new();
+    let (outer, coils) = (s.springs.outer_diameter_mm, s.springs.active_coils + 2.0);
+    for place in design.springs_at_mm().into_iter().filter(|place| place.x.abs() >= place.y.abs()) {
+        let turns = (2.0 * coils).round().max(2.0) as u32;
+        let mut path = format!("M{:.3} {:.3}", place.x - 0.5 * outer, -lower_top);
+        for turn in 1..=turns {
+            let side = if turn % 2 == 1 { 0.5 } else { -0.5 };
+            let z = lower_top + (underside - lower_top) * f64::from(turn) / f64::from(turns);
+            let _ = write!(path, "L{:.3} {:.3}", place.x + side * outer, -z);
+        }
+        let _ = write!(art, "<path class=\"spring\" d=\"{path}\"><title>spring</title></path>");
+    }
+    art
 }
 
 /// Rays of the row through the principal point, evenly spread over what arrives at the dome.

@@ -23,7 +23,7 @@ use nalgebra::{Matrix2x3, Matrix3x2};
 
 use super::LensLimit;
 use super::brown_formula::{factor_of, first_fold, image_of, image_with_slope, radius};
-use super::inverse::{LEFT_OVER, RadialInverse};
+use super::inverse::{NEWTON_TOLERANCE, RadialInverse};
 use super::lanes::Lanes;
 use super::limit::Domain;
 use super::perspective::{
@@ -32,10 +32,10 @@ use super::perspective::{
 use crate::numeric::{MAX_ITERATIONS, bracketed_newton};
 
 /// Most first Newton steps in two dimensions; a lens has as many as it needs.
-const MOST_FIRST_STEPS: u32 = 5;
+const MAX_FIRST_STEPS: u32 = 5;
 
 /// No inverse takes more evaluations of the formula than this.
-pub(super) const MAX_STEPS: u32 = MOST_FIRST_STEPS + 2 + 1 + MAX_ITERATIONS;
+pub(super) const MAX_STEPS: u32 = MAX_FIRST_STEPS + 2 + 1 + MAX_ITERATIONS;
 
 /// The lens of `plumb_bob` and `rational_polynomial` calibrations.
 #[derive(Debug, Clone)]
@@ -48,7 +48,7 @@ pub(super) struct BrownConrady {
     /// Radius of the domain on the plane `z = 1`.
     end: f64,
     /// Bound on the second derivative of the tangential terms.
-    tangential_bend: f64,
+    tangential_curvature: f64,
     max_radius: f64,
     inverse: RadialInverse,
     /// Newton steps that the tangential terms need before the last ones.
@@ -70,7 +70,7 @@ impl BrownConrady {
             _ => domain.end_rad.tan(),
         };
         let inverse = RadialInverse::new(|r| radius(&numerator, &denominator, r), end)?;
-        let tangential_bend = 6.0 * q.length();
+        let tangential_curvature = 6.0 * q.length();
         let max_radius = inverse.end_image() + 3.0 * q.length() * end * end;
         let mut lens = Self {
             numerator,
@@ -78,7 +78,7 @@ impl BrownConrady {
             q,
             domain,
             end,
-            tangential_bend,
+            tangential_curvature,
             max_radius,
             inverse,
             first_steps: 0,
@@ -134,11 +134,11 @@ impl BrownConrady {
     }
 
     /// [`Self::unproject`] for many at a time, and the same bits. What is not
-    /// `fine` is left to it.
+    /// `converged` is left to it.
     #[inline]
     pub fn unproject_lanes<const N: usize>(&self, images: &Lanes<N>) -> ([DVec3; N], [bool; N]) {
-        let (points, fine) = self.quick_planes(images);
-        (std::array::from_fn(|l| ray_of(points.at(l))), fine)
+        let (points, converged) = self.quick_planes(images);
+        (std::array::from_fn(|l| ray_of(points.at(l))), converged)
     }
 
     pub fn unproject_with_jacobian(
@@ -155,9 +155,9 @@ impl BrownConrady {
     /// `f` that it took.
     #[inline]
     pub fn plane_of(&self, image: DVec2, slack: f64) -> Result<(DVec2, u32), LensLimit> {
-        let (point, [fine]) = self.quick_planes(&Lanes { x: [image.x], y: [image.y] });
+        let (point, [converged]) = self.quick_planes(&Lanes { x: [image.x], y: [image.y] });
         let quick = if self.q == DVec2::ZERO { 1 } else { self.first_steps + 2 };
-        if fine {
+        if converged {
             return Ok((point.at(0), quick));
         }
         let (point, steps) = self.slow_plane_of(image, slack)?;
@@ -233,11 +233,11 @@ impl BrownConrady {
         images: &Lanes<N>,
     ) -> (Lanes<N>, [bool; N]) {
         let (n, d) = (self.numerator, self.denominator);
-        let (stretches, fine) = self.inverse.stretches(&images.squares(), |u| {
+        let (stretches, converged) = self.inverse.stretches(&images.squares(), |u| {
             let (level, slope) = factor_of::<RATIONAL>(&n, &d, u);
             (level, level + 2.0 * u * slope)
         });
-        (images.times(&stretches), fine)
+        (images.times(&stretches), converged)
     }
 
     /// From the radial inverse, which is off by the tangential terms: as many
@@ -248,8 +248,8 @@ impl BrownConrady {
         images: &Lanes<N>,
     ) -> (Lanes<N>, [bool; N]) {
         let (n, d, q) = (self.numerator, self.denominator, self.q);
-        let (rim, sides) = (self.end * self.end, self.tangential_bend);
-        let (stretches, bends) = self.inverse.starts(&images.squares());
+        let (rim, sides) = (self.end * self.end, self.tangential_curvature);
+        let (stretches, curvatures) = self.inverse.starts(&images.squares());
         let mut points = images.times(&stretches);
         for _ in 0..self.first_steps {
             for l in 0..N {
@@ -258,7 +258,7 @@ impl BrownConrady {
                 points.set(l, x - slope.inverse().times(value - image));
             }
         }
-        let mut fine = [false; N];
+        let mut converged = [false; N];
         for l in 0..N {
             let (image, mut x) = (images.at(l), points.at(l));
             let (value, slope) = image_with_slope::<RATIONAL>(&n, &d, q, x);
@@ -270,17 +270,17 @@ impl BrownConrady {
             points.set(l, x);
             // The last step's error is at most |f''| |step| |last| / s with the
             // smaller eigenvalue s > determinant / trace. |f''| is rho'' along
-            // the radius, 2 r L' across, both within 3 times the bend, and
+            // the radius, 2 r L' across, both within 3 times the curvature, and
             // 6 |q| from the tangential terms.
-            let bend = (3.0 * bends[l] + sides) * slope.trace();
+            let curvature = (3.0 * curvatures[l] + sides) * slope.trace();
             let (left, size) = (step.length_squared() * last.length_squared(), x.length_squared());
-            let room = LEFT_OVER * slope.determinant();
-            fine[l] = (bend * bend * left <= room * room * size)
+            let room = NEWTON_TOLERANCE * slope.determinant();
+            converged[l] = (curvature * curvature * left <= room * room * size)
                 & (size <= rim)
                 & (slope.determinant() > 0.0)
                 & (slope.trace() > 0.0);
         }
-        (points, fine)
+        (points, converged)
     }
 
     /// The smallest number of first steps with which nearly all of the domain is
@@ -288,20 +288,20 @@ impl BrownConrady {
     fn needed_first_steps(mut self) -> u32 {
         const RINGS: u32 = 32;
         const AROUND: u32 = 8;
-        for steps in 0..MOST_FIRST_STEPS {
+        for steps in 0..MAX_FIRST_STEPS {
             self.first_steps = steps;
             let mut missed = 0;
             for i in 0..RINGS * AROUND {
                 let r = self.end * (f64::from(i / AROUND) + 0.5) / f64::from(RINGS);
                 let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / f64::from(AROUND)).sin_cos();
                 let image = self.image(DVec2::new(r * cos, r * sin));
-                let (_, [fine]) = self.quick_planes(&Lanes { x: [image.x], y: [image.y] });
-                missed += u32::from(!fine);
+                let (_, [converged]) = self.quick_planes(&Lanes { x: [image.x], y: [image.y] });
+                missed += u32::from(!converged);
             }
             if missed <= RINGS * AROUND / 64 {
                 return steps;
             }
         }
-        MOST_FIRST_STEPS
+        MAX_FIRST_STEPS
     }
 }

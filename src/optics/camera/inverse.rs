@@ -9,12 +9,12 @@ use crate::numeric::bracketed_newton;
 const PIECES: usize = 256;
 
 /// What a start from the table, or a Newton step, may leave: a tenth of an ulp.
-pub(super) const LEFT_OVER: f64 = 1e-17;
+pub(super) const NEWTON_TOLERANCE: f64 = 1e-17;
 
 /// A piece of the table: the coefficients of a cubic in the way through it, 0
 /// to 1, and the largest |f''| times image radius over it and its neighbours,
 /// for the estimate of what a Newton step leaves.
-type Piece = [f64; 5];
+type TablePiece = [f64; 5];
 
 /// The inverse of `image = f(x)`, `f(0) = 0`, `f' > 0` inside `[0, end]`, `f`
 /// odd.
@@ -28,21 +28,21 @@ type Piece = [f64; 5];
 pub(super) struct RadialInverse {
     end: f64,
     end_image: f64,
-    spread: Spread,
-    pieces: Box<[Piece; PIECES]>,
+    spread: TableSpacing,
+    pieces: Box<[TablePiece; PIECES]>,
 }
 
 /// How the table is laid over the square of the image radius: `s^2` is 1 at the
 /// centre and 0 at the end.
 #[derive(Debug, Clone, Copy)]
-struct Spread {
+struct TableSpacing {
     end: f64,
     per_end: f64,
     /// Square up to which the pieces are fine; zero for even pieces.
     knee: f64,
 }
 
-impl Spread {
+impl TableSpacing {
     /// A model that runs off to large radii (a pincushion, or coefficients
     /// beyond their fit) spends its pieces on the inner part: `s^2 =
     /// knee (end - square) / (end (knee + square))` instead of `1 - square / end`.
@@ -59,7 +59,7 @@ impl Spread {
         if self.knee == 0.0 { even } else { even * self.knee / (self.knee + square) }
     }
 
-    /// Derivative of [`Spread::at`].
+    /// Derivative of [`TableSpacing::at`].
     fn slope(&self, square: f64) -> f64 {
         if self.knee == 0.0 {
             return -self.per_end;
@@ -85,7 +85,7 @@ impl RadialInverse {
         if !(end > 0.0 && end.is_finite() && end_image > 0.0 && end_image.is_finite()) {
             return None;
         }
-        let spread = Spread::new(end_image, f((0.5 * end).min(1.0)).0);
+        let spread = TableSpacing::new(end_image, f((0.5 * end).min(1.0)).0);
         let step = 1.0 / PIECES as f64;
         // Argument, stretch and its derivative by s times the step.
         let mut nodes = Vec::with_capacity(PIECES + 1);
@@ -107,20 +107,20 @@ impl RadialInverse {
         nodes.push([0.0, 1.0 / f(0.0).1, beside * 2.0 / spread.slope(0.0) * step]);
         // So it is at s = 0 for a fold: take it from the neighbours.
         nodes[0][2] = -1.5 * nodes[0][1] + 2.0 * nodes[1][1] - 0.5 * nodes[2][1];
-        let bend_of = |pair: &[[f64; 3]]| {
+        let curvature_of = |pair: &[[f64; 3]]| {
             let (low, high) = (pair[1][0], pair[0][0]);
             let slopes: Vec<f64> = (0..=8).map(|k| f(low + (high - low) * f64::from(k) / 8.0).1).collect();
             let rise = slopes.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
             rise * 8.0 / (high - low)
         };
-        let bends: Vec<f64> = nodes.windows(2).map(bend_of).collect();
+        let curvatures: Vec<f64> = nodes.windows(2).map(curvature_of).collect();
         let mut pieces = Box::new([[0.0; 5]; PIECES]);
         for (i, (piece, pair)) in pieces.iter_mut().zip(nodes.windows(2)).enumerate() {
             let ([_, g0, d0], [_, g1, d1]) = (pair[0], pair[1]);
             let rise = g1 - g0;
-            let near = &bends[i.saturating_sub(1)..(i + 2).min(PIECES)];
-            let bend = near.iter().copied().fold(0.0, f64::max);
-            *piece = [g0, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise, bend];
+            let near = &curvatures[i.saturating_sub(1)..(i + 2).min(PIECES)];
+            let curvature = near.iter().copied().fold(0.0, f64::max);
+            *piece = [g0, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise, curvature];
         }
         let finite = pieces.iter().flatten().all(|v| v.is_finite());
         finite.then_some(Self { end, end_image, spread, pieces })
@@ -131,7 +131,7 @@ impl RadialInverse {
         self.end_image
     }
 
-    /// First guesses of the stretch for squares of image radii, and the bends
+    /// First guesses of the stretch for squares of image radii, and the curvatures
     /// around. Squares past the end start at the end.
     #[inline(always)]
     pub fn starts<const N: usize>(&self, squares: &[f64; N]) -> ([f64; N], [f64; N]) {
@@ -148,13 +148,13 @@ impl RadialInverse {
                 pieces[k][l] = piece[k];
             }
         }
-        let [c0, c1, c2, c3, bends] = pieces;
+        let [c0, c1, c2, c3, curvatures] = pieces;
         let mut stretches = [0.0; N];
         for l in 0..N {
             let t = way[l];
             stretches[l] = c0[l] + t * (c1[l] + t * (c2[l] + t * c3[l]));
         }
-        (stretches, bends)
+        (stretches, curvatures)
     }
 
     /// The stretches of image radii, given by their squares; `factor` returns
@@ -167,8 +167,8 @@ impl RadialInverse {
         squares: &[f64; N],
         factor: impl Fn(f64) -> (f64, f64),
     ) -> ([f64; N], [bool; N]) {
-        let (mut stretches, bends) = self.starts(squares);
-        let mut fine = [false; N];
+        let (mut stretches, curvatures) = self.starts(squares);
+        let mut converged = [false; N];
         for l in 0..N {
             let g = stretches[l];
             let (level, slope) = factor(g * g * squares[l]);
@@ -176,14 +176,14 @@ impl RadialInverse {
             let next = g - step;
             // Newton's next error in x is f'' dx^2 / (2 f'), and dx is the step
             // times the image radius; squared, since only its square is known.
-            let (left, room) = (step * step * bends[l], LEFT_OVER * slope * next);
-            fine[l] = (left * left * squares[l] <= room * room)
+            let (left, room) = (step * step * curvatures[l], NEWTON_TOLERANCE * slope * next);
+            converged[l] = (left * left * squares[l] <= room * room)
                 & (squares[l] <= self.spread.end)
                 & (slope > 0.0)
                 & (next > 0.0);
             stretches[l] = next;
         }
-        (stretches, fine)
+        (stretches, converged)
     }
 
     /// The `x` in `[0, end]` with `f(x) = image`, in a bracket, and the evaluations

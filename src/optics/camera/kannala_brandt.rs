@@ -18,7 +18,7 @@ pub(super) struct KannalaBrandt {
     k: [f64; 4],
     domain: Domain,
     inverse: RadialInverse,
-    turns: Turns,
+    sines: SineTable,
 }
 
 impl KannalaBrandt {
@@ -30,7 +30,7 @@ impl KannalaBrandt {
         let fold_rad = slope.first_root_after(0.0, last * last).map(f64::sqrt);
         let domain = Domain::new((0.5 * field_of_view_rad).min(last), fold_rad);
         let inverse = RadialInverse::new(|theta| radius(&k, theta), domain.end_rad)?;
-        Some(Self { k, domain, inverse, turns: Turns::new(domain.end_rad) })
+        Some(Self { k, domain, inverse, sines: SineTable::new(domain.end_rad) })
     }
 
     pub fn domain(&self) -> &Domain {
@@ -93,8 +93,8 @@ impl KannalaBrandt {
     #[inline]
     pub fn angle_of(&self, image: DVec2, slack: f64) -> Result<(f64, u32), LensLimit> {
         let square = image.length_squared();
-        let ([stretch], [fine]) = self.inverse.stretches(&[square], |u| level(&self.k, u));
-        if fine {
+        let ([stretch], [converged]) = self.inverse.stretches(&[square], |u| level(&self.k, u));
+        if converged {
             return Ok((square.sqrt() * stretch, 1));
         }
         self.slow_angle_of(image.length(), slack)
@@ -114,22 +114,22 @@ impl KannalaBrandt {
     }
 
     /// [`Self::unproject`] for many at a time, and the same bits. What is not
-    /// `fine` is left to it.
+    /// `converged` is left to it.
     #[inline]
     pub fn unproject_lanes<const N: usize>(&self, images: &Lanes<N>) -> ([DVec3; N], [bool; N]) {
         let squares = images.squares();
-        let (stretches, fine) = self.inverse.stretches(&squares, |u| level(&self.k, u));
+        let (stretches, converged) = self.inverse.stretches(&squares, |u| level(&self.k, u));
         let ray = |l: usize| {
             let image_radius = squares[l].sqrt();
             let theta = image_radius * stretches[l];
             self.ray(images.at(l), image_radius, theta)
         };
-        (std::array::from_fn(ray), fine)
+        (std::array::from_fn(ray), converged)
     }
 
     #[inline(always)]
     fn ray(&self, image: DVec2, image_radius: f64, theta: f64) -> DVec3 {
-        let (sin, cos) = self.turns.sin_cos(theta);
+        let (sin, cos) = self.sines.sin_cos(theta);
         let scale = if image_radius == 0.0 { 1.0 } else { sin / image_radius };
         DVec3::new(image.x * scale, image.y * scale, cos)
     }
@@ -141,7 +141,7 @@ impl KannalaBrandt {
     ) -> Result<(DVec3, Matrix3x2<f64>), LensLimit> {
         let image_radius = image.length_squared().sqrt();
         let (theta, _) = self.angle_of(image, slack)?;
-        let (sin, cos) = self.turns.sin_cos(theta);
+        let (sin, cos) = self.sines.sin_cos(theta);
         let (e, around) =
             if image_radius == 0.0 { (DVec2::X, 1.0) } else { (image / image_radius, sin / image_radius) };
         let slope = radius(&self.k, theta).1;
@@ -176,30 +176,30 @@ fn radius(k: &[f64; 4], theta: f64) -> (f64, f64) {
 }
 
 /// Angles in the table of sines.
-const TURNS: usize = 512;
+const SINE_TABLE_STEPS: usize = 512;
 
 /// Sine and cosine of the domain's angles, from a table and a rotation by what
 /// is left: as exact as the standard functions and several times as fast.
 #[derive(Debug, Clone)]
-struct Turns {
+struct SineTable {
     per_step: f64,
     step: f64,
     table: Vec<[f64; 2]>,
 }
 
-impl Turns {
+impl SineTable {
     fn new(end_rad: f64) -> Self {
-        let step = end_rad / TURNS as f64;
+        let step = end_rad / SINE_TABLE_STEPS as f64;
         let at = |i: usize| {
             let (sin, cos) = (i as f64 * step).sin_cos();
             [sin, cos]
         };
-        Self { per_step: 1.0 / step, step, table: (0..=TURNS).map(at).collect() }
+        Self { per_step: 1.0 / step, step, table: (0..=SINE_TABLE_STEPS).map(at).collect() }
     }
 
     #[inline]
     fn sin_cos(&self, angle: f64) -> (f64, f64) {
-        let i = ((angle * self.per_step + 0.5) as usize).min(TURNS);
+        let i = ((angle * self.per_step + 0.5) as usize).min(SINE_TABLE_STEPS);
         let [sin, cos] = self.table[i];
         // At most half a step, 0.0031: the next terms are below 1e-19.
         let left = angle - i as f64 * self.step;

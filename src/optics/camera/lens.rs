@@ -8,7 +8,7 @@ use super::kannala_brandt::KannalaBrandt;
 use super::lanes::Lanes;
 use super::limit::Domain;
 use super::pinhole::Pinhole;
-use super::pupil::PupilShift;
+use super::pupil::PupilPolynomial;
 use super::{LensError, LensLimit, LensSpec, Model};
 use crate::numeric::LengthMismatch;
 use crate::numeric::batch::{fill, fill_runs};
@@ -16,18 +16,18 @@ use crate::numeric::batch::{fill, fill_runs};
 /// A lens with its domain.
 ///
 /// Directions are in the camera frame (x right, y down, z forward), pixels
-/// count from the centre of the top-left one. Whether a pixel lies on the
-/// image raster is not asked: a lens sees what its domain holds.
+/// count from the centre of the top-left one. Whether a pixel lies in the
+/// image is not checked: a lens sees what its domain holds.
 #[derive(Debug, Clone)]
 pub struct Lens {
     spec: LensSpec,
     formula: Formula,
-    pupil: PupilShift,
+    pupil: PupilPolynomial,
     /// Reciprocals of the focal lengths: a product costs a quarter of a quotient.
     per_focal: DVec2,
 }
 
-/// Pixels that are worked on side by side.
+/// Pixels that are computed side by side.
 pub(crate) const LANES: usize = 16;
 
 /// What an inverse found, and how.
@@ -77,7 +77,7 @@ impl Lens {
         }
         .ok_or_else(LensSpec::no_domain)?;
         let end_rad = each!(&formula, model => model.domain().end_rad);
-        let pupil = PupilShift::new(&spec.pupil_shift_mm, end_rad);
+        let pupil = PupilPolynomial::new(&spec.pupil_shift_mm, end_rad);
         let per_focal = DVec2::new(1.0 / spec.matrix[0][0], 1.0 / spec.matrix[1][1]);
         Ok(Self { spec, formula, pupil, per_focal })
     }
@@ -237,9 +237,9 @@ impl Lens {
                     images.x[l] = image.x;
                     images.y[l] = image.y;
                 }
-                let (found, fine) = model.unproject_lanes(&images);
+                let (found, converged) = model.unproject_lanes(&images);
                 for l in 0..LANES {
-                    rays[l] = if fine[l] { Ok(found[l]) } else { self.unproject(pixels[l]) };
+                    rays[l] = if converged[l] { Ok(found[l]) } else { self.unproject(pixels[l]) };
                 }
             }
         });

@@ -18,7 +18,7 @@ pub enum LensLimit {
 }
 
 impl LensLimit {
-    /// The name that files and programs carry.
+    /// The name in files.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::BeyondFold => "beyond_fold",

@@ -20,7 +20,7 @@
 //! The rays that a wide lens accepts do not all cross one point. The pupil
 //! lies on the axis at `s(theta) = c1 theta^2 + c2 theta^4 + ...` millimetres
 //! in front of the camera's origin ([`LensSpec::pupil_shift_mm`]): even powers
-//! only, since the lens turns about its axis, and zero on the axis, where the
+//! only, since the lens is symmetric about its axis, and zero on the axis, where the
 //! origin is put. See [`Lens::pupil_shift_mm`].
 //!
 #![doc = include_str!("lenses.md")]

@@ -48,12 +48,12 @@ impl Pinhole {
     }
 
     /// [`Self::unproject`] for many at a time, and the same bits. What is not
-    /// `fine` is left to it.
+    /// `converged` is left to it.
     #[inline]
     pub fn unproject_lanes<const N: usize>(&self, images: &Lanes<N>) -> ([DVec3; N], [bool; N]) {
         let squares = images.squares();
-        let fine = squares.map(|square| square <= self.end * self.end);
-        (std::array::from_fn(|l| ray_of(images.at(l))), fine)
+        let converged = squares.map(|square| square <= self.end * self.end);
+        (std::array::from_fn(|l| ray_of(images.at(l))), converged)
     }
 
     pub fn unproject_with_jacobian(

@@ -2,12 +2,12 @@
 
 /// `s(theta) = c1 theta^2 + c2 theta^4 + ...`, constant past the domain's end.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct PupilShift {
+pub(super) struct PupilPolynomial {
     coefficients_mm: Vec<f64>,
     end_rad: f64,
 }
 
-impl PupilShift {
+impl PupilPolynomial {
     pub fn new(coefficients_mm: &[f64], end_rad: f64) -> Self {
         let mut coefficients_mm = coefficients_mm.to_vec();
         while coefficients_mm.last() == Some(&0.0) {

@@ -15,7 +15,7 @@ pub enum Model {
 }
 
 impl Model {
-    /// The name that files carry.
+    /// The name in files.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Pinhole => "pinhole",
@@ -93,7 +93,7 @@ fn error(field: impl Into<String>, value: impl ToString, allowed: impl Into<Stri
 
 /// Largest magnitude of a coefficient. Published overfit sets reach 1e4; the
 /// bound keeps every polynomial of the domain search finite.
-const LARGEST_COEFFICIENT: f64 = 1e9;
+const MAX_COEFFICIENT: f64 = 1e9;
 
 impl LensSpec {
     /// Whether every field can be used; the domain is found by [`super::Lens::new`].
@@ -134,10 +134,9 @@ impl LensSpec {
                 format!("{} takes {} coefficients", self.model, counts.join(" or ")),
             ));
         }
-        for (list, values, largest) in [
-            ("distortion", &self.distortion, LARGEST_COEFFICIENT),
-            ("pupil_shift_mm", &self.pupil_shift_mm, 1e6),
-        ] {
+        for (list, values, largest) in
+            [("distortion", &self.distortion, MAX_COEFFICIENT), ("pupil_shift_mm", &self.pupil_shift_mm, 1e6)]
+        {
             for (i, &value) in values.iter().enumerate() {
                 if !value.is_finite() || value.abs() > largest {
                     return Err(error(

@@ -11,16 +11,16 @@ pub struct PoseOptions {
     /// Standard deviation of a centroid on each image axis, px.
     pub noise_px: f64,
     /// Farthest that the platform can be from rest, mm.
-    pub most_shift_mm: f64,
+    pub max_shift_mm: f64,
     /// Farthest that the platform can turn from rest, rad; below half the markers' symmetry, so that markers
     /// counted one further do not pass for a turned platform.
-    pub most_turn_rad: f64,
+    pub max_turn_rad: f64,
 }
 
 impl PoseOptions {
     /// The reach of a platform on springs: a turn of 40 degrees, a shift as given.
-    pub fn new(noise_px: f64, most_shift_mm: f64) -> Self {
-        Self { noise_px, most_shift_mm, most_turn_rad: 0.7 }
+    pub fn new(noise_px: f64, max_shift_mm: f64) -> Self {
+        Self { noise_px, max_shift_mm, max_turn_rad: 0.7 }
     }
 }
 

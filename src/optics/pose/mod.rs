@@ -4,17 +4,17 @@
 //! two fit, and a named [`PoseError`] where none does. Where the pixels come from is not known here.
 
 mod disc;
+mod error;
 mod estimate;
-mod fault;
 mod refine;
+mod sheet;
 mod solver;
 mod start;
-mod view;
 
 pub use disc::{DiscImage, Marker, outline_centroid_offset};
+pub use error::PoseError;
 pub use estimate::{PoseEstimate, PoseOptions, Sighting, displacement_from_motion};
-pub use fault::PoseError;
-pub use solver::{MOST_MARKERS, PoseSolver};
+pub use solver::{MAX_MARKERS, PoseSolver};
 
 #[cfg(test)]
 mod tests;

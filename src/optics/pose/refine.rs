@@ -1,43 +1,44 @@
-//! Levenberg-Marquardt over poses, and the two ways to get residuals.
+//! Levenberg-Marquardt over poses, and two forms of the residuals.
 
 use glam::{DVec2, DVec3};
 use nalgebra::Matrix6;
 
 use super::disc::{DIRECTIONS, Marker, OUTLINE, centroid_offset};
-use super::view::{Placed, Sheet, Sight};
+use super::sheet::{ObservedRay, PlacedSheet, SheetView};
 use crate::numeric::{Rigid, rotation_from_vector, vector_from_rotation};
 use crate::refraction::{Limit, SensorOptics};
 
-const MOST_STEPS: u32 = 40;
-/// The step after which a pose counts as found, mm: it is then right to 1e-8 mm.
-const SETTLED_MM: f64 = 2e-6;
+const MAX_STEPS: u32 = 40;
+/// A step this short ends the refinement, mm: the pose is then right to 1e-8 mm.
+const CONVERGED_MM: f64 = 2e-6;
 
 /// Why residuals do not exist at a pose: which marker, which limit.
-pub(super) type Hidden = (u32, Limit);
+pub(super) type HiddenMarker = (u32, Limit);
 
 /// Sum of squared residuals (px^2), normal matrix (its lower half) and right side.
-pub(super) struct Normal {
+pub(super) struct NormalEquations {
     pub chi2: f64,
     matrix: [[f64; 6]; 6],
     right: [f64; 6],
 }
 
 /// Residuals of sightings as a function of the pose.
-pub(super) trait Model {
-    /// At a pose; at the first look slow parts may be guessed. The second value says whether everything is exact.
-    fn at(&mut self, pose: &Rigid, first_look: bool) -> Result<(Normal, bool), Hidden>;
+pub(super) trait ResidualModel {
+    /// Normal equations at a pose. The first evaluation may use a guess for slow parts; the second value is whether all
+    /// parts are exact.
+    fn at(&mut self, pose: &Rigid, first_evaluation: bool) -> Result<(NormalEquations, bool), HiddenMarker>;
 }
 
 /// A refined pose.
-pub(super) struct Fit {
+pub(super) struct RefinedPose {
     pub pose: Rigid,
     pub chi2: f64,
     pub normal: Matrix6<f64>,
     pub steps: u32,
-    pub settled: bool,
+    pub converged: bool,
 }
 
-impl Normal {
+impl NormalEquations {
     fn empty() -> Self {
         Self { chi2: 0.0, matrix: [[0.0; 6]; 6], right: [0.0; 6] }
     }
@@ -53,7 +54,7 @@ impl Normal {
         }
     }
 
-    fn whole(&self) -> Matrix6<f64> {
+    fn matrix(&self) -> Matrix6<f64> {
         Matrix6::from_fn(|i, j| self.matrix[i.max(j)][i.min(j)])
     }
 
@@ -86,17 +87,17 @@ impl Normal {
     }
 }
 
-/// Residuals through the whole of `optics`, for any lens.
-pub(super) struct Residuals<'a> {
+/// PixelResiduals through all of `optics`, for any lens.
+pub(super) struct PixelResiduals<'a> {
     pub optics: &'a SensorOptics,
     pub seen: &'a [(Marker, DVec2)],
 }
 
-impl Model for Residuals<'_> {
-    fn at(&mut self, pose: &Rigid, _first_look: bool) -> Result<(Normal, bool), Hidden> {
+impl ResidualModel for PixelResiduals<'_> {
+    fn at(&mut self, pose: &Rigid, _first_look: bool) -> Result<(NormalEquations, bool), HiddenMarker> {
         let first = self.seen.first().map_or(0, |(m, _)| m.id);
         let optics = self.optics.at_pose(pose).map_err(|_| (first, Limit::PupilInsideSheet))?;
-        let mut normal = Normal::empty();
+        let mut normal = NormalEquations::empty();
         for (marker, px) in self.seen {
             let (centroid, motion) =
                 marker.centroid_with_motion(&optics).map_err(|limit| (marker.id, limit))?;
@@ -108,36 +109,36 @@ impl Model for Residuals<'_> {
     }
 }
 
-/// Residuals in the plane that touches the observed pixel's ray, scaled to pixels by the lens's Jacobian there,
+/// PixelResiduals in the plane that touches the observed pixel's ray, scaled to pixels by the lens's Jacobian there,
 /// plus an offset: what the exact centroid of the disc's image differs by. The offset changes slowly with the pose
-/// (hundredths of a pixel per mm): a guess does for the first look, every later one makes it anew, so that at the end
-/// the residuals are those of raw pixels.
-pub(super) struct Sharp<'a> {
-    sheet: &'a Sheet,
+/// (hundredths of a pixel per mm): a guess is enough for the first evaluation, every later one updates it, so that at
+/// the end the residuals are those of raw pixels.
+pub(super) struct TangentResiduals<'a> {
+    sheet: &'a SheetView,
     seen: &'a [(Marker, DVec2)],
-    sights: Vec<Sight>,
+    observed: Vec<ObservedRay>,
     offsets: Vec<DVec2>,
     /// Tangent over reach of each marker's last ray, 1/mm; zero before.
     nears: Vec<f64>,
 }
 
-impl<'a> Sharp<'a> {
+impl<'a> TangentResiduals<'a> {
     /// `offsets` are a first guess, px.
     pub fn new(
-        sheet: &'a Sheet,
+        sheet: &'a SheetView,
         seen: &'a [(Marker, DVec2)],
-        sights: Vec<Sight>,
+        observed: Vec<ObservedRay>,
         offsets: Vec<DVec2>,
     ) -> Self {
-        Self { sheet, seen, sights, offsets, nears: vec![0.0; seen.len()] }
+        Self { sheet, seen, observed, offsets, nears: vec![0.0; seen.len()] }
     }
 
-    fn renew(&mut self, placed: &Placed) -> Result<(), Hidden> {
-        let parts = self.seen.iter().zip(&self.sights).zip(&mut self.offsets).zip(&self.nears);
-        for ((((marker, px), sight), offset), near) in parts {
+    fn update_offsets(&mut self, placed: &PlacedSheet) -> Result<(), HiddenMarker> {
+        let parts = self.seen.iter().zip(&self.observed).zip(&mut self.offsets).zip(&self.nears);
+        for ((((marker, px), observed), offset), near) in parts {
             let radius = 0.5 * marker.diameter_mm;
             let steps: [DVec2; OUTLINE] = DIRECTIONS.map(|[cos, sin]| DVec2::new(radius * cos, radius * sin));
-            let found = self.sheet.pixels(placed, marker.position_mm, steps, sight, *near);
+            let found = self.sheet.pixels(placed, marker.position_mm, steps, observed, *near);
             let (center, first_order, outline) = found.ok_or((marker.id, Limit::BeyondFieldOfView))?;
             // The exact centroid less what the first order says of the centre.
             *offset = center - *px - first_order;
@@ -149,44 +150,44 @@ impl<'a> Sharp<'a> {
     }
 }
 
-impl Model for Sharp<'_> {
-    fn at(&mut self, pose: &Rigid, first_look: bool) -> Result<(Normal, bool), Hidden> {
+impl ResidualModel for TangentResiduals<'_> {
+    fn at(&mut self, pose: &Rigid, first_evaluation: bool) -> Result<(NormalEquations, bool), HiddenMarker> {
         let first = self.seen.first().map_or(0, |(m, _)| m.id);
         let placed = self.sheet.placed(pose).ok_or((first, Limit::PupilInsideSheet))?;
-        if first_look {
-            self.nears.fill(self.sheet.near_axis(&placed));
+        if first_evaluation {
+            self.nears.fill(self.sheet.paraxial_tangent_per_mm(&placed));
         } else {
-            self.renew(&placed)?;
+            self.update_offsets(&placed)?;
         }
-        let mut normal = Normal::empty();
-        let parts = self.seen.iter().zip(&self.sights).zip(&self.offsets).zip(&mut self.nears);
-        for ((((marker, _), sight), offset), near) in parts {
-            let (from_sight, motion) = self
+        let mut normal = NormalEquations::empty();
+        let parts = self.seen.iter().zip(&self.observed).zip(&self.offsets).zip(&mut self.nears);
+        for ((((marker, _), observed), offset), near) in parts {
+            let (from_observed, motion) = self
                 .sheet
-                .offset(&placed, marker.position_mm, sight, near)
+                .offset(&placed, marker.position_mm, observed, near)
                 .ok_or((marker.id, Limit::BeyondFieldOfView))?;
-            let left = -(from_sight + *offset);
+            let left = -(from_observed + *offset);
             for (axis, [v, w]) in motion.iter().enumerate() {
                 normal.add([v.x, v.y, v.z, w.x, w.y, w.z], left[axis]);
             }
         }
-        Ok((normal, !first_look))
+        Ok((normal, !first_evaluation))
     }
 }
 
-/// Refines a pose; gives up early when after two steps (with a pose `known`: at once) the residual is beyond
-/// `far`, or when the pose closes in on the known one.
+/// Refines a pose. Stops early when the residual is above `far` (px^2) after two steps (at once if a pose is `known`),
+/// or when the pose comes near the known one.
 pub(super) fn refine(
-    model: &mut impl Model,
+    model: &mut impl ResidualModel,
     start: Rigid,
     far: f64,
     known: Option<&Rigid>,
-) -> Result<Fit, Hidden> {
+) -> Result<RefinedPose, HiddenMarker> {
     let mut pose = start;
     let (mut now, mut exact) = model.at(&pose, true)?;
-    let (mut damping, mut steps, mut settled) = (0.0, 0, false);
-    while steps < MOST_STEPS && !settled {
-        // A second start is the mirror of a pose that fits: where both fit it starts near its end.
+    let (mut damping, mut steps, mut converged) = (0.0, 0, false);
+    while steps < MAX_STEPS && !converged {
+        // A second start is the mirror of a pose that fits: where both fit, it starts near its minimum.
         if (steps >= 2 || known.is_some()) && now.chi2 > far.max(1.0) {
             break;
         }
@@ -202,10 +203,10 @@ pub(super) fn refine(
         }
         // A turn counts by what it moves at a lever of ten millimetres.
         let moved = v.length().max(10.0 * w.length());
-        if exact && moved <= SETTLED_MM && damping == 0.0 {
-            // What is left after this step is some thousandths of it (an offset's own motion, and the curvature
-            // where noise leaves residuals): no need to look again.
-            (pose, settled) = (next, true);
+        if exact && moved <= CONVERGED_MM && damping == 0.0 {
+            // What is left after this step is some thousandths of it (the offset's own motion, and the curvature
+            // where noise leaves residuals): no other evaluation is needed.
+            (pose, converged) = (next, true);
             break;
         }
         match model.at(&next, false) {
@@ -213,12 +214,12 @@ pub(super) fn refine(
                 (pose, now, exact) = (next, n, e);
                 damping = if damping > 1e-9 { 0.1 * damping } else { 0.0 };
             }
-            // At the floor of rounding no step goes down; that is where we want to be.
-            Ok((n, e)) if moved <= 1e-6 => (pose, now, exact, settled) = (next, n, e, true),
+            // At the floor of rounding no step goes down: this is the minimum.
+            Ok((n, e)) if moved <= 1e-6 => (pose, now, exact, converged) = (next, n, e, true),
             _ => damping = f64::max(10.0 * damping, 1e-4),
         }
     }
-    Ok(Fit { pose, chi2: now.chi2, normal: now.whole(), steps, settled })
+    Ok(RefinedPose { pose, chi2: now.chi2, normal: now.matrix(), steps, converged })
 }
 
 /// A pose within a hundredth of a millimetre and a thousandth of a radian of a minimum leads to it.

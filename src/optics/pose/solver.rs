@@ -4,11 +4,11 @@ use glam::{DVec2, DVec3};
 use nalgebra::Vector6;
 
 use super::disc::Marker;
+use super::error::PoseError;
 use super::estimate::{PoseEstimate, PoseOptions, Sighting};
-use super::fault::PoseError;
-use super::refine::{Residuals, Sharp, refine};
+use super::refine::{PixelResiduals, RefinedPose, TangentResiduals, refine};
+use super::sheet::SheetView;
 use super::start::{planar_poses, widest_four};
-use super::view::Sheet;
 use crate::numeric::{Rigid, vector_from_rotation};
 use crate::refraction::{Limit, SensorOptics};
 
@@ -18,16 +18,16 @@ pub struct PoseSolver {
     optics: SensorOptics,
     markers: Vec<Marker>,
     options: PoseOptions,
-    /// How much nearer than it is the sheet's top seems, straight through the layers, mm.
+    /// Apparent lift of the sheet's top by refraction, near the axis, mm.
     apparent_lift_mm: f64,
-    /// The fast way, where it holds.
-    sheet: Option<Sheet>,
+    /// The fast projection, where it holds: a central lens and markers on the sheet's top.
+    sheet: Option<SheetView>,
     /// How far each disc's centroid is from its centre's image at rest, px; zero where it is not seen there.
     offsets_at_rest: Vec<DVec2>,
 }
 
-/// Markers that a sensor may have.
-pub const MOST_MARKERS: usize = 64;
+/// Most markers of one sensor.
+pub const MAX_MARKERS: usize = 64;
 /// Two sightings closer than this are one blob, px.
 const ONE_BLOB_PX: f64 = 0.5;
 
@@ -38,7 +38,7 @@ impl PoseSolver {
     /// [`PoseError`] for fewer than four markers, two in one place or with one number, all on a line, or a
     /// position that is not finite.
     pub fn new(optics: &SensorOptics, markers: &[Marker], options: PoseOptions) -> Result<Self, PoseError> {
-        if markers.len() < 4 || markers.len() > MOST_MARKERS {
+        if markers.len() < 4 || markers.len() > MAX_MARKERS {
             return Err(PoseError::Missing { ids: Vec::new() });
         }
         for (i, a) in markers.iter().enumerate() {
@@ -61,9 +61,9 @@ impl PoseSolver {
             layer.thickness_mm.map_or(0.0, |thickness| thickness * (1.0 - 1.0 / index))
         };
         let apparent_lift_mm = optics.layers().iter().map(lift).sum();
-        // The fast way knows points on the sheet's top only.
+        // The fast projection holds for points on the sheet's top only.
         let flat = markers.iter().all(|m| m.position_mm.z == 0.0);
-        let sheet = if flat { Sheet::new(optics) } else { None };
+        let sheet = if flat { SheetView::new(optics) } else { None };
         let at_rest =
             |m: &Marker| m.image(optics).map_or(DVec2::ZERO, |image| image.centroid_px - image.center_px);
         let offsets_at_rest = markers.iter().map(at_rest).collect();
@@ -161,18 +161,18 @@ impl PoseSolver {
         };
         let hidden = |i: usize, limit: Limit| PoseError::NotVisible { id: seen[i].0.id, limit };
         let mut rays = [DVec3::ZERO; 4];
-        let mut sharp = None;
+        let mut tangent_residuals = None;
         if let Some(sheet) = &self.sheet {
-            let mut sights = Vec::with_capacity(seen.len());
+            let mut observed = Vec::with_capacity(seen.len());
             for (i, (_, px)) in seen.iter().enumerate() {
-                sights.push(sheet.sight(*px).map_err(|limit| hidden(i, limit))?);
+                observed.push(sheet.observed_ray(*px).map_err(|limit| hidden(i, limit))?);
             }
-            rays = four.map(|i| sights[i].ray());
+            rays = four.map(|i| observed[i].ray());
             let at_rest = |m: &Marker| {
                 self.markers.iter().position(|own| own.id == m.id).map(|i| self.offsets_at_rest[i])
             };
             let offsets = seen.iter().map(|(m, _)| at_rest(m).unwrap_or_default()).collect();
-            sharp = Some(Sharp::new(sheet, seen, sights, offsets));
+            tangent_residuals = Some(TangentResiduals::new(sheet, seen, observed, offsets));
         } else {
             for (ray, i) in rays.iter_mut().zip(four) {
                 *ray = self.optics.lens().unproject(seen[i].1).map_err(|limit| hidden(i, limit.into()))?;
@@ -187,9 +187,9 @@ impl PoseSolver {
         let mut limit = None;
         let mut run = |start: &Rigid, known: Option<&Rigid>| {
             let start = self.start_pose(start);
-            let fit = match &mut sharp {
+            let fit = match &mut tangent_residuals {
                 Some(residuals) => refine(residuals, start, far, known),
-                None => refine(&mut Residuals { optics: &self.optics, seen }, start, far, known),
+                None => refine(&mut PixelResiduals { optics: &self.optics, seen }, start, far, known),
             };
             fit.map_err(|error| limit = limit.or(Some(error))).ok()
         };
@@ -197,7 +197,7 @@ impl PoseSolver {
         let second = run(&starts[1], first.as_ref().filter(|f| f.chi2 <= allowed).map(|f| &f.pose));
         let (best, other) = match (first, second) {
             // A second fit that stopped because it was closing in on the first is the first.
-            (Some(a), Some(b)) if b.chi2 < a.chi2 && (b.settled || !a.settled) => (b, Some(a)),
+            (Some(a), Some(b)) if b.chi2 < a.chi2 && (b.converged || !a.converged) => (b, Some(a)),
             (Some(a), b) => (a, b),
             (None, Some(b)) => (b, None),
             (None, None) => {
@@ -205,12 +205,24 @@ impl PoseSolver {
                 return Err(PoseError::NoViewFits { id, limit });
             }
         };
-        let count = 2.0 * seen.len() as f64;
+        self.accept(best, other, 2 * seen.len(), allowed)
+    }
+
+    /// The estimate of the best fit to `count` numbers, if its residual is within `allowed` (px^2) and the platform
+    /// can reach the pose; with the other fit where noise cannot tell the two apart.
+    fn accept(
+        &self,
+        best: RefinedPose,
+        other: Option<RefinedPose>,
+        count: usize,
+        allowed: f64,
+    ) -> Result<PoseEstimate, PoseError> {
+        let count = count as f64;
         let rms_px = (best.chi2 / count).sqrt();
         if best.chi2 > allowed {
             return Err(PoseError::DoesNotFit { rms_px, allowed_px: (allowed / count).sqrt() });
         }
-        if !best.settled {
+        if !best.converged {
             return Err(PoseError::NotConverged { rms_px });
         }
         let mut estimate = PoseEstimate {
@@ -221,10 +233,10 @@ impl PoseSolver {
             other: None,
         };
         // Both starts may lead to one pose; two poses are two when they differ by more than noise.
-        let other = other.filter(|o| o.settled && o.chi2 <= allowed && differs(&estimate, &o.pose));
+        let other = other.filter(|o| o.converged && o.chi2 <= allowed && differs(&estimate, &o.pose));
         let reachable = |pose: &Rigid| {
-            pose.translation_mm.length() <= self.options.most_shift_mm
-                && vector_from_rotation(&pose.rotation).length() <= self.options.most_turn_rad
+            pose.translation_mm.length() <= self.options.max_shift_mm
+                && vector_from_rotation(&pose.rotation).length() <= self.options.max_turn_rad
         };
         match (reachable(&estimate.pose), other) {
             (true, other) => estimate.other = other.map(|o| o.pose).filter(reachable),
@@ -256,15 +268,16 @@ impl PoseSolver {
         pose
     }
 
-    /// Whether the pixels, dealt out differently, fit: tried for up to five sightings.
+    /// The order of marker numbers in which the pixels fit, if another order than the given one does: tried for up to
+    /// five sightings.
     fn swap_that_fits(&self, seen: &[(Marker, DVec2)]) -> Option<Vec<u32>> {
         if seen.len() > 5 {
             return None;
         }
         permutations(seen.len()).into_iter().find_map(|order| {
-            let dealt: Vec<(Marker, DVec2)> =
+            let permuted: Vec<(Marker, DVec2)> =
                 order.iter().zip(seen).map(|(from, (_, px))| (seen[*from].0, *px)).collect();
-            self.solve_matched(&dealt).ok().map(|_| dealt.iter().map(|(m, _)| m.id).collect())
+            self.solve_matched(&permuted).ok().map(|_| permuted.iter().map(|(m, _)| m.id).collect())
         })
     }
 }

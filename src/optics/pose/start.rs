@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 use crate::numeric::Rigid;
 
 /// Smallest triangle among the four points, over the area of their spread, for which they span a plane.
-const LEAST_AREA: f64 = 1e-4;
+const MIN_AREA: f64 = 1e-4;
 
 /// The pose of the plane z = 0 of `platform` seen along unit rays, and its mirror about the line of sight, as
 /// `camera_from_platform`; `None` where three of the four points, or of the rays, are on one line.
@@ -64,7 +64,7 @@ fn basis(points: &[DVec3; 4]) -> Option<DMat3> {
     let volumes = [spread(0, 1, 2), spread(0, 1, 3), spread(0, 2, 3), spread(1, 2, 3)];
     let largest = volumes.iter().copied().fold(0.0, f64::max);
     let least = volumes.iter().copied().fold(f64::INFINITY, f64::min);
-    if !(largest > 1e-12 * size && least > LEAST_AREA * largest) {
+    if !(largest > 1e-12 * size && least > MIN_AREA * largest) {
         return None;
     }
     let weights = m.inverse() * points[3];

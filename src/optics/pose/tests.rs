@@ -186,9 +186,9 @@ fn swapped_markers_are_told() {
     let solver = solver(Model::BrownConrady);
     let good = sightings(&solver, &pose([0.1, 0.0, -1.0, 0.02, 0.01, 0.0]));
     for order in [[1, 0, 2, 3], [0, 1, 3, 2], [2, 1, 0, 3], [1, 2, 3, 0], [2, 3, 0, 1], [3, 1, 2, 0]] {
-        let dealt: Vec<Sighting> =
+        let permuted: Vec<Sighting> =
             (0..4).map(|i| Sighting { id: i as u32, centroid_px: good[order[i]].centroid_px }).collect();
-        let error = solver.solve(&dealt).unwrap_err();
+        let error = solver.solve(&permuted).unwrap_err();
         assert_eq!(error, PoseError::Swapped { ids: order.map(|i| i as u32).to_vec() });
     }
 }

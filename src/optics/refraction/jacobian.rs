@@ -7,10 +7,12 @@
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{Matrix2x3, Matrix2x6, Matrix3x2};
 
-use super::sensor::SurfacePoint;
+use super::limit::Limit;
+use super::sensor::SensorOptics;
 use super::stack::{travel, travel_by_cos};
-use super::{Limit, SensorOptics};
+use super::trace::SurfacePoint;
 use crate::camera::Lens;
+use crate::numeric::cross_matrix;
 
 /// Gradient of the field angle by the ray's components (any length); zero on
 /// the axis, where the angle has no derivative but every even power of it has
@@ -43,11 +45,6 @@ fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
-/// The matrix of `x -> w cross x`.
-fn cross_matrix(w: DVec3) -> DMat3 {
-    DMat3::from_cols(DVec3::new(0.0, w.z, -w.y), DVec3::new(-w.z, 0.0, w.x), DVec3::new(w.y, -w.x, 0.0))
-}
-
 /// How a pixel moves with what it sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PixelMotion {
@@ -72,7 +69,7 @@ impl SensorOptics {
     pub fn trace_with_jacobian(&self, pixel: DVec2) -> Result<(SurfacePoint, Matrix3x2<f64>), Limit> {
         let (ray, ray_by_pixel) = self.lens.unproject_with_jacobian(pixel)?;
         let field_angle_rad = Lens::field_angle_of_unit_rad(ray);
-        let hit = self.meet(ray, field_angle_rad)?;
+        let hit = self.intersect_dome(ray, field_angle_rad)?;
         let rotation = self.sensor_from_camera.rotation;
         let cos = hit.direction.z;
         let p = DVec2::new(hit.direction.x, hit.direction.y);
@@ -155,10 +152,10 @@ impl SensorOptics {
         let shift_slope = self.lens.pupil_shift_mm(angle).1;
         let follow = by_pupil * self.sensor_from_camera.rotation.z_axis * shift_slope;
         let feedback = 1.0 - gradient.dot(follow);
-        let whole = DMat3::IDENTITY + outer(follow, gradient) * (1.0 / feedback);
+        let feedback_matrix = DMat3::IDENTITY + outer(follow, gradient) * (1.0 / feedback);
 
         let pixel_by_direction = times(&pixel_by_ray, camera_from_sensor);
-        let pixel_by_point = times(&pixel_by_direction, whole * by_point);
+        let pixel_by_point = times(&pixel_by_direction, feedback_matrix * by_point);
 
         // Moving the platform by (v, w) in the rest frame moves the camera by
         // the opposite, seen from the sensor: pupil and axes.
@@ -169,7 +166,7 @@ impl SensorOptics {
         // The field angle changes by the turn of the axes as well.
         let pupil_by_turn = turn * cross_matrix(rest_pupil);
         let seen_by_turn = turn * cross_matrix(turn.transpose() * direction) * -1.0;
-        let by_shift = whole * by_pupil * turn * -1.0;
+        let by_shift = feedback_matrix * by_pupil * turn * -1.0;
         let by_turn = by_pupil * pupil_by_turn;
         // d_seen = d_free + follow dangle, dangle = g . (d_free + turn part) / feedback.
         let turned = by_turn + seen_by_turn;

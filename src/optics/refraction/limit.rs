@@ -30,7 +30,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// The name that files and programs carry.
+    /// The name in files.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::BeyondFold => LensLimit::BeyondFold.as_str(),

@@ -19,15 +19,19 @@
 
 mod jacobian;
 mod limit;
+mod project;
 mod sensor;
 mod spec;
 mod stack;
+mod trace;
 mod tube;
 
 pub use jacobian::PixelMotion;
 pub use limit::Limit;
-pub use sensor::{SensorOptics, SolvedPixel, SurfacePoint};
+pub use project::SolvedPixel;
+pub use sensor::SensorOptics;
 pub use spec::{Channel, Layer, OpticsError, OpticsSpec};
+pub use trace::SurfacePoint;
 pub use tube::LightTube;
 
 #[cfg(test)]

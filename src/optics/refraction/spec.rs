@@ -90,7 +90,7 @@ impl std::error::Error for OpticsError {}
 const LENGTHS_MM: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
 /// Largest index of refraction; no clear material comes near it.
-const LARGEST_INDEX: f64 = 100.0;
+const MAX_INDEX: f64 = 100.0;
 
 impl OpticsSpec {
     /// Whether layers and dome can be used; the lens is checked when it is
@@ -108,7 +108,7 @@ impl OpticsSpec {
         let last = self.layers.len() - 1;
         for (i, layer) in self.layers.iter().enumerate() {
             for index in layer.index {
-                if !(1.0..=LARGEST_INDEX).contains(&index) {
+                if !(1.0..=MAX_INDEX).contains(&index) {
                     return Err(OpticsError::new(
                         format!("layers[{i}].index"),
                         index,

@@ -1,6 +1,6 @@
 //! Flat layers between the pupil and a height, and the ray through them.
 
-use super::Limit;
+use super::limit::Limit;
 
 /// Newton steps of the climb to a point. Observed in millions of random stacks:
 /// at most 14; each step past the first few doubles the digits.
@@ -26,13 +26,13 @@ impl Plate {
 /// What a ray from the pupil to a point has to cross: each layer with the
 /// thickness that is really in the way.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Path<'a> {
+pub(super) struct LayerPath<'a> {
     /// Air between the pupil and the sheet (or the point, if that is lower).
     pub air_mm: f64,
     /// The sheet's layers from below.
     pub plates: &'a [Plate],
     /// How much of the sheet, from its top down, is not in the way.
-    pub spared_mm: f64,
+    pub skipped_mm: f64,
     /// The medium above the sheet, with the height of the point in it.
     pub fill: Plate,
 }
@@ -64,14 +64,14 @@ pub(super) struct AirRay {
     pub by_air: f64,
 }
 
-impl Path<'_> {
+impl LayerPath<'_> {
     /// Calls `visit(index, thickness)` for every layer with thickness in the
     /// way, from the air up.
     fn for_each(&self, mut visit: impl FnMut(f64, f64)) {
         if self.air_mm > 0.0 {
             visit(1.0, self.air_mm);
         }
-        if self.spared_mm == 0.0 {
+        if self.skipped_mm == 0.0 {
             for plate in self.plates {
                 if plate.thickness_mm > 0.0 {
                     visit(plate.index, plate.thickness_mm);
@@ -79,7 +79,7 @@ impl Path<'_> {
             }
         } else {
             let whole: f64 = self.plates.iter().map(|p| p.thickness_mm).sum();
-            let mut left = whole - self.spared_mm;
+            let mut left = whole - self.skipped_mm;
             for plate in self.plates {
                 let thickness = left.min(plate.thickness_mm);
                 if thickness > 0.0 {
@@ -124,7 +124,7 @@ impl Path<'_> {
         Ok(self.climb_counted(n0, reach_mm)?.0)
     }
 
-    /// [`Path::climb`] and the steps that it took.
+    /// [`LayerPath::climb`] and the steps that it took.
     fn climb_counted(&self, n0: f64, reach_mm: f64) -> Result<(f64, u32), Limit> {
         let (at_axis, _) = self.reach(n0, 0.0);
         // X(t) <= t X'(0): a lower bound of the solution.
@@ -188,7 +188,7 @@ impl Path<'_> {
         if t > 0.0 { reach_mm / t } else { self.reach(n0, 0.0).0 }
     }
 
-    /// [`Path::tangent_per_mm`] with derivatives.
+    /// [`LayerPath::tangent_per_mm`] with derivatives.
     pub fn air_ray(&self, reach_mm: f64) -> Result<AirRay, Limit> {
         let n0 = self.lowest_index()?;
         let t = self.climb(n0, reach_mm)?;
@@ -198,7 +198,7 @@ impl Path<'_> {
         // The point moves up into the medium that it is in: the last one.
         let mut last = 1.0;
         self.for_each(|n, _| last = n);
-        if self.spared_mm == 0.0 {
+        if self.skipped_mm == 0.0 {
             last = self.fill.index;
         }
         let by_reach = slope / reach_slope;

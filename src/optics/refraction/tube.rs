@@ -13,8 +13,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::stack::{Path, Plate};
-use super::{Limit, SensorOptics};
+use super::limit::Limit;
+use super::sensor::SensorOptics;
+use super::stack::{LayerPath, Plate};
 
 /// A thin tube of light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +56,7 @@ impl SensorOptics {
             return Err(Limit::Unreachable);
         }
         let fill = Plate { thickness_mm: point_mm.z, ..self.fill };
-        let path = Path { air_mm, plates: &self.plates, spared_mm: 0.0, fill };
+        let path = LayerPath { air_mm, plates: &self.plates, skipped_mm: 0.0, fill };
         let sideways = (point_mm - source_mm).truncate();
         let end = self.medium_at(point_mm.z);
         let way = tube(&path, sideways, near_tangent, 1.0, end)?;
@@ -86,7 +87,7 @@ impl SensorOptics {
         let twice = |plate: &Plate| Plate { thickness_mm: 2.0 * plate.thickness_mm, ..*plate };
         let plates: Vec<Plate> = self.plates.iter().map(twice).collect();
         let fill = Plate { thickness_mm: from_mm.z + to_mm.z, ..self.fill };
-        let path = Path { air_mm: 0.0, plates: &plates, spared_mm: 0.0, fill };
+        let path = LayerPath { air_mm: 0.0, plates: &plates, skipped_mm: 0.0, fill };
         let (start, end) = (self.medium_at(from_mm.z), self.medium_at(to_mm.z));
         let way = tube(&path, (to_mm - from_mm).truncate(), near_tangent, start, end)?;
         let down = from_mm.z * slope_in(self.fill.index, way.momentum)
@@ -112,7 +113,7 @@ impl SensorOptics {
 }
 
 /// What [`tube`] finds.
-struct Way {
+struct TubeEnd {
     aside: DVec2,
     tangent: f64,
     momentum: f64,
@@ -120,7 +121,7 @@ struct Way {
 }
 
 /// The tube through a path between media of the given indices.
-fn tube(path: &Path<'_>, sideways: DVec2, near: f64, start: f64, end: f64) -> Result<Way, Limit> {
+fn tube(path: &LayerPath<'_>, sideways: DVec2, near: f64, start: f64, end: f64) -> Result<TubeEnd, Limit> {
     let reach_mm = sideways.length();
     let found = path.climb_from(reach_mm, near)?;
     let momentum = found.index * found.tangent / (1.0 + found.tangent * found.tangent).sqrt();
@@ -133,7 +134,7 @@ fn tube(path: &Path<'_>, sideways: DVec2, near: f64, start: f64, end: f64) -> Re
     let cos = |index: f64| (1.0 - (momentum / index).powi(2)).max(0.0).sqrt();
     let sr_per_mm2 = momentum_per_reach * momentum_by_reach / (start * start * cos(start) * cos(end));
     if sr_per_mm2.is_finite() {
-        Ok(Way { aside, tangent: found.tangent, momentum, sr_per_mm2 })
+        Ok(TubeEnd { aside, tangent: found.tangent, momentum, sr_per_mm2 })
     } else {
         Err(Limit::Unreachable)
     }

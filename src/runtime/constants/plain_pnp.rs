@@ -53,7 +53,7 @@ impl PlainRuntimeSolver {
             .map(|(marker, position_mm)| Marker { position_mm: *position_mm, diameter_mm: 0.0, ..*marker })
             .collect();
         // The plain runtime has no gate: whatever the residual, it takes the pose.
-        let options = PoseOptions { noise_px: 1e3, most_shift_mm: 1e6, most_turn_rad: 10.0 };
+        let options = PoseOptions { noise_px: 1e3, max_shift_mm: 1e6, max_turn_rad: 10.0 };
         Ok(Self { solver: PoseSolver::new(&optics, &markers, options).map_err(PlainError::Pose)? })
     }
 

@@ -11,7 +11,6 @@ pub fn level_named(scene: &Scene, name: LevelName) -> Level {
         LevelName::Geometric => Level::Geometric,
         LevelName::ClosedForm => Level::ClosedForm,
         LevelName::Linear => Level::Linear { element_mm },
-        LevelName::NeoHookean => Level::NeoHookean { element_mm },
     }
 }
 
@@ -24,7 +23,7 @@ pub fn level_of(scene: &Scene) -> Level {
 /// are smoother than the elements themselves, whose slopes jump from one to the next.
 pub(crate) fn map_step_mm(level: Option<Level>) -> f64 {
     match level {
-        Some(Level::Linear { element_mm } | Level::NeoHookean { element_mm }) => (0.5 * element_mm).max(0.15),
+        Some(Level::Linear { element_mm }) => (0.5 * element_mm).max(0.15),
         Some(Level::ClosedForm) => 0.25,
         _ => 0.15,
     }

@@ -17,9 +17,6 @@ pub struct ContactTruth {
     pub residual_mm: Option<f64>,
     /// How deep a node of the deformed dome still lies in the object, mm; null where nothing was solved.
     pub penetration_mm: Option<f64>,
-    /// The largest force by which a free node of bricks is out of balance, N, where the level has bricks.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub imbalance_n: Option<f64>,
     /// Iterations of the last contact solve; null where nothing was solved.
     pub iterations: Option<u32>,
     /// What springs and contact are out of balance by, N (moments counted over the springs' reach); null where nothing was
@@ -37,7 +34,6 @@ impl ContactTruth {
             note: None,
             residual_mm: None,
             penetration_mm: None,
-            imbalance_n: None,
             iterations: None,
             balance_residual_n: None,
             solves: None,
@@ -61,7 +57,6 @@ impl ContactTruth {
             note,
             residual_mm: finite(state.residual_mm),
             penetration_mm: finite(state.penetration_mm),
-            imbalance_n: state.imbalance_n,
             iterations: Some(state.iterations),
             balance_residual_n: finite(pressed.residual_n),
             solves: Some(pressed.iterations),
@@ -75,10 +70,8 @@ fn how_far_off(state: &ContactState) -> String {
         residual_mm if residual_mm.is_finite() => format!("nodes still moved by {residual_mm:.1e} mm"),
         _ => "no step could be taken".into(),
     };
-    let bricks =
-        state.imbalance_n.map_or_else(String::new, |off_n| format!(", bricks were off by {off_n:.1e} N"));
     format!(
-        "after {} iterations {moved}{bricks} and one lay {:.1e} mm inside the object",
+        "after {} iterations {moved} and one lay {:.1e} mm inside the object",
         state.iterations, state.penetration_mm
     )
 }

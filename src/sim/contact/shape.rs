@@ -7,7 +7,6 @@ use glam::DVec3;
 
 use crate::contact::between::{Around, Between, extents, pressed_cap};
 use crate::contact::displacement_map::{DisplacementMap, MapLayout};
-use crate::contact::stepper::Touch;
 use crate::effect_name::EffectName;
 use crate::work::Work;
 

@@ -10,7 +10,7 @@ use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
 use crate::electronics::pass::{CodedPass, PassContext};
-use crate::frame::Image8;
+use crate::raster::frame::Image8;
 use crate::scene::electronics::JpegChroma;
 use crate::{Pipeline, Scene, SimError, Work};
 

@@ -7,7 +7,8 @@ use crate::raster::spots::Points;
 use crate::scene::file::LevelName;
 use crate::scene::object::Hold;
 use crate::{Pipeline, Scene, SimError};
-use domecast_contact::{Level, estimate, most_force_n};
+use crate::contact::level::{level_named, level_of};
+use domecast_contact::{estimate, most_force_n};
 
 /// See the module.
 pub struct Contact;
@@ -50,7 +51,7 @@ pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
     let most_n = scene.file().tolerance.force_n.unwrap_or(f64::INFINITY);
     let px_per_mm = largest_px_per_mm(scene);
     let own_work = per_frame(scene, best);
-    [LevelName::Geometric, LevelName::ClosedForm, LevelName::Linear]
+    [LevelName::Geometric, LevelName::ClosedForm]
         .into_iter()
         .filter(|name| *name < best)
         .filter_map(|name| {

@@ -52,7 +52,7 @@ fn frames(scene: &Scene) -> Vec<u32> {
 fn quickest_level(scene: &Scene) -> Level {
     let edged = scene.objects().iter().any(|object| object.indenter.solid.is_mesh());
     match scene.file().contact.level {
-        LevelName::Linear | LevelName::NeoHookean if edged => level_named(scene, LevelName::Linear),
+        LevelName::Linear if edged => level_named(scene, LevelName::Linear),
         _ => Level::Geometric,
     }
 }

@@ -29,7 +29,7 @@ pub mod speed;
 mod tests;
 mod vignetting;
 
-use super::effect::Effect;
+use self::effect::Effect;
 
 /// All effects, in the order of their names.
 pub fn all() -> &'static [&'static dyn Effect] {

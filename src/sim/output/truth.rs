@@ -3,6 +3,7 @@
 use glam::DVec2;
 use serde::Serialize;
 
+use crate::contact::record::ContactTruth;
 use crate::effect_name::EffectName;
 use crate::plan::Plan;
 use crate::raster::spots::{Spot, Spots};

@@ -1,12 +1,13 @@
 //! Which effects are used, and what leaving the others out can cost.
 
-mod fill;
+pub(crate) mod fill;
 #[cfg(test)]
 mod honesty;
 
 use serde::Serialize;
 
 use crate::bound::Bound;
+use crate::contact::level::level_named;
 use crate::effect_name::{EffectChoice, EffectName};
 use crate::effects;
 use crate::effects::effect::{Cost, Effect};
@@ -280,7 +281,7 @@ impl Plan {
             }
         }
         if let Some(name) = self.contact_level {
-            pipeline.contact = Some(effects::contact::level_named(scene, name));
+            pipeline.contact = Some(level_named(scene, name));
         }
         pipeline.passes.sort_by_key(|pass| pass.stage());
         pipeline.fill_tolerance = fill_tolerance(scene, self.filled_grey);

@@ -186,7 +186,6 @@ impl LevelName {
             Self::Geometric => "geometric",
             Self::ClosedForm => "closed_form",
             Self::Linear => "linear",
-            Self::NeoHookean => "neo_hookean",
         }
     }
 }
@@ -201,8 +200,6 @@ pub enum LevelName {
     ClosedForm,
     /// Linear finite elements.
     Linear,
-    /// Neo-Hookean finite elements.
-    NeoHookean,
 }
 
 /// The printed dots as they came out.

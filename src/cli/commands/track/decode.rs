@@ -74,7 +74,10 @@ fn jpeg(bytes: &[u8]) -> Result<Picture, String> {
         .set_max_width(1 << 14)
         .set_max_height(1 << 14);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    let bytes = decoder.decode().map_err(|error| format!("is not a whole JPEG picture ({error})"))?;
+    // the decoder ends some of its messages with a line break
+    let bytes = decoder
+        .decode()
+        .map_err(|error| format!("is not a whole JPEG picture ({})", error.to_string().trim_end()))?;
     let Some((width, height)) = decoder.dimensions() else { return Err("has no size".into()) };
     Picture { width, height, channels: 3, bytes }.checked()
 }
@@ -151,7 +154,7 @@ mod tests {
         pgm.extend(&bytes[..32 * 24]);
         let mut ppm = b"P6 # a comment\n32 24 255\n".to_vec();
         ppm.extend(&bytes);
-        let jpeg = include_bytes!("../../../../tests/cases/tiny.jpg").to_vec();
+        let jpeg = include_bytes!("../../../../tests/cases/frames/tiny.jpg").to_vec();
         [png_of(32, 24, 3, &bytes).unwrap(), jpeg, pgm, ppm]
     }
 

@@ -30,14 +30,14 @@ pub enum FitError {
         /// Their indices.
         samples: Vec<usize>,
         /// The share that is accepted.
-        most: f64,
+        max: f64,
     },
     /// What the best map leaves is no scatter of a print.
     TooScattered {
         /// Root mean square of the residuals, per axis, mm along the dome.
         rms_mm: f64,
         /// The most that is accepted, mm.
-        most_mm: f64,
+        max_mm: f64,
     },
     /// The best map folds.
     Folds(TransferError),
@@ -56,15 +56,15 @@ impl fmt::Display for FitError {
             Self::TooFew { have, need } => write!(f, "{have} points, at least {need} are needed"),
             Self::NotFinite { sample } => write!(f, "point {sample} has no finite place"),
             Self::Degenerate => write!(f, "the points determine no map: they lie on a line or on one ring"),
-            Self::TooManyOutliers { samples, most } => write!(
+            Self::TooManyOutliers { samples, max } => write!(
                 f,
                 "{} points do not fit the others, more than {} %: wrong marks or a wrong unit?",
                 samples.len(),
-                most * 100.0
+                max * 100.0
             ),
-            Self::TooScattered { rms_mm, most_mm } => write!(
+            Self::TooScattered { rms_mm, max_mm } => write!(
                 f,
-                "the points miss the map that fits them best by {rms_mm:.3} mm rms, more than {most_mm:.3}: wrong \
+                "the points miss the map that fits them best by {rms_mm:.3} mm rms, more than {max_mm:.3}: wrong \
                  marks, or another artwork?"
             ),
             Self::Folds(error) => write!(f, "the map that fits best cannot be used: {error}"),

@@ -3,18 +3,18 @@
 //! Pairs of samples, each of which fixes a plain map, vote first; the best of them starts a least trimmed squares fit
 //! of the whole model (P. Rousseeuw and K. Van Driessen, Data Mining and Knowledge Discovery 12, 2006), which reads
 //! the best seven samples of ten only. Mistaken marks cannot pull it over as they pull a fit of least squares, nor,
-//! where they stand far out, one of least absolute deviations. What lies beyond its scatter is then left out, and the
-//! scatter taken anew.
+//! where they stand far out, one of least absolute deviations. Samples beyond its scatter are then left out, and the
+//! scatter is computed again.
 
 use glam::DVec2;
 
 use super::error::FitError;
 use super::sample::Sample;
-use super::solve::{BEYOND_RAD, Model, Problem};
+use super::solve::{BEYOND_RAD, FitModel, FitProblem};
 use crate::transfer::{Nominal, TransferMap, UnitPlate};
 
 /// Share of outliers above which the measurement itself is in doubt.
-pub(super) const MOST_OUTLIERS: f64 = 0.3;
+pub(super) const MAX_OUTLIERS: f64 = 0.3;
 /// A sample is an outlier beyond this multiple of the scatter. Of 1000 good samples in two dimensions, 0.04
 /// lie further out.
 const OUTLIER_SIGMAS: f64 = 4.5;
@@ -24,21 +24,21 @@ const NO_OUTLIER: f64 = 0.002;
 /// Median of the length of a scatter in two dimensions over its standard deviation per axis: sqrt(2 ln 2).
 const MEDIAN_LENGTH: f64 = 1.177_410_022_515_474_7;
 /// Bound on the rounds of either search.
-const MOST_ROUNDS: u32 = 12;
+const MAX_ROUNDS: u32 = 12;
 /// Pairs of samples that vote. With three mistaken marks of ten, half of the pairs are good.
 const PAIRS: usize = 64;
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// Which samples are no outliers: by the model that explains seven samples of ten best, among those that do not
     /// fold. A series that meets every ring can bend, and fold, to meet a mistaken mark beyond them; one with a term
     /// less can not, but may miss a ring.
     pub fn inliers(&self) -> Result<Vec<bool>, FitError> {
         let mut best: Option<((bool, f64), Vec<bool>)> = None;
         let count = self.samples.len();
-        let most = self.most_radial().min(if count >= 40 { 4 } else { 3 });
+        let most = self.max_radial().min(if count >= 40 { 4 } else { 3 });
         for nominal in Nominal::ALL {
             for radial in most.saturating_sub(1).max(1)..=most {
-                let model = Model { nominal, radial, two_fold: count >= 24 };
+                let model = FitModel { nominal, radial, two_fold: count >= 24 };
                 let Ok((length, used)) = self.inliers_of(model) else { continue };
                 let rank = (self.folds(model, &used), length);
                 if best.as_ref().is_none_or(|(least, _)| rank < *least) {
@@ -50,18 +50,18 @@ impl Problem<'_> {
     }
 
     /// Whether the map through the samples used folds among them.
-    fn folds(&self, model: Model, used: &[bool]) -> bool {
+    fn folds(&self, model: FitModel, used: &[bool]) -> bool {
         let weights: Vec<f64> = used.iter().map(|used| f64::from(u8::from(*used))).collect();
         let Ok(mut correction) = self.solve(model, &weights) else { return true };
         correction.max_polar_rad -= BEYOND_RAD;
         TransferMap::new(self.radius_mm, model.nominal, Some(correction)).is_err()
     }
 
-    fn inliers_of(&self, model: Model) -> Result<(f64, Vec<bool>), FitError> {
+    fn inliers_of(&self, model: FitModel) -> Result<(f64, Vec<bool>), FitError> {
         let mut lengths = self.by_pairs(model.nominal);
         let mut used = Vec::new();
-        for _ in 0..MOST_ROUNDS {
-            let next = best_of(&lengths, 1.0 - MOST_OUTLIERS);
+        for _ in 0..MAX_ROUNDS {
+            let next = best_of(&lengths, 1.0 - MAX_OUTLIERS);
             if next == used {
                 break;
             }
@@ -73,15 +73,15 @@ impl Problem<'_> {
         // Outlier Detection", 1987, chapter 5).
         let free = lengths.len().saturating_sub(model.parameters() / 2).max(1);
         let mut small_sample = 1.0 + 5.0 / free as f64;
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let kept = lengths.iter().zip(&used).filter(|(_, used)| **used).map(|(length, _)| *length);
             let sigma = small_sample * scatter(kept.collect(), model.parameters());
             let limit = (OUTLIER_SIGMAS * sigma).max(NO_OUTLIER * self.radius_mm);
             let next: Vec<bool> = lengths.iter().map(|length| *length <= limit).collect();
             let same = next == used;
             used = next;
-            // So few that agree cannot carry a map; the caller names the rest.
-            if used.iter().filter(|used| **used).count() as f64 <= (1.0 - MOST_OUTLIERS) * used.len() as f64 {
+            // So few that agree determine no map; the caller names the rest.
+            if used.iter().filter(|used| **used).count() as f64 <= (1.0 - MAX_OUTLIERS) * used.len() as f64 {
                 break;
             }
             lengths = self.lengths_without(model, &used)?;
@@ -91,11 +91,11 @@ impl Problem<'_> {
             small_sample = 1.0;
         }
         // Over all samples: a wrong nominal map can fit a few rings exactly and disown the rest.
-        Ok((quantile(&lengths, 1.0 - MOST_OUTLIERS), used))
+        Ok((quantile(&lengths, 1.0 - MAX_OUTLIERS), used))
     }
 
     /// Lengths of all residuals of a fit to the samples used.
-    fn lengths_without(&self, model: Model, used: &[bool]) -> Result<Vec<f64>, FitError> {
+    fn lengths_without(&self, model: FitModel, used: &[bool]) -> Result<Vec<f64>, FitError> {
         let weights: Vec<f64> = used.iter().map(|used| f64::from(u8::from(*used))).collect();
         let correction = self.solve(model, &weights)?;
         Ok(self.residuals(model.nominal, &correction).map(DVec2::length).collect())
@@ -125,7 +125,7 @@ impl Problem<'_> {
             let off =
                 |(place, sample): (&DVec2, &Sample)| (turn.rotate(*place) + shift).distance(sample.plate_mm);
             let lengths: Vec<f64> = nominal_places.iter().zip(self.samples).map(off).collect();
-            let score = quantile(&lengths, 1.0 - MOST_OUTLIERS);
+            let score = quantile(&lengths, 1.0 - MAX_OUTLIERS);
             if score < best.0 {
                 best = (score, lengths);
             }
@@ -149,8 +149,8 @@ fn best_of(lengths: &[f64], share: f64) -> Vec<bool> {
 /// zero by its free numbers, two to a sample.
 fn scatter(mut lengths: Vec<f64>, parameters: usize) -> f64 {
     lengths.sort_by(f64::total_cmp);
-    let spoken = lengths.get(parameters / 2..).filter(|rest| !rest.is_empty()).unwrap_or(&lengths);
-    quantile(spoken, 0.5) / MEDIAN_LENGTH
+    let informative = lengths.get(parameters / 2..).filter(|rest| !rest.is_empty()).unwrap_or(&lengths);
+    quantile(informative, 0.5) / MEDIAN_LENGTH
 }
 
 /// The value below which this share of the values lies.

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::sample::{MeasuredIn, Sample};
-use super::solve::{LEAST_SLOPE, Model, Problem};
+use super::solve::{FitModel, FitProblem, MIN_SLOPE};
 use crate::transfer::{Correction, Nominal, Polar};
 
 /// A fitted map and how well it fits.
@@ -29,19 +29,25 @@ pub struct Fit {
     pub rejected: Vec<usize>,
     /// Number of free numbers of the model.
     pub parameters: usize,
-    /// Polar angle of the outermost sample used, rad; beyond it the map is carried on by its formula.
+    /// Polar angle of the outermost sample used, rad; beyond it the map is extrapolated.
     pub measured_to_rad: f64,
 }
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// The fit, with residuals and scatter in mm along the dome.
-    pub fn report(&self, model: Model, correction: Correction, used: &[bool], rejected: Vec<usize>) -> Fit {
+    pub fn report(
+        &self,
+        model: FitModel,
+        correction: Correction,
+        used: &[bool],
+        rejected: Vec<usize>,
+    ) -> Fit {
         let residuals: Vec<DVec2> = self
             .residuals(model.nominal, &correction)
             .zip(&self.polar)
             .map(|(residual, at)| match self.measured_in {
                 MeasuredIn::Dome => residual,
-                MeasuredIn::View => DVec2::new(residual.x / at.cos_polar.max(LEAST_SLOPE), residual.y),
+                MeasuredIn::View => DVec2::new(residual.x / at.cos_polar.max(MIN_SLOPE), residual.y),
             })
             .collect();
         let kept = || residuals.iter().zip(self.samples).zip(used).filter(|(_, u)| **u).map(|(pair, _)| pair);

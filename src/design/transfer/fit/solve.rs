@@ -10,42 +10,42 @@ use super::sample::{MeasuredIn, Sample};
 use crate::transfer::{Correction, Nominal, Polar, UnitPlate};
 
 /// Bound on the steps; the model is linear in all but the rotation, and three to five are taken.
-const MOST_STEPS: u32 = 12;
-/// Radii on the plate that differ by less, as a share of the dome's radius, tell nothing apart: the two-fold terms alone
+const MAX_STEPS: u32 = 12;
+/// Radii on the plate that differ by less, as a share of the dome's radius, cannot be told apart: the two-fold terms alone
 /// spread a ring by half of this.
 const RING_GAP: f64 = 0.08;
-/// Least slope by which a plate residual is carried to the dome, so that the rim does not weigh endlessly.
-pub(super) const LEAST_SLOPE: f64 = 0.1;
+/// Smallest slope by which a plate residual is projected to the dome: it bounds the weight of the rim.
+pub(super) const MIN_SLOPE: f64 = 0.1;
 
-/// How far past the outermost sample the map is carried: half a mark and a little, rad.
+/// How far past the outermost sample the map is extrapolated: half a mark and a little, rad.
 pub(super) const BEYOND_RAD: f64 = 0.06;
 /// Furthest that any measured map reaches, rad: at the rim itself a print cannot be measured from above.
-pub(super) const FURTHEST_RAD: f64 = FRAC_PI_2 - 0.03;
+pub(super) const MAX_POLAR_RAD: f64 = FRAC_PI_2 - 0.03;
 
 /// Which numbers of the model are free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Model {
+pub(super) struct FitModel {
     pub nominal: Nominal,
     pub radial: usize,
     pub two_fold: bool,
 }
 
-impl Model {
+impl FitModel {
     pub fn parameters(self) -> usize {
         self.radial + if self.two_fold { 4 } else { 0 } + 3
     }
 }
 
-pub(super) struct Problem<'a> {
+pub(super) struct FitProblem<'a> {
     pub radius_mm: f64,
     pub samples: &'a [Sample],
     pub polar: Vec<Polar>,
     pub measured_in: MeasuredIn,
 }
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// Most radial terms that the marks can tell apart: one for each ring of the artwork.
-    pub fn most_radial(&self) -> usize {
+    pub fn max_radial(&self) -> usize {
         let middle =
             self.samples.iter().map(|sample| sample.plate_mm).sum::<DVec2>() / self.samples.len() as f64;
         let mut radii: Vec<f64> =
@@ -63,7 +63,7 @@ impl Problem<'_> {
     }
 
     /// The correction that leaves the least weighted squares.
-    pub fn solve(&self, model: Model, weights: &[f64]) -> Result<Correction, FitError> {
+    pub fn solve(&self, model: FitModel, weights: &[f64]) -> Result<Correction, FitError> {
         let outermost = self.polar.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(p, _)| p.polar_rad);
         let mut correction = Correction {
             radial: vec![0.0; model.radial],
@@ -71,10 +71,10 @@ impl Problem<'_> {
             two_fold_sideways: [0.0; 2],
             rotation_rad: 0.0,
             offset_mm: DVec2::ZERO,
-            max_polar_rad: (outermost.fold(0.0, f64::max) + BEYOND_RAD).min(FURTHEST_RAD),
+            max_polar_rad: (outermost.fold(0.0, f64::max) + BEYOND_RAD).min(MAX_POLAR_RAD),
         };
         let count = model.parameters();
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let mut matrix = DMatrix::zeros(2 * self.samples.len(), count);
             let mut right = DVector::zeros(2 * self.samples.len());
             for (i, ((sample, at), weight)) in self.samples.iter().zip(&self.polar).zip(weights).enumerate() {
@@ -130,7 +130,7 @@ impl Problem<'_> {
         if finite { Ok(correction) } else { Err(FitError::Degenerate) }
     }
 
-    /// Carries a small step on the plate to where the measurement was made: (towards the rim, around).
+    /// Projects a small step on the plate to where the measurement was made: (towards the rim, around).
     fn to_measured(&self, at: &Polar, image: &UnitPlate) -> impl Fn(DVec2) -> DVec2 + use<> {
         let (polar, around) = (image.d_polar(at), image.d_around(at));
         let area = polar.perp_dot(around);
@@ -138,7 +138,7 @@ impl Problem<'_> {
             MeasuredIn::View => at.cos_polar.max(0.0),
             MeasuredIn::Dome => 1.0,
         };
-        let area = if area.abs() < LEAST_SLOPE { LEAST_SLOPE } else { area };
+        let area = if area.abs() < MIN_SLOPE { MIN_SLOPE } else { area };
         move |step: DVec2| DVec2::new(step.perp_dot(around) / area * shortened, polar.perp_dot(step) / area)
     }
 

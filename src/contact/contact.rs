@@ -1,0 +1,120 @@
+//! A dome made ready for a level, and the contact with an object at a pose.
+
+use std::sync::Arc;
+
+use crate::elastomer::{Elastomer, Indenter};
+use crate::error::ContactError;
+use crate::estimate::{Estimate, estimate};
+use crate::fem::Compliance;
+use crate::level::{DEEPEST, Level, elements_of};
+use crate::levels;
+use crate::linear;
+use crate::outcome::Status;
+use crate::state::ContactState;
+use domecast_optics::numeric::Rigid;
+
+/// A dome that can be touched.
+#[derive(Debug, Clone)]
+pub struct Contact {
+    elastomer: Elastomer,
+    level: Level,
+    pub(crate) prepared: Prepared,
+}
+
+/// What a level computes once for a dome.
+#[derive(Debug, Clone)]
+pub(crate) enum Prepared {
+    Nothing,
+    Compliance(Arc<Compliance>),
+}
+
+impl Contact {
+    /// Makes a dome ready for a level.
+    ///
+    /// # Errors
+    /// [`ContactError::Dimension`] for constants that are no elastomer, [`ContactError::TooFine`] for elements
+    /// beyond the level's memory.
+    pub fn new(elastomer: Elastomer, level: Level) -> Result<Self, ContactError> {
+        elastomer.check()?;
+        let prepared = match level {
+            Level::Geometric | Level::ClosedForm => Prepared::Nothing,
+            Level::Linear { element_mm } => {
+                let elements = elements_of(&elastomer, element_mm)?;
+                Prepared::Compliance(Arc::new(Compliance::new(&elastomer, elements)?))
+            }
+        };
+        Ok(Self { elastomer, level, prepared })
+    }
+
+    /// The elastomer.
+    pub fn elastomer(&self) -> &Elastomer {
+        &self.elastomer
+    }
+
+    /// The level.
+    pub fn level(&self) -> Level {
+        self.level
+    }
+
+    /// How far the level may be off for an object that lies `depth_mm` inside the undeformed dome, and its cost.
+    pub fn estimate(&self, indenter: &Indenter, depth_mm: f64) -> Estimate {
+        estimate(self.level, &self.elastomer, indenter, depth_mm)
+    }
+
+    /// The contact with an object at a pose. `before` is the state of the frame before, for the friction that
+    /// depends on the way; without it the object is taken to have come along the contact's normal.
+    ///
+    /// # Errors
+    /// [`ContactError`] for constants or poses without meaning, an object that reaches into the sheet, or deeper
+    /// than the model goes. Iterations that reach their bound are not an error: see [`ContactState::status`].
+    pub fn solve(
+        &self,
+        indenter: &Indenter,
+        sensor_from_object: &Rigid,
+        before: Option<&ContactState>,
+    ) -> Result<ContactState, ContactError> {
+        let history = before.map(|state| &state.history);
+        let elastomer = &self.elastomer;
+        self.checked(indenter, sensor_from_object, || match &self.prepared {
+            Prepared::Compliance(compliance) => {
+                linear::linear(elastomer, compliance, indenter, sensor_from_object, before)
+            }
+            Prepared::Nothing if self.level == Level::Geometric => {
+                levels::geometric(elastomer, indenter, sensor_from_object, history)
+            }
+            Prepared::Nothing => levels::closed_form(elastomer, indenter, sensor_from_object, history),
+        })
+    }
+
+    /// Solves between the checks of the input and of the answer.
+    pub(crate) fn checked(
+        &self,
+        indenter: &Indenter,
+        sensor_from_object: &Rigid,
+        solve: impl FnOnce() -> Result<ContactState, ContactError>,
+    ) -> Result<ContactState, ContactError> {
+        indenter.check()?;
+        sensor_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
+        self.above_sheet(indenter, sensor_from_object)?;
+        let state = solve()?;
+        // Nothing touches the surface: then the object is outside, or all of it within.
+        let any = sensor_from_object.point(indenter.solid.support(glam::DVec3::Z));
+        let inside_mm = self.elastomer.dome_radius_mm - any.length();
+        if state.status == Status::Free && inside_mm > 1e-9 * self.elastomer.dome_radius_mm {
+            let limit_mm = DEEPEST * self.elastomer.dome_radius_mm;
+            return Err(ContactError::TooDeep { depth_mm: inside_mm, limit_mm });
+        }
+        Ok(state)
+    }
+
+    /// The object may not reach below the base plane: there is the sheet.
+    fn above_sheet(&self, indenter: &Indenter, sensor_from_object: &Rigid) -> Result<(), ContactError> {
+        let down = sensor_from_object.inverse().vector(-glam::DVec3::Z);
+        let lowest = sensor_from_object.point(indenter.solid.support(down)).z;
+        // Rounding of the pose, not a tolerance.
+        if lowest < -1e-9 * self.elastomer.dome_radius_mm {
+            return Err(ContactError::InsideSheet { depth_mm: -lowest });
+        }
+        Ok(())
+    }
+}

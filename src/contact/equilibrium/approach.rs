@@ -1,0 +1,46 @@
+//! How far an object goes until it touches.
+
+use glam::DVec3;
+
+use crate::elastomer::Indenter;
+use crate::error::ContactError;
+use crate::object::{Placed, deepest, deepest_from};
+use domecast_optics::numeric::Rigid;
+
+/// An object counts as met when it is this near, as a part of the radius: closer than a search along its edges comes.
+const MET: f64 = 1e-4;
+/// How far the object goes along a way until it touches the dome at a platform's pose.
+pub(super) fn touch_mm(
+    dome_radius_mm: f64,
+    indenter: &Indenter,
+    platform: &Rigid,
+    rest_from_object: &Rigid,
+    way: DVec3,
+) -> Result<f64, ContactError> {
+    let radius = dome_radius_mm;
+    let (mut gone, mut near_mm) = (0.0, None);
+    // The distance is a safe step forwards; from inside, its depth is one backwards.
+    for _ in 0..64 {
+        let mut object = *rest_from_object;
+        object.translation_mm += way * gone;
+        let placed = Placed::new(indenter.solid.clone(), platform.inverse().compose(&object));
+        let (at_mm, distance_mm, _) = match near_mm {
+            // From one step to the next the nearest place hardly moves; what it is taken for is checked at last.
+            Some(near_mm) => deepest_from(&placed, radius, near_mm),
+            None => deepest(&placed, radius),
+        };
+        gone += distance_mm;
+        if distance_mm.abs() < MET * radius {
+            if near_mm.is_none() {
+                return Ok(gone);
+            }
+            near_mm = None;
+            continue;
+        }
+        near_mm = Some(at_mm);
+        if gone.abs() > 1e3 * radius {
+            break;
+        }
+    }
+    Err(ContactError::BadPose(format!("the object does not meet the dome along {way}")))
+}

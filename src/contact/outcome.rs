@@ -1,0 +1,74 @@
+//! Parts of what a solve answers: how it ended, the nodes that bear a force, where the dome moves, and what the next
+//! frame must know.
+
+use glam::DVec3;
+
+use domecast_optics::numeric::Rigid;
+use domecast_springs::Wrench;
+
+/// How a solve ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Status {
+    /// Nothing touches.
+    Free,
+    /// Solved to its tolerance.
+    Solved,
+    /// The bound on iterations was reached; the state is the last one, its residuals say how far it is off.
+    BoundReached,
+    /// The level's formulas do not cover this contact; the state is that of the geometric level.
+    NotApplicable(&'static str),
+}
+
+/// A node of the dome's surface that bears a force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TouchedNode {
+    /// Its place on the undeformed dome, sensor frame, mm.
+    pub at_mm: DVec3,
+    /// The surface it stands for, mm2.
+    pub area_mm2: f64,
+    /// The force on the dome, sensor frame, N.
+    pub force_n: DVec3,
+    /// Its part along the contact normal, over the area, MPa.
+    pub pressure_mpa: f64,
+    /// Whether it sticks to the object.
+    pub sticks: bool,
+}
+
+/// Where the dome moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Direction from the base's centre to the middle of the touched region.
+    pub direction: DVec3,
+    /// Half angle of a cap about it, rad.
+    pub angle_rad: f64,
+    /// No point outside the cap moves by more than this, mm.
+    pub beyond_mm: f64,
+}
+
+/// What the next state must know of this one for friction.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct History {
+    /// Where the object was.
+    pub sensor_from_object: Option<Rigid>,
+    /// Friction force and moment about the normal of a level with one spring for the whole contact, N, N*mm.
+    pub tangential_n: DVec3,
+    pub torsion_nmm: f64,
+    /// Unknowns of the last solve, by node of the level's grid: force in the node's frame, tangential displacement.
+    pub nodes: Vec<NodeMemory>,
+}
+
+/// One node's part of [`History`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NodeMemory {
+    pub node: u32,
+    pub force_n: DVec3,
+    pub displacement_mm: DVec3,
+}
+
+/// Forces of the nodes about the base's centre.
+pub(crate) fn sum(nodes: &[TouchedNode]) -> Wrench {
+    nodes.iter().fold(Wrench::default(), |sum, node| Wrench {
+        force_n: sum.force_n + node.force_n,
+        moment_nmm: sum.moment_nmm + node.at_mm.cross(node.force_n),
+    })
+}

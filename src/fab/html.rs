@@ -1,0 +1,218 @@
+//! HTML in which text is escaped by default.
+//!
+//! [`html!`](crate::html!) formats like [`format!`] and escapes every value that is not [`Html`] already, so that no name
+//! out of a design can become markup.
+//!
+//! ```
+//! use domecast_fab::html;
+//!
+//! let cell = html!("<td>{}</td>", "R < 10");
+//! assert_eq!(html!("<tr>{}</tr>", cell).as_str(), "<tr><td>R &lt; 10</td></tr>");
+//! ```
+
+use std::fmt::{self, Write as _};
+
+/// A piece of HTML.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Html(String);
+
+impl Html {
+    /// Markup that is known to be whole: a style sheet, a script, an SVG drawing.
+    pub fn trusted(markup: impl Into<String>) -> Self {
+        Self(markup.into())
+    }
+
+    /// The markup.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// Whether there is nothing.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The markup as bytes of a file.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.0.into_bytes()
+    }
+}
+
+impl From<&str> for Html {
+    /// Escapes the text.
+    fn from(text: &str) -> Self {
+        html!("{}", text)
+    }
+}
+
+impl From<String> for Html {
+    /// Escapes the text.
+    fn from(text: String) -> Self {
+        text.as_str().into()
+    }
+}
+
+impl std::ops::AddAssign for Html {
+    fn add_assign(&mut self, more: Self) {
+        self.0 += &more.0;
+    }
+}
+
+impl std::ops::Add for Html {
+    type Output = Self;
+
+    fn add(mut self, more: Self) -> Self {
+        self += more;
+        self
+    }
+}
+
+impl FromIterator<Html> for Html {
+    fn from_iter<I: IntoIterator<Item = Html>>(pieces: I) -> Self {
+        pieces.into_iter().fold(Self::default(), std::ops::Add::add)
+    }
+}
+
+/// What can stand in HTML: markup as it is, everything else escaped.
+pub trait ToHtml {
+    /// Writes the value as HTML.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    fn write_html(&self, out: &mut dyn fmt::Write) -> fmt::Result;
+}
+
+impl ToHtml for Html {
+    fn write_html(&self, out: &mut dyn fmt::Write) -> fmt::Result {
+        out.write_str(&self.0)
+    }
+}
+
+impl ToHtml for str {
+    fn write_html(&self, out: &mut dyn fmt::Write) -> fmt::Result {
+        for c in self.chars() {
+            match c {
+                '&' => out.write_str("&amp;")?,
+                '<' => out.write_str("&lt;")?,
+                '>' => out.write_str("&gt;")?,
+                '"' => out.write_str("&quot;")?,
+                '\'' => out.write_str("&#39;")?,
+                c => out.write_char(c)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl ToHtml for String {
+    fn write_html(&self, out: &mut dyn fmt::Write) -> fmt::Result {
+        self.as_str().write_html(out)
+    }
+}
+
+impl<T: ToHtml + ?Sized> ToHtml for &T {
+    fn write_html(&self, out: &mut dyn fmt::Write) -> fmt::Result {
+        (**self).write_html(out)
+    }
+}
+
+macro_rules! numbers_to_html {
+    ($($number:ty)*) => {$(
+        impl ToHtml for $number {
+            fn write_html(&self, out: &mut dyn fmt::Write) -> fmt::Result {
+                write!(out, "{self}")
+            }
+        }
+    )*};
+}
+numbers_to_html!(f64 i64 u32 usize);
+
+/// Shows a value as HTML; what [`html!`](crate::html!) puts around each of its values.
+#[derive(Debug, Clone, Copy)]
+pub struct AsHtml<'a, T: ?Sized>(pub &'a T);
+
+impl<T: ToHtml + ?Sized> fmt::Display for AsHtml<'_, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.write_html(f)
+    }
+}
+
+/// Formats [`Html`](crate::html::Html): the template is markup, each value is escaped unless it is `Html` itself.
+#[macro_export]
+macro_rules! html {
+    ($template:literal $(, $value:expr)* $(,)?) => {
+        $crate::html::Html::trusted(format!($template $(, $crate::html::AsHtml(&$value))*))
+    };
+}
+pub use crate::html;
+
+/// A table; the first column names the row.
+pub fn table(caption: &str, heads: &[&str], rows: &[Vec<Html>]) -> Html {
+    let heads: Html = heads.iter().map(|head| html!("<th scope=\"col\">{}</th>", head)).collect();
+    let cells = |row: &Vec<Html>| -> Html {
+        let cell = |(index, cell): (usize, &Html)| match index {
+            0 => html!("<th scope=\"row\">{}</th>", cell),
+            _ => html!("<td>{}</td>", cell),
+        };
+        html!("<tr>{}</tr>\n", row.iter().enumerate().map(cell).collect::<Html>())
+    };
+    html!(
+        "<div class=\"scroll\"><table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
+        caption,
+        heads,
+        rows.iter().map(cells).collect::<Html>(),
+    )
+}
+
+/// A figure with its caption below.
+pub fn figure(content: &Html, caption: &str) -> Html {
+    html!("<figure>{}<figcaption>{}</figcaption></figure>\n", content, caption)
+}
+
+/// A picture that stands in the page itself.
+pub fn picture(mime: &str, bytes: &[u8], alt: &str) -> Html {
+    html!("<img src=\"data:{};base64,{}\" alt=\"{}\">", mime, base64(bytes), alt)
+}
+
+/// Base64 (RFC 4648, section 4), padded.
+pub fn base64(bytes: &[u8]) -> String {
+    use base64::Engine as _;
+    base64::engine::general_purpose::STANDARD.encode(bytes)
+}
+
+/// The style of a bar as long as `share` of its place, for the style sheet's `.bar`.
+fn bar_style(share: f64) -> String {
+    let mut style = String::new();
+    // writing to a String cannot fail
+    let _ = write!(style, "--w:{:.1}%", 100.0 * share.clamp(0.0, 1.0));
+    style
+}
+
+/// A bar of a length between 0 and 1, with its value in words for those who do not see it.
+pub fn bar(share: f64, label: &str) -> Html {
+    let class = if share > 1.0 { "bar over" } else { "bar" };
+    html!("<span class=\"{}\" style=\"{}\">{}</span>", class, bar_style(share), label)
+}
+
+/// Bars beside their names, the largest value as long as the place allows: name, value, label.
+pub fn bars(rows: &[(String, f64, String)]) -> Html {
+    let max = rows.iter().map(|row| row.1).filter(|v| v.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
+    let line = |(name, value, label): &(String, f64, String)| {
+        html!("<li><span>{}</span>{}</li>", name, bar((value / max).min(1.0), label))
+    };
+    html!("<ul class=\"bars\">{}</ul>\n", rows.iter().map(line).collect::<Html>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_cannot_become_markup() {
+        assert_eq!(Html::from("<b a=\"x\">&'").as_str(), "&lt;b a=&quot;x&quot;&gt;&amp;&#39;");
+        let row = vec![Html::from("<script>"), html!("<b>{}</b>", "a & b")];
+        let table = table("<i>", &["x"], &[row]);
+        assert!(table.as_str().contains("&lt;script&gt;") && table.as_str().contains("<b>a &amp; b</b>"));
+        assert!(table.as_str().contains("<caption>&lt;i&gt;</caption>"));
+    }
+}

@@ -1,0 +1,140 @@
+//! The page: what is to be seen first, then a chapter for each subject.
+
+use super::subject::ReportSubject;
+use super::{constants, forces, making, measured, parts, pattern, section};
+use crate::html::{Html, base64, figure, html, table};
+use crate::numbers::{percent, typeset};
+
+/// A chapter of the page.
+struct Chapter {
+    anchor: &'static str,
+    heading: &'static str,
+    content: Html,
+}
+
+fn chapters(subject: &ReportSubject<'_>) -> Vec<Chapter> {
+    let chapter = |anchor, heading, content| Chapter { anchor, heading, content };
+    let mut all = vec![
+        chapter("sensor", "The sensor in section", sensor(subject)),
+        chapter("dots", "Dots", pattern::dots(subject)),
+        chapter("coverage", "What the camera covers", pattern::coverage(subject)),
+        chapter("parts", "Parts and assembly", parts::parts(subject)),
+        chapter("fits", "Fits and interference", parts::fits(subject)),
+        chapter("loads", "Springs and load envelope", forces::loads(subject)),
+        chapter("resolution", "What the sensor can resolve", forces::resolution(subject)),
+        chapter("constants", "Constants at a glance", constants::chapter(subject)),
+    ];
+    let measured = measured::chapter(subject);
+    all.extend(measured.map(|content| chapter("accuracy", "What accuracy costs in time", content)));
+    all.push(chapter("making", "Making it", making::chapter(subject)));
+    all.push(chapter("files", "All files", files(subject)));
+    all
+}
+
+/// The page of a build.
+pub fn page(subject: &ReportSubject<'_>) -> Html {
+    let chapters = chapters(subject);
+    let description = subject.design.sections().description.as_ref();
+    let links = chapters.iter().map(|c| html!("<li><a href=\"#{}\">{}</a></li>\n", c.anchor, c.heading));
+    let sections = chapters
+        .iter()
+        .map(|c| html!("<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n", c.anchor, c.heading, c.content));
+    html!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+         content=\"width=device-width, initial-scale=1\">\n<title>{0} – domecast</title>\n<link rel=\"icon\" \
+         href=\"data:,\">\n<style>\n{1}</style>\n</head>\n<body>\n<a class=\"skip\" href=\"#warnings\">To the \
+         content</a>\n<header>\n<h1>{0}</h1>\n{2}<p class=\"soft\">Design <a href=\"../design.json\"><code>{3}</code></a>, \
+         domecast {4}</p>\n<nav aria-label=\"Chapters\"><ul>\n{5}</ul></nav>\n</header>\n<main>\n{6}{7}{8}</main>\n\
+         <footer><p>Lengths mm, angles degrees, forces N, pixels px. Made by domecast from the design (and the \
+         measurement, where one is shown) alone: the same design gives the same page.</p></footer>\n{9}</body>\n</html>\n",
+        subject.design.name(),
+        Html::trusted(include_str!("style.css")),
+        description.map_or_else(Html::default, |text| html!("<p>{}</p>\n", text)),
+        subject.hash.chars().take(12).collect::<String>(),
+        env!("CARGO_PKG_VERSION"),
+        links.collect::<Html>(),
+        warnings(subject),
+        glance(subject),
+        sections.collect::<Html>(),
+        viewer(subject),
+    )
+}
+
+/// The assembly and the script that shows it.
+fn viewer(subject: &ReportSubject<'_>) -> Html {
+    subject.file("parts/assembly.glb").map_or_else(Html::default, |bytes| {
+        html!(
+            "<script type=\"application/octet-stream\" id=\"assembly\">{}</script>\n<script>\n{}</script>\n",
+            base64(bytes),
+            Html::trusted(include_str!("viewer.js")),
+        )
+    })
+}
+
+fn warnings(subject: &ReportSubject<'_>) -> Html {
+    let count = subject.warnings.len();
+    if count == 0 {
+        return Html::trusted("<section id=\"warnings\"><p class=\"fine\">No warnings.</p></section>\n");
+    }
+    let lines =
+        subject.warnings.iter().map(|(field, text)| html!("<li><code>{}</code> {}</li>\n", field, text));
+    html!(
+        "<section id=\"warnings\"><h2>{} warning{}</h2><ul class=\"warnings\">\n{}</ul></section>\n",
+        count,
+        if count == 1 { "" } else { "s" },
+        lines.collect::<Html>(),
+    )
+}
+
+fn glance(subject: &ReportSubject<'_>) -> Html {
+    let s = subject.design.sections();
+    let n = typeset;
+    let mut entries = vec![
+        ("Dots", subject.layout.dots.len().to_string()),
+        ("Dome", format!("⌀ {} mm", n(2.0 * s.dome.radius_mm))),
+        ("Envelope", s.envelope.size_mm.map(n).join(" × ") + " mm"),
+        ("Air gap at rest", format!("{} mm", n(subject.design.optics().air_gap_mm()))),
+        ("Largest field angle", format!("{}°", n(subject.constants.camera.max_field_angle_rad.to_degrees()))),
+    ];
+    if let Some(coverage) = subject.judged.coverage.first().and_then(|record| record.coverage.as_ref()) {
+        entries.push(("Dome visible at rest", percent(coverage.in_mask)));
+    }
+    if let Some(springs) = &subject.constants.springs {
+        entries.push(("Stiffness Fz", format!("{} N/mm", n(springs.stiffness[2][2]))));
+    }
+    if let Some(press) = subject.forces.lines.iter().find(|line| line.load == "press") {
+        entries.push(("Straight press", format!("{} N", n(press.size))));
+    }
+    let entry = |(name, value): &(&str, String)| html!("<div><dt>{}</dt><dd>{}</dd></div>\n", name, value);
+    html!("<dl class=\"glance\">\n{}</dl>\n", entries.iter().map(entry).collect::<Html>())
+}
+
+fn sensor(subject: &ReportSubject<'_>) -> Html {
+    let row = |layer: &domecast_runtime::constants::LayerConstants| {
+        let index = layer.index_rgb.map_or_else(|| typeset(layer.index), |rgb| rgb.map(typeset).join(" / "));
+        let thickness =
+            layer.thickness_mm.map_or_else(|| "fills the dome".into(), |t| format!("{} mm", typeset(t)));
+        vec![layer.name.as_str().into(), thickness.into(), index.into()]
+    };
+    let rows: Vec<Vec<Html>> = subject.constants.optics.layers.iter().map(row).collect();
+    figure(
+        &section::drawing(subject.design),
+        "Cut along x, true to scale: red are the rays of the image's middle row, bent at the sheet and in the silicone. \
+         Platforms are drawn as blocks; their true shape is below.",
+    ) + table("Layers from the camera outwards", &["layer", "thickness", "index (red / green / blue)"], &rows)
+}
+
+fn files(subject: &ReportSubject<'_>) -> Html {
+    let line = |(path, bytes): &(&str, &[u8])| {
+        let kb = typeset((bytes.len() as f64 / 100.0).round() / 10.0);
+        html!(
+            "<li><a href=\"../{0}\"><code>{0}</code></a> <span class=\"soft\">{1} kB</span></li>\n",
+            path,
+            kb
+        )
+    };
+    html!(
+        "<ul>\n{}<li><a href=\"../manifest.json\"><code>manifest.json</code></a></li>\n</ul>\n",
+        subject.files.iter().map(line).collect::<Html>(),
+    )
+}

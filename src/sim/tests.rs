@@ -4,9 +4,9 @@ use std::str::FromStr;
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
-use super::coverage::{Coverage, area_moment, clip};
-use super::outline::RimFit;
 use super::*;
+use crate::raster::coverage::{Coverage, area_moment, clip};
+use crate::raster::outline::RimFit;
 use domecast_design;
 
 fn scene(name: &str) -> Scene {
@@ -297,12 +297,12 @@ fn a_contact_at_its_bound_is_told_with_what_is_left() {
     let mut pressed = contact.press(&ball, still.suspension(), &at, None).expect("pressed");
     pressed.state.status = Status::BoundReached;
     (pressed.state.residual_mm, pressed.state.penetration_mm) = (3.2e-3, 1.5e-2);
-    let told = truth::ContactTruth::of(&pressed);
+    let told = ContactTruth::of(&pressed);
     assert_eq!((told.status, told.residual_mm), ("not_converged", Some(3.2e-3)));
     let note = told.note.expect("a note");
     assert!(note.contains("3.2e-3 mm") && note.contains("1.5e-2 mm"), "{note}");
     pressed.state.residual_mm = f64::INFINITY;
-    let told = truth::ContactTruth::of(&pressed);
+    let told = ContactTruth::of(&pressed);
     assert!(told.residual_mm.is_none() && told.note.is_some_and(|note| note.contains("no step")));
 }
 

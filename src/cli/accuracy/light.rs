@@ -8,7 +8,7 @@ use domecast_sim::light::direct;
 use domecast_sim::light::direct::EmitterRule;
 use domecast_sim::light::radiosity::{DomeRoom, Rings, Underside};
 use domecast_sim::light::tables::Ways;
-use domecast_sim::light::{LightUse, lit_by_leds, setup};
+use domecast_sim::light::{LightUse, is_lit_by_leds, setup};
 use domecast_sim::{Scene, SimError};
 
 /// Places across an emitter, each direction, of the samples; the simulator's among them.
@@ -29,7 +29,7 @@ const BOUNCES: [u32; 6] = [1, 2, 4, 8, 16, 32];
 /// # Errors
 /// Lights that do not fit the design.
 pub fn sweeps(scene: &Scene, time_limit: TimeLimit, quick: bool) -> Result<Vec<Sweep>, SimError> {
-    if !lit_by_leds(scene) {
+    if !is_lit_by_leds(scene) {
         return Ok(Vec::new());
     }
     let ways = setup::ways(scene, &LightUse::ALL)?;

@@ -3,9 +3,9 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use domecast::camera::{Lens, LensSpec, Model};
+use domecast::camera::{Lens, LensModel, LensSpec};
 use domecast::numeric::Rigid;
-use domecast::optics::{Layer, OpticsSpec, SensorOptics};
+use domecast::optics::{FlatLayer, OpticsSpec, SensorOptics};
 use glam::{DVec2, DVec3};
 
 const BROWN: [f64; 5] = [-0.2917, 0.0878, 0.0, 0.0, -0.01156];
@@ -13,7 +13,7 @@ const BROWN_TANGENTIAL: [f64; 5] = [-0.2917, 0.0878, 6e-4, -7e-4, -0.01156];
 const RATIONAL: [f64; 8] = [0.93, 0.166, -2.4e-5, -1.4e-5, 0.0029, 1.33, 0.436, 0.0276];
 const FISHEYE: [f64; 4] = [-0.0033, 0.0541, -0.0516, 0.0107];
 
-fn lens_spec(model: Model, distortion: &[f64]) -> LensSpec {
+fn lens_spec(model: LensModel, distortion: &[f64]) -> LensSpec {
     LensSpec {
         model,
         width: 640,
@@ -25,9 +25,12 @@ fn lens_spec(model: Model, distortion: &[f64]) -> LensSpec {
     }
 }
 
-fn optics(model: Model, distortion: &[f64]) -> SensorOptics {
-    let layer =
-        |name: &str, index, thickness_mm| Layer { name: name.to_owned(), index: [index; 3], thickness_mm };
+fn optics(model: LensModel, distortion: &[f64]) -> SensorOptics {
+    let layer = |name: &str, index, thickness_mm| FlatLayer {
+        name: name.to_owned(),
+        index: [index; 3],
+        thickness_mm,
+    };
     SensorOptics::new(&OpticsSpec {
         lens: lens_spec(model, distortion),
         sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0)),
@@ -51,11 +54,11 @@ fn pixels(optics: &SensorOptics) -> Vec<DVec2> {
 
 fn bench(c: &mut Criterion) {
     let cases = [
-        ("pinhole", Model::Pinhole, &[][..]),
-        ("brown_conrady", Model::BrownConrady, &BROWN[..]),
-        ("brown_conrady_tangential", Model::BrownConrady, &BROWN_TANGENTIAL[..]),
-        ("rational", Model::BrownConrady, &RATIONAL[..]),
-        ("kannala_brandt", Model::KannalaBrandt, &FISHEYE[..]),
+        ("pinhole", LensModel::Pinhole, &[][..]),
+        ("brown_conrady", LensModel::BrownConrady, &BROWN[..]),
+        ("brown_conrady_tangential", LensModel::BrownConrady, &BROWN_TANGENTIAL[..]),
+        ("rational", LensModel::BrownConrady, &RATIONAL[..]),
+        ("kannala_brandt", LensModel::KannalaBrandt, &FISHEYE[..]),
     ];
     for (name, model, distortion) in cases {
         let optics = optics(model, distortion);

@@ -6,7 +6,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use domecast::layout::Hit;
+use domecast::layout::PrintPass;
 use domecast::parts::{Assembly, Measures, build, check_assembly, files};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let design = domecast::design::Design::load(Path::new(&design)).map_err(|error| error.to_string())?;
     let measures = Measures::of(&design)?;
-    let parts = build(&measures, &[Hit::new(0.0, 0.0)])?;
+    let parts = build(&measures, &[PrintPass::new(0.0, 0.0)])?;
     let assembly = Assembly::of(&measures, &parts)?;
     check_assembly(&measures, &parts, &assembly)?;
     for file in files(&design, &measures, &parts, &assembly)? {

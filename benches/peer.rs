@@ -6,9 +6,9 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use domecast::camera::{Lens, LensSpec, Model};
+use domecast::camera::{Lens, LensModel, LensSpec};
 use domecast::numeric::Rigid;
-use domecast::optics::{Layer, OpticsSpec, SensorOptics};
+use domecast::optics::{FlatLayer, OpticsSpec, SensorOptics};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -60,7 +60,7 @@ fn median_ns<I, O>(inputs: &[I], outputs: &mut [O], run: impl Fn(&[I], &mut [O])
 
 fn answer(case: Case) -> Answer {
     let spec = LensSpec {
-        model: Model::parse(&case.model).expect("a known model"),
+        model: LensModel::parse(&case.model).expect("a known model"),
         width: case.width,
         height: case.height,
         matrix: case.matrix,
@@ -69,7 +69,7 @@ fn answer(case: Case) -> Answer {
         pupil_shift_mm: Vec::new(),
     };
     let lens = Lens::new(spec.clone()).expect("a usable lens");
-    let layer = |name: &str, index: f64, thickness_mm| Layer {
+    let layer = |name: &str, index: f64, thickness_mm| FlatLayer {
         name: name.to_owned(),
         index: [index; 3],
         thickness_mm,

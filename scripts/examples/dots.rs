@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     fs::create_dir_all(out)?;
     let label = FilmLabel { design: design.name().to_owned(), hash: String::new() };
-    for pass in 0..layout.hits.len() {
+    for pass in 0..layout.passes.len() {
         let drawing = film(&layout, pass, design.sections().print.pad_over_image, &label)?;
         fs::write(Path::new(out).join(format!("film-{}.svg", pass + 1)), to_svg(&drawing))?;
     }

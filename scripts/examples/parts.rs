@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let layout = design.layout()?;
     fs::create_dir_all(out)?;
     // there is a printing jig for each pass of the pad
-    for part in parts::build(&Measures::of(&design)?, &layout.hits)? {
+    for part in parts::build(&Measures::of(&design)?, &layout.passes)? {
         let size_mm = part.bounds.max_mm - part.bounds.min_mm;
         let grams = PLA_G_MM3 * part.volume_mm3;
         println!(

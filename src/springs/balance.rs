@@ -7,7 +7,7 @@ use super::load::Wrench;
 use super::state::{Displacement, Equilibrium, MechanicsError};
 use super::suspension::Suspension;
 
-const MOST_NEWTON_STEPS: u32 = 40;
+const MAX_NEWTON_STEPS: u32 = 40;
 /// The load is applied in halves, quarters, .. down to this part when Newton fails from further away.
 const SMALLEST_LOAD_STEP: f64 = 1.0 / 1024.0;
 
@@ -66,7 +66,7 @@ impl Suspension {
         // Rounding of sums of this size; below it a step cannot improve.
         let floor =
             1e-13 * (size(target) + size(&self.rest_load.to_vector()) + self.spec.spring.axial_n_per_mm());
-        while used < MOST_NEWTON_STEPS {
+        while used < MAX_NEWTON_STEPS {
             let left = size(&balance);
             if left <= floor {
                 return (x, used, left, true);

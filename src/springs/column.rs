@@ -15,7 +15,7 @@
 //! real spring some per cent stiffer sideways; a force calibration measures what this leaves out.
 
 use super::dual::{Jet, Stumpff};
-use super::spring::SpringSpec;
+use super::spec::SpringSpec;
 
 /// Where the column's shear force or moment grows without bound the model ends: (qL)^2 = pi^2 is the buckling
 /// load of a column with clamped, parallel ends.

@@ -4,7 +4,8 @@ use glam::DVec3;
 
 use super::limits::{Check, Limit, Limits, LoadCase, try_load};
 use super::load::Wrench;
-use super::spring::{Spring, SpringSpec};
+use super::spec::SpringSpec;
+use super::spring::Spring;
 use super::suspension::{Suspension, SuspensionSpec};
 use domecast_optics::numeric::Rigid;
 

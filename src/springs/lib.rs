@@ -11,6 +11,7 @@ mod law;
 mod limits;
 mod load;
 mod magnet;
+mod spec;
 mod spring;
 mod state;
 mod suspension;
@@ -23,9 +24,10 @@ pub use envelope::{
 pub use limits::{Check, Limit, Limits, LoadCase, Stop, StopShape, checks_at, sort_worst_first, try_load};
 pub use load::Wrench;
 pub use magnet::MagnetPair;
-pub use spring::{EndType, SpecError, Spring, SpringSpec};
+pub use spec::{EndType, SpecError, SpringSpec};
+pub use spring::Spring;
 pub use state::{Displacement, Equilibrium, MechanicsError, SpringState};
-pub use suspension::{MOST_SPRINGS, Suspension, SuspensionSpec};
+pub use suspension::{MAX_SPRINGS, Suspension, SuspensionSpec};
 
 #[cfg(test)]
 mod envelope_tests;

@@ -11,7 +11,7 @@
 
 use std::sync::OnceLock;
 
-use super::spring::SpecError;
+use super::spec::SpecError;
 
 /// Permeability of vacuum times 1e6: T^2 / MU_0 comes out in N/mm^2.
 const MU_0: f64 = 1.256_637_062_12;

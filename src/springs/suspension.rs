@@ -5,7 +5,8 @@ use glam::DVec3;
 
 use super::load::Wrench;
 use super::magnet::MagnetPair;
-use super::spring::{SpecError, Spring};
+use super::spec::SpecError;
+use super::spring::Spring;
 use super::state::Displacement;
 
 /// What a suspension is made of; the sensor frame at rest, mm.
@@ -26,7 +27,7 @@ pub struct SuspensionSpec {
 }
 
 /// Spring ends that a layout may have.
-pub const MOST_SPRINGS: usize = 256;
+pub const MAX_SPRINGS: usize = 256;
 
 /// A platform on springs.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,8 +47,8 @@ impl Suspension {
     /// springs cannot bear.
     pub fn new(spec: SuspensionSpec) -> Result<Self, SpecError> {
         let count = spec.upper_ends_mm.len();
-        if count == 0 || count > MOST_SPRINGS {
-            let allowed = format!("1 to {MOST_SPRINGS} springs");
+        if count == 0 || count > MAX_SPRINGS {
+            let allowed = format!("1 to {MAX_SPRINGS} springs");
             return Err(SpecError { field: "upper_ends_mm", value: count as f64, allowed });
         }
         for (field, v) in spec

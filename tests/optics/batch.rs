@@ -1,12 +1,12 @@
 //! Batches: the same bytes as one by one, for any number of threads.
 
 use domecast::camera::LensLimit;
-use domecast::optics::{Limit, SensorOptics, SurfacePoint};
+use domecast::optics::{RayLimit, SensorOptics, SurfacePoint};
 use glam::{DVec2, DVec3};
 
 use super::cases::golden;
 
-fn bytes(hits: &[Result<SurfacePoint, Limit>]) -> Vec<u64> {
+fn bytes(hits: &[Result<SurfacePoint, RayLimit>]) -> Vec<u64> {
     hits.iter()
         .flat_map(|hit| match hit {
             Ok(h) => {
@@ -39,10 +39,10 @@ fn batches_have_the_same_bytes_on_any_number_of_threads() {
         assert!(points.len() > 5000, "{}: {}", case.name, points.len());
         for threads in [1, 2, 3, 7] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let mut hits = vec![Err(Limit::NotFinite); pixels.len()];
+            let mut hits = vec![Err(RayLimit::NotFinite); pixels.len()];
             pool.install(|| optics.trace_all(&pixels, &mut hits)).unwrap();
             assert_eq!(bytes(&hits), bytes(&one_by_one), "{} on {threads} threads", case.name);
-            let mut back = vec![Err(Limit::NotFinite); points.len()];
+            let mut back = vec![Err(RayLimit::NotFinite); points.len()];
             pool.install(|| optics.project_all(&points, &mut back)).unwrap();
             for (pixel, &point) in back.iter().zip(&points) {
                 assert_eq!(*pixel, optics.project(point));
@@ -67,8 +67,8 @@ fn batches_have_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn slices_of_different_length_are_refused() {
     let optics = SensorOptics::new(&golden()[0].spec).unwrap();
-    let mut hits = vec![Err(Limit::NotFinite); 2];
+    let mut hits = vec![Err(RayLimit::NotFinite); 2];
     let error = optics.trace_all(&[DVec2::ZERO], &mut hits).unwrap_err();
     assert_eq!((error.inputs, error.outputs), (1, 2));
-    assert_eq!(hits, vec![Err(Limit::NotFinite); 2]);
+    assert_eq!(hits, vec![Err(RayLimit::NotFinite); 2]);
 }

@@ -4,9 +4,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use domecast::camera::{LensSpec, Model};
+use domecast::camera::{LensModel, LensSpec};
 use domecast::numeric::Rigid;
-use domecast::optics::{Layer, OpticsSpec};
+use domecast::optics::{FlatLayer, OpticsSpec};
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
@@ -25,7 +25,7 @@ pub struct LensFile {
 impl LensFile {
     pub fn spec(&self) -> LensSpec {
         LensSpec {
-            model: Model::parse(&self.model).unwrap(),
+            model: LensModel::parse(&self.model).unwrap(),
             width: self.width,
             height: self.height,
             matrix: self.matrix,
@@ -107,8 +107,11 @@ fn numbers<const N: usize>(text: &[String; N]) -> [f64; N] {
 }
 
 fn read(file: CaseFile) -> Case {
-    let layer =
-        |l: &LayerFile| Layer { name: "layer".to_owned(), index: [l.index; 3], thickness_mm: l.thickness_mm };
+    let layer = |l: &LayerFile| FlatLayer {
+        name: "layer".to_owned(),
+        index: [l.index; 3],
+        thickness_mm: l.thickness_mm,
+    };
     let traced = |t: TraceFile| Traced {
         pixel: DVec2::from_array(t.pixel),
         status: t.status,
@@ -201,7 +204,7 @@ impl Case {
     }
 
     fn decentring(&mut self, f: impl Fn(DVec2) -> DVec2) {
-        if self.spec.lens.model == Model::BrownConrady {
+        if self.spec.lens.model == LensModel::BrownConrady {
             // (p2, p1) is a vector of the image plane.
             let k = &mut self.spec.lens.distortion;
             let q = f(DVec2::new(k[3], k[2]));

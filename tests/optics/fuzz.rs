@@ -5,9 +5,9 @@
 
 use std::f64::consts::PI;
 
-use domecast::camera::{Lens, LensLimit, Model};
+use domecast::camera::{Lens, LensLimit, LensModel};
 use domecast::numeric::SeededRandom;
-use domecast::optics::{Channel, Limit, SensorOptics};
+use domecast::optics::{ColorChannel, RayLimit, SensorOptics};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -115,14 +115,14 @@ impl Run<'_> {
         match self.lens().unproject_solved(pixel) {
             Ok(found) => {
                 self.seen.most.lens = self.seen.most.lens.max(found.iterations);
-                assert_eq!(self.lens().unproject(pixel), Ok(found.value), "seed {seed}");
-                self.ray_is_right(pixel, found.value, "unproject");
+                assert_eq!(self.lens().unproject(pixel), Ok(found.ray), "seed {seed}");
+                self.ray_is_right(pixel, found.ray, "unproject");
             }
             Err(limit) => {
                 assert_eq!(limit, self.lens().end_limit(), "seed {seed}: pixel {pixel}");
                 let tangential = {
                     let spec = self.lens().spec();
-                    spec.model == Model::BrownConrady
+                    spec.model == LensModel::BrownConrady
                         && (spec.distortion[2], spec.distortion[3]) != (0.0, 0.0)
                 };
                 if tangential {
@@ -130,7 +130,7 @@ impl Run<'_> {
                 } else {
                     let [x, y] = self.reference.lens.image_of_pixel(pixel);
                     let rho = (x * x + y * y).sqrt().f64();
-                    let fisheye = self.lens().spec().model == Model::KannalaBrandt;
+                    let fisheye = self.lens().spec().model == LensModel::KannalaBrandt;
                     let rim = self.reference.lens.radius(dd(if fisheye { self.end } else { self.end.tan() }));
                     assert!(rho >= rim.f64() * (1.0 - 4.0 * EPS), "seed {seed}: pixel {pixel} refused");
                 }
@@ -147,9 +147,9 @@ impl Run<'_> {
                 (hit, slope.norm())
             }
             Err(limit) => {
-                assert_ne!(limit, Limit::NotConverged, "seed {seed}: pixel {pixel}");
+                assert_ne!(limit, RayLimit::NotConverged, "seed {seed}: pixel {pixel}");
                 self.seen.limits += 1;
-                if limit == Limit::MissesDome && self.optics.trace(pixel).is_err() {
+                if limit == RayLimit::MissesDome && self.optics.trace(pixel).is_err() {
                     let Ok(ray) = self.lens().unproject(pixel) else {
                         panic!("seed {seed}: {limit}");
                     };
@@ -226,13 +226,13 @@ impl Run<'_> {
                 Err(limit) => panic!("seed {seed}: {limit} for {pixel} at {inside} of the domain"),
             };
             self.seen.most.lens = self.seen.most.lens.max(back.iterations);
-            let error = distance(v3(back.value), unit(v3(ray)));
+            let error = distance(v3(back.ray), unit(v3(ray)));
             let allowed = (pixel_ulps(self.lens(), pixel) + by_lens) * condition(&slope, ray.length());
             assert!(
                 error <= allowed.max(1e-10),
                 "seed {seed}: {pixel} at {inside}: {error:e} rad, {allowed:e} allowed"
             );
-            self.ray_is_right(pixel, back.value, "back");
+            self.ray_is_right(pixel, back.ray, "back");
         }
         self.seen.ok += 1;
     }
@@ -258,7 +258,7 @@ impl Run<'_> {
         let seed = self.seed;
         let found = self.optics.project_with_motion(point);
         let plain = self.optics.project(point);
-        assert_ne!(plain, Err(Limit::NotConverged), "seed {seed}: point {point}");
+        assert_ne!(plain, Err(RayLimit::NotConverged), "seed {seed}: point {point}");
         let theta = match self.reference.chief(v3(point), self.end) {
             Some(ray) => field_angle(ray).f64(),
             // No reference: total reflection, or a pupil that does not settle.
@@ -282,7 +282,7 @@ impl Run<'_> {
         match self.optics.project_solved(point) {
             Ok(solved) => {
                 assert_eq!(solved.pixel, pixel, "seed {seed}");
-                self.seen.most.climb = self.seen.most.climb.max(solved.climb_iterations);
+                self.seen.most.climb = self.seen.most.climb.max(solved.newton_iterations);
                 self.seen.most.pupil = self.seen.most.pupil.max(solved.pupil_iterations);
             }
             Err(limit) => panic!("seed {seed}: {limit} at {point}"),
@@ -321,7 +321,7 @@ fn run(seed: u64, per_lens: u64) -> Seen {
     let mut r = SeededRandom::new(seed);
     let lens = lens_spec(&mut r);
     let spec = optics_spec(&mut r, lens);
-    let channel = Channel::ALL[(r.next_u64() % 3) as usize];
+    let channel = ColorChannel::ALL[(r.next_u64() % 3) as usize];
     let optics = match SensorOptics::new(&spec) {
         Ok(optics) => optics.for_channel(channel),
         Err(error) => panic!("seed {seed}: {error}"),
@@ -359,7 +359,7 @@ fn first_seed(default: u64) -> u64 {
 fn within_the_stated_iterations(most: &Iterations) {
     let stated = [
         (most.lens, Lens::MAX_UNPROJECT_ITERATIONS),
-        (most.climb, SensorOptics::MAX_CLIMB_ITERATIONS),
+        (most.climb, SensorOptics::MAX_NEWTON_ITERATIONS),
         (most.pupil, SensorOptics::MAX_PUPIL_ITERATIONS),
     ];
     for (met, bound) in stated {

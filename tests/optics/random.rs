@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
-use domecast::camera::{LensSpec, Model};
+use domecast::camera::{LensModel, LensSpec};
 use domecast::numeric::{Rigid, SeededRandom};
-use domecast::optics::{Layer, OpticsSpec};
+use domecast::optics::{FlatLayer, OpticsSpec};
 use glam::{DMat3, DVec3};
 
 pub fn lens_spec(r: &mut SeededRandom) -> LensSpec {
     let (model, distortion, widest) = match r.next_u64() % 8 {
-        0 => (Model::Pinhole, vec![], 179.9),
+        0 => (LensModel::Pinhole, vec![], 179.9),
         // Like published ones, then anything.
         1 | 2 => {
             let p = if r.next_u64().is_multiple_of(2) { 0.0 } else { 0.005 };
@@ -20,28 +20,28 @@ pub fn lens_spec(r: &mut SeededRandom) -> LensSpec {
                 p * r.between(-1.0, 1.0),
                 r.between(-0.02, 0.02),
             ];
-            (Model::BrownConrady, k, 179.9)
+            (LensModel::BrownConrady, k, 179.9)
         }
         3 => {
             let size = 10f64.powf(r.between(-2.0, 2.0));
             let mut k: Vec<f64> = (0..5).map(|_| size * r.between(-1.0, 1.0)).collect();
             k[2] *= 0.02;
             k[3] *= 0.02;
-            (Model::BrownConrady, k, 179.9)
+            (LensModel::BrownConrady, k, 179.9)
         }
         4 => {
             let mut k: Vec<f64> = (0..8).map(|_| r.between(-1.0, 1.0)).collect();
             k[2] *= 0.01;
             k[3] *= 0.01;
-            (Model::BrownConrady, k, 179.9)
+            (LensModel::BrownConrady, k, 179.9)
         }
         5 | 6 => {
             let k = (0..4).map(|_| r.between(-0.06, 0.06)).collect();
-            (Model::KannalaBrandt, k, 260.0)
+            (LensModel::KannalaBrandt, k, 260.0)
         }
         _ => {
             let k = (0..4).map(|_| r.between(-0.5, 0.5)).collect();
-            (Model::KannalaBrandt, k, 360.0)
+            (LensModel::KannalaBrandt, k, 360.0)
         }
     };
     let fx = 10f64.powf(r.between(1.7, 3.3));
@@ -72,14 +72,14 @@ pub fn optics_spec(r: &mut SeededRandom, mut lens: LensSpec) -> OpticsSpec {
         };
         last = index;
         let thickness = if r.next_u64().is_multiple_of(5) { 0.0 } else { radius * r.between(0.0, 0.3) };
-        layers.push(Layer {
+        layers.push(FlatLayer {
             name: "sheet".into(),
             index: [index, (index * 1.002).min(2.5), index * 1.005],
             thickness_mm: Some(thickness),
         });
     }
     let fill = if r.next_u64().is_multiple_of(6) { 1.0 } else { r.between(1.0, 2.0) };
-    layers.push(Layer { name: "fill".into(), index: [fill; 3], thickness_mm: None });
+    layers.push(FlatLayer { name: "fill".into(), index: [fill; 3], thickness_mm: None });
     let bottom: f64 = layers.iter().filter_map(|l| l.thickness_mm).sum();
     let gap = match r.next_u64() % 8 {
         0 => 0.0,

@@ -5,7 +5,7 @@
 //! map is one-to-one there); the way from a point to the camera bisects the
 //! rising reach.
 
-use domecast::camera::{LensSpec, Model};
+use domecast::camera::{LensModel, LensSpec};
 use glam::DVec2;
 
 use super::dd::{Dd, dd};
@@ -101,7 +101,7 @@ pub struct Lens<'a> {
 impl<'a> Lens<'a> {
     pub fn new(spec: &'a LensSpec) -> Self {
         let k = |i: usize| spec.distortion.get(i).copied().unwrap_or(0.0);
-        if spec.model == Model::BrownConrady {
+        if spec.model == LensModel::BrownConrady {
             Self {
                 spec,
                 numerator: [1.0, k(0), k(1), k(4)],
@@ -114,7 +114,7 @@ impl<'a> Lens<'a> {
     }
 
     fn is_fisheye(&self) -> bool {
-        self.spec.model == Model::KannalaBrandt
+        self.spec.model == LensModel::KannalaBrandt
     }
 
     /// Image radius of tan(theta), or of theta for a fisheye.

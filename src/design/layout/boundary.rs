@@ -1,4 +1,13 @@
 //! The edge of a pattern: a closed curve around the pattern's centre that every ray from there meets once.
+//!
+//! # Example
+//! ```
+//! use domecast_design::glam::DVec2;
+//! use domecast_design::layout::boundary::Boundary;
+//!
+//! let circle = Boundary::new(|_| 100.0).inset(10.0);
+//! assert!(circle.contains(DVec2::new(0.0, 89.0)) && !circle.contains(DVec2::new(0.0, 91.0)));
+//! ```
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,24 @@
 //! From a measured print to a better map: which mark stands where on the plate, and the fit.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::LayoutSpec;
+//! use domecast_design::layout::calibrate::{Printed, calibrate};
+//! use domecast_design::layout::target::print_target;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! // a print of the test target that landed where the design expects it
+//! let spec = LayoutSpec::of_design(&design)?;
+//! let mut table = "id,x_mm,y_mm\n".to_owned();
+//! for mark in print_target(&spec.transfer()?, &spec.print) {
+//!     table += &format!("{},{},{}\n", mark.id, mark.surface_mm.x, mark.surface_mm.y);
+//! }
+//! let calibration = calibrate(&design, &table, Some(Printed::Target))?;
+//! assert!(calibration.error_after_mm < 1e-6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DVec2, DVec3};
 
@@ -7,9 +27,9 @@ use super::{Layout, LayoutError, LayoutSpec};
 use crate::spec::Design;
 use crate::spec::sections::{MeasuredTransferSection, TransferMapName};
 use crate::transfer::fit;
-use crate::transfer::fit::{Fit, FitError, Sample};
+use crate::transfer::fit::{FitError, Sample, TransferFit};
 use crate::transfer::measured_csv;
-use crate::transfer::measured_csv::{MeasuredTable, TableError};
+use crate::transfer::measured_csv::{MeasuredTable, PrintTableError};
 use crate::transfer::{Nominal, TransferMap};
 
 /// Which artwork was printed and measured.
@@ -27,7 +47,7 @@ pub struct Calibration {
     /// Which artwork the marks belong to.
     pub printed: Printed,
     /// The fit.
-    pub fit: Fit,
+    pub fit: TransferFit,
     /// The table that was read.
     pub table: MeasuredTable,
     /// The nominal map for the design's `print.transfer`.
@@ -45,7 +65,7 @@ pub struct Calibration {
 #[derive(Debug, Clone, PartialEq)]
 pub enum CalibrateError {
     /// The table is at fault.
-    Table(TableError),
+    Table(PrintTableError),
     /// The design's own layout failed.
     Layout(LayoutError),
     /// No map fits.
@@ -74,8 +94,8 @@ impl std::fmt::Display for CalibrateError {
 
 impl std::error::Error for CalibrateError {}
 
-impl From<TableError> for CalibrateError {
-    fn from(error: TableError) -> Self {
+impl From<PrintTableError> for CalibrateError {
+    fn from(error: PrintTableError) -> Self {
         Self::Table(error)
     }
 }
@@ -89,7 +109,7 @@ impl From<LayoutError> for CalibrateError {
 /// Where each mark of an artwork stands: on the plate, and on the dome by the present map.
 struct KnownMarks {
     printed: Printed,
-    /// By id: place on the plate, and the turn into the frame of its hit.
+    /// By id: place on the plate, and the turn into the frame of its print pass.
     places: Vec<Option<(DVec2, glam::DMat3)>>,
 }
 
@@ -125,8 +145,8 @@ pub fn calibrate(
         .rows
         .iter()
         .filter_map(|row| {
-            let (plate_mm, hit_from_sensor) = (*marks.places.get(row.id as usize)?)?;
-            Some(Sample { plate_mm, landed: hit_from_sensor * row.landed, mark: row.id, print: row.print })
+            let (plate_mm, pass_from_sensor) = (*marks.places.get(row.id as usize)?)?;
+            Some(Sample { plate_mm, landed: pass_from_sensor * row.landed, mark: row.id, print: row.print })
         })
         .collect();
     let radius_mm = transfer.dome_radius_mm();
@@ -190,7 +210,7 @@ fn target_marks(spec: &LayoutSpec, transfer: &TransferMap) -> KnownMarks {
 }
 
 fn dot_marks(layout: &Layout) -> KnownMarks {
-    let place = |dot: &super::Dot| Some((dot.plate_mm, layout.hits[dot.hit].hit_from_sensor));
+    let place = |dot: &super::Dot| Some((dot.plate_mm, layout.passes[dot.pass].pass_from_sensor));
     KnownMarks { printed: Printed::Dots, places: layout.dots.iter().map(place).collect() }
 }
 
@@ -199,7 +219,7 @@ fn choose<'a>(
     known: &'a [KnownMarks],
     table: &MeasuredTable,
     transfer: &TransferMap,
-) -> Result<&'a KnownMarks, TableError> {
+) -> Result<&'a KnownMarks, PrintTableError> {
     let mut best: Option<(f64, &KnownMarks)> = None;
     let mut unknown = None;
     for marks in known {
@@ -207,8 +227,8 @@ fn choose<'a>(
         let mut missing = None;
         for row in &table.rows {
             match marks.places.get(row.id as usize).copied().flatten() {
-                Some((plate_mm, hit_from_sensor)) => {
-                    let landed: DVec3 = hit_from_sensor * row.landed * transfer.dome_radius_mm();
+                Some((plate_mm, pass_from_sensor)) => {
+                    let landed: DVec3 = pass_from_sensor * row.landed * transfer.dome_radius_mm();
                     // By the orthographic map, which has an answer for every point: only the size matters.
                     misses.push(landed.truncate().distance(plate_mm));
                 }
@@ -228,7 +248,7 @@ fn choose<'a>(
     best.map(|(_, marks)| marks).ok_or_else(|| {
         let (line, id, last) =
             unknown.map_or((1, 0, 0), |(row, marks)| (row.line, row.id, marks.places.len()));
-        TableError {
+        PrintTableError {
             line,
             column: "id".into(),
             value: id.to_string(),

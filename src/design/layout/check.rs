@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::dot::{Dot, DotProjector, plate_outline};
 use super::lost::{LostDot, Reason, Zone};
 use super::outline::Outline;
-use super::passes::Hit;
+use super::passes::PrintPass;
 use super::spec::LayoutSpec;
 use super::zones::{self, ImageZone};
 
@@ -13,7 +13,7 @@ use super::zones::{self, ImageZone};
 pub(super) fn check_dot(
     spec: &LayoutSpec,
     projector: &DotProjector<'_>,
-    hits: &[Hit],
+    passes: &[PrintPass],
     zones: &[ImageZone],
     even_px: DVec2,
 ) -> Result<Dot, LostDot> {
@@ -26,7 +26,7 @@ pub(super) fn check_dot(
     let diameter_mm = projector.dome_diameter_mm(&curve).map_err(lose)?;
     check_seen(spec, &image_outline).map_err(lose)?;
     zones::check(zones, &image_outline).map_err(lose)?;
-    let (hit, wrap_rad) = nearest_hit(hits, surface.normal);
+    let (pass, wrap_rad) = nearest_pass(passes, surface.normal);
     let own_rad = (0.5 * diameter_mm / spec.optics.dome_radius_mm()).min(1.0).asin();
     let reach_rad = wrap_rad + own_rad;
     let limit_rad = spec.print.wrap_limit_deg.to_radians();
@@ -41,13 +41,13 @@ pub(super) fn check_dot(
     if reach_rad > limit_rad {
         return Err(lose(Reason::BeyondWrap { wrap_rad: reach_rad, limit_rad }));
     }
-    let hit_from_sensor = hits[hit].hit_from_sensor;
+    let pass_from_sensor = passes[pass].pass_from_sensor;
     let plate_mm = projector
         .transfer
-        .plate_from_dome(hit_from_sensor * surface.surface_mm)
+        .plate_from_dome(pass_from_sensor * surface.surface_mm)
         .map_err(|limit| lose(Reason::BeyondTransfer(limit)))?;
     let plate_outline =
-        plate_outline(&curve, projector.transfer, hit_from_sensor, projector.outline_tolerance_mm)
+        plate_outline(&curve, projector.transfer, pass_from_sensor, projector.outline_tolerance_mm)
             .map_err(lose)?;
     let (width_mm, _) = plate_outline.widths();
     if width_mm < spec.print.min_dot_mm {
@@ -60,7 +60,7 @@ pub(super) fn check_dot(
         surface_mm: surface.surface_mm,
         normal: surface.normal,
         field_angle_rad: surface.field_angle_rad,
-        hit,
+        pass,
         wrap_rad,
         plate_mm,
         diameter_mm,
@@ -70,10 +70,10 @@ pub(super) fn check_dot(
     })
 }
 
-fn nearest_hit(hits: &[Hit], normal: DVec3) -> (usize, f64) {
+fn nearest_pass(passes: &[PrintPass], normal: DVec3) -> (usize, f64) {
     let mut best = (0, f64::INFINITY);
-    for (index, hit) in hits.iter().enumerate() {
-        let local = hit.hit_from_sensor * normal;
+    for (index, pass) in passes.iter().enumerate() {
+        let local = pass.pass_from_sensor * normal;
         let wrap_rad = local.truncate().length().atan2(local.z);
         if wrap_rad < best.1 {
             best = (index, wrap_rad);

@@ -1,4 +1,18 @@
-//! How much of the dome the camera covers, at rest and under load, and which dots it loses on the way.
+//! Which part of the dome the camera sees, at rest and under load, and which dots a load hides.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::coverage::coverage;
+//! use domecast_design::layout::{Layout, LayoutSpec};
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let spec = LayoutSpec::of_design(&Design::load(THUMB24.as_ref())?)?;
+//! let layout = Layout::new(&spec)?;
+//! let at_rest = coverage(&spec, &layout, &spec.optics, None);
+//! assert!(at_rest.in_sight > 0.9 && at_rest.unseen_dots.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -30,7 +44,7 @@ const NEAR: f64 = 6.0;
 
 /// How much of the dome is seen at one pose.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Coverage {
+pub struct DomeCoverage {
     /// Share of the dome's area that the lens sees through the layers, in the image or beyond its edges.
     pub seen_by_lens: f64,
     /// Share inside the image.
@@ -65,7 +79,7 @@ pub fn coverage(
     layout: &Layout,
     optics: &SensorOptics,
     window: Option<&Window>,
-) -> Coverage {
+) -> DomeCoverage {
     let visibility = Visibility { spec, optics, markers: marker_zones(optics, &spec.white_markers), window };
     let radius_mm = optics.dome_radius_mm();
     let (mut lens, mut raster, mut mask, mut free, mut whole) = (0u32, 0u32, 0u32, 0u32, true);
@@ -92,7 +106,7 @@ pub fn coverage(
     }
     let all = f64::from(RINGS * AROUND);
     let (window_gap_mm, unseen_dots) = visibility.dots(layout);
-    Coverage {
+    DomeCoverage {
         seen_by_lens: f64::from(lens) / all,
         on_raster: f64::from(raster) / all,
         in_mask: f64::from(mask) / all,
@@ -191,7 +205,7 @@ impl Visibility<'_> {
             let (point, _) = curve.on_dome(TAU * f64::from(k) / f64::from(EDGE_POINTS))?;
             let seen = self.point(point)?;
             window_mm = window_mm.min(seen.window_mm);
-            // A hair inside, so that a dot that just clears a marker in the layout does so here.
+            // Slightly inside, so that a dot that just clears a marker in the layout does so here.
             corners.push(middle.pixel.lerp(seen.pixel, 0.995));
         }
         check_corners(&self.markers, &corners)?;

@@ -1,4 +1,15 @@
 //! One dot: where it is in the image, on the dome and on the plate, and its outlines.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let layout = Design::load(THUMB24.as_ref())?.layout()?;
+//! let dot = &layout.dots[0];
+//! assert!((dot.plate_outline.centroid() - dot.plate_mm).length() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,7 +20,7 @@ use super::frame::EvenFrame;
 use super::lost::Reason;
 use super::outline::{CurvePoint, Outline};
 use crate::transfer::TransferMap;
-use domecast_optics::{Limit, SensorOptics};
+use domecast_optics::{RayLimit, SensorOptics};
 
 /// A dot that is laid out.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,17 +37,17 @@ pub struct Dot {
     pub normal: DVec3,
     /// Angle of its ray in air to the camera's axis, rad.
     pub field_angle_rad: f64,
-    /// Index of the pad's hit that prints it.
-    pub hit: usize,
-    /// Angle between the normal and the stroke of its hit, rad.
+    /// Index of the print pass that prints it.
+    pub pass: usize,
+    /// Angle between the normal and the stroke of its print pass, rad.
     pub wrap_rad: f64,
-    /// Its centre on the plate of its hit, mm.
+    /// Its centre on the plate of its print pass, mm.
     pub plate_mm: DVec2,
     /// Diameter of the flat disc with the area that its outline on the dome encloses, mm.
     pub diameter_mm: f64,
     /// Its outline in the raw image, px.
     pub image_outline: Outline,
-    /// Its outline on the plate of its hit, mm.
+    /// Its outline on the plate of its print pass, mm.
     pub plate_outline: Outline,
     /// The dots next to it in the image, by id, ascending.
     pub neighbors: Vec<u32>,
@@ -128,7 +139,7 @@ impl DotCurve<'_> {
             }
             Self::OnDome { optics, .. } => {
                 let (point, slope) = self.on_dome(angle)?;
-                let optics = optics.ok_or(Reason::Unseen(Limit::Unreachable))?;
+                let optics = optics.ok_or(Reason::Unseen(RayLimit::Unreachable))?;
                 let (at, by_point) = optics.project_with_jacobian(point).map_err(Reason::Unseen)?;
                 let slope = by_point * Vector3::from(slope.to_array());
                 Ok(CurvePoint { at, slope: DVec2::new(slope.x, slope.y) })
@@ -138,7 +149,7 @@ impl DotCurve<'_> {
 }
 
 impl DotProjector<'_> {
-    /// A dot's outline on the plate of a hit, as `hit_from_sensor` turns the dome under the pad, drawn as closely as
+    /// A dot's outline on the plate of a print pass, as `pass_from_sensor` turns the dome under the pad, drawn as closely as
     /// `tolerance_mm` asks.
     ///
     /// # Errors
@@ -146,10 +157,10 @@ impl DotProjector<'_> {
     pub fn plate_outline(
         &self,
         dot: &Dot,
-        hit_from_sensor: DMat3,
+        pass_from_sensor: DMat3,
         tolerance_mm: f64,
     ) -> Result<Outline, Reason> {
-        plate_outline(&self.curve(dot.even_px, dot.surface_mm), self.transfer, hit_from_sensor, tolerance_mm)
+        plate_outline(&self.curve(dot.even_px, dot.surface_mm), self.transfer, pass_from_sensor, tolerance_mm)
     }
 
     /// The exact curve that the outline follows, at an angle; mm and mm per rad.
@@ -159,10 +170,10 @@ impl DotProjector<'_> {
     pub fn plate_point(
         &self,
         dot: &Dot,
-        hit_from_sensor: DMat3,
+        pass_from_sensor: DMat3,
         angle_rad: f64,
     ) -> Result<CurvePoint, Reason> {
-        plate_point(&self.curve(dot.even_px, dot.surface_mm), self.transfer, hit_from_sensor, angle_rad)
+        plate_point(&self.curve(dot.even_px, dot.surface_mm), self.transfer, pass_from_sensor, angle_rad)
     }
 
     pub(super) fn curve(&self, even_px: DVec2, surface_mm: DVec3) -> DotCurve<'_> {
@@ -202,28 +213,28 @@ impl DotProjector<'_> {
     }
 }
 
-/// A curve's outline on the plate of a hit, as `hit_from_sensor` turns the dome under the pad.
+/// A curve's outline on the plate of a print pass, as `pass_from_sensor` turns the dome under the pad.
 pub(super) fn plate_outline(
     curve: &DotCurve<'_>,
     transfer: &TransferMap,
-    hit_from_sensor: DMat3,
+    pass_from_sensor: DMat3,
     tolerance_mm: f64,
 ) -> Result<Outline, Reason> {
     let (outline, fit) =
-        Outline::of_curve(|angle| plate_point(curve, transfer, hit_from_sensor, angle), tolerance_mm)?;
+        Outline::of_curve(|angle| plate_point(curve, transfer, pass_from_sensor, angle), tolerance_mm)?;
     if fit.reached { Ok(outline) } else { Err(Reason::NotSmooth { error_mm: fit.error }) }
 }
 
 fn plate_point(
     curve: &DotCurve<'_>,
     transfer: &TransferMap,
-    hit_from_sensor: DMat3,
+    pass_from_sensor: DMat3,
     angle_rad: f64,
 ) -> Result<CurvePoint, Reason> {
     let (point, slope) = curve.on_dome(angle_rad)?;
     let plate =
-        transfer.plate_from_dome_with_slope(hit_from_sensor * point).map_err(Reason::BeyondTransfer)?;
-    let slope = hit_from_sensor * slope;
+        transfer.plate_from_dome_with_slope(pass_from_sensor * point).map_err(Reason::BeyondTransfer)?;
+    let slope = pass_from_sensor * slope;
     let [x, y] = plate.plate_from_dome;
     Ok(CurvePoint { at: plate.plate_mm, slope: DVec2::new(x.dot(slope), y.dot(slope)) })
 }

@@ -11,7 +11,7 @@ use super::frame::EvenFrame;
 use super::region;
 use super::spec::LayoutSpec;
 use crate::spec::sections::{OnLost, PatternCentre, PatternKind};
-use domecast_optics::Limit;
+use domecast_optics::RayLimit;
 
 /// The pattern's middle in the even frame, px.
 pub(super) fn center(spec: &LayoutSpec, frame: &EvenFrame<'_>) -> Result<DVec2, LayoutError> {
@@ -20,7 +20,7 @@ pub(super) fn center(spec: &LayoutSpec, frame: &EvenFrame<'_>) -> Result<DVec2, 
         PatternCentre::Pole => spec.optics.project(DVec3::new(0.0, 0.0, radius_mm)),
         PatternCentre::PrincipalPoint => Ok(spec.optics.lens().project(DVec3::Z).unwrap_or_default()),
     };
-    let lost = |limit: Limit| {
+    let lost = |limit: RayLimit| {
         LayoutError::new(
             "pattern.centre",
             "the dome's pole",
@@ -102,10 +102,10 @@ pub(super) fn edge(
 /// How far a dot of equal size on the dome reaches in the even frame, px; zero where it is not seen, since
 /// then it is lost for that reason.
 fn apparent_radius_px(projector: &DotProjector<'_>, even_px: DVec2) -> f64 {
-    let reach = || -> Result<f64, Limit> {
+    let reach = || -> Result<f64, RayLimit> {
         let point = projector.optics.trace(projector.frame.raw_from_even(even_px)?)?;
         let curve = projector.curve(even_px, point.surface_mm);
-        let outline = projector.image_outline(&curve).map_err(|_| Limit::Unreachable)?;
+        let outline = projector.image_outline(&curve).map_err(|_| RayLimit::Unreachable)?;
         let mut furthest: f64 = 0.0;
         for corner in outline.polygon(4) {
             furthest = furthest.max(projector.frame.even_from_raw(corner)?.distance(even_px));

@@ -1,5 +1,17 @@
-//! How even a pattern is: in the image, on the dome, on the plate; and what would be seen of it if the layout had been
-//! made by the pinhole alone.
+//! How even a pattern is: in the image, on the dome and on the plate; and the image of the same pattern if it is laid
+//! out without refraction.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::evenness::by_design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let layout = Design::load(THUMB24.as_ref())?.layout()?;
+//! let evenness = by_design(&layout).ok_or("no dot has a neighbour")?;
+//! assert!(evenness.image_px.nearest.variation < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DVec2, DVec3};
 use serde::Serialize;
@@ -41,7 +53,7 @@ pub struct EvennessReport {
     pub image_px: Evenness,
     /// Along the dome, mm.
     pub dome_mm: Evenness,
-    /// On the plate, between dots of one hit, mm.
+    /// On the plate, between dots of one print pass, mm.
     pub plate_mm: Option<Evenness>,
 }
 
@@ -58,7 +70,7 @@ pub struct PinholeComparison {
     pub mean_shift_mm: f64,
     /// The largest of them, mm.
     pub max_shift_mm: f64,
-    /// Dots that would not be seen, or not hit the dome.
+    /// Dots that would not be seen, or whose ray misses the dome.
     pub lost: usize,
 }
 
@@ -134,12 +146,12 @@ pub fn by_design(layout: &Layout) -> Option<EvennessReport> {
         even_frame_px: evenness(layout, &even, in_plane, any)?,
         image_px: evenness(layout, &image, in_plane, any)?,
         dome_mm: evenness(layout, &dome, arc, any)?,
-        plate_mm: evenness(layout, &plate, in_plane, |i, j| dots[i].hit == dots[j].hit),
+        plate_mm: evenness(layout, &plate, in_plane, |i, j| dots[i].pass == dots[j].pass),
     })
 }
 
-/// The same pattern laid out by the pinhole alone: the rays of the pattern's pixels, by the same lens, go
-/// straight to the dome as if every index were 1. What the real stack shows of dots placed there.
+/// The same pattern laid out without refraction: the rays of the pattern's pixels, by the same lens, go straight to
+/// the dome, every index 1. The image of the dots placed there, through the real layers.
 pub fn by_pinhole(spec: &LayoutSpec, layout: &Layout) -> Option<PinholeComparison> {
     let mut clear = spec.optics.spec();
     for layer in &mut clear.layers {
@@ -147,7 +159,7 @@ pub fn by_pinhole(spec: &LayoutSpec, layout: &Layout) -> Option<PinholeCompariso
     }
     let clear = SensorOptics::new(&clear).ok()?;
     let placed: Vec<Option<DVec3>> =
-        layout.dots.iter().map(|dot| clear.trace(dot.image_px).ok().map(|hit| hit.surface_mm)).collect();
+        layout.dots.iter().map(|dot| clear.trace(dot.image_px).ok().map(|point| point.surface_mm)).collect();
     let seen: Vec<Option<DVec2>> =
         placed.iter().map(|point| point.and_then(|point| spec.optics.project(point).ok())).collect();
     let image_px = evenness(layout, &seen, in_plane, |_, _| true)?;

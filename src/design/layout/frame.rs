@@ -1,4 +1,20 @@
 //! The frame in which a pattern is even: the raw image or the runtime's undistorted one.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::glam::DVec3;
+//! use domecast_design::layout::frame::UndistortedFrame;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! let matrix = design.undistorted_matrix();
+//! let frame = UndistortedFrame::new(&matrix).ok_or("the matrix has no inverse")?;
+//! // the camera's axis appears at the principal point
+//! let place = frame.from_ray(DVec3::Z)?;
+//! assert!((place.x - matrix[0][2]).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::Vector3;
@@ -8,12 +24,12 @@ use domecast_optics::camera::{Lens, LensLimit};
 
 /// The undistorted frame: what a pinhole camera with this matrix would show.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Undistorted {
+pub struct UndistortedFrame {
     matrix: DMat3,
     inverse: DMat3,
 }
 
-impl Undistorted {
+impl UndistortedFrame {
     /// The frame of a camera matrix (rows); `None` if the matrix cannot be inverted.
     pub fn new(matrix: &[[f64; 3]; 3]) -> Option<Self> {
         let matrix = DMat3::from_cols_array_2d(matrix).transpose();
@@ -51,15 +67,15 @@ impl Undistorted {
 #[derive(Debug, Clone, Copy)]
 pub struct EvenFrame<'a> {
     lens: &'a Lens,
-    undistorted: Option<Undistorted>,
+    undistorted: Option<UndistortedFrame>,
 }
 
 impl<'a> EvenFrame<'a> {
     /// The frame that a pattern names.
-    pub fn new(lens: &'a Lens, even_in: EvenIn, undistorted: Undistorted) -> Self {
+    pub fn new(lens: &'a Lens, even_in: EvenIn, undistorted: UndistortedFrame) -> Self {
         let undistorted = match even_in {
             EvenIn::Raw => None,
-            EvenIn::Undistorted => Some(undistorted),
+            EvenIn::UndistortedFrame => Some(undistorted),
         };
         Self { lens, undistorted }
     }

@@ -11,7 +11,7 @@ use super::zones::gap;
 /// Chord error of the polygons between which gaps are measured, as a share of the least gap.
 const POLYGON_SHARE: f64 = 0.01;
 
-/// Of two dots of one hit that are closer on the plate than the pad keeps apart, the later in the list goes.
+/// Drops the later of two dots of one print pass whose gap on the plate is too small.
 ///
 /// Dots are sorted into square cells as wide as the widest reach, so that only neighbouring cells are looked
 /// at and the time grows with the number of dots. The map is only asked, never walked through: its order
@@ -33,7 +33,7 @@ pub(super) fn keep_apart(dots: Vec<Result<Dot, LostDot>>, min_mm: f64) -> Vec<Re
             let near = (-1..=1).flat_map(|di| (-1..=1).map(move |dj| (di, dj)));
             let mut polygon = Vec::new();
             for (di, dj) in near {
-                for other in cells.get(&(dot.hit, i + di, j + dj)).into_iter().flatten() {
+                for other in cells.get(&(dot.pass, i + di, j + dj)).into_iter().flatten() {
                     if center.distance(other.center) - reach - other.reach >= min_mm {
                         continue;
                     }
@@ -50,7 +50,7 @@ pub(super) fn keep_apart(dots: Vec<Result<Dot, LostDot>>, min_mm: f64) -> Vec<Re
                 }
             }
             let kept = Kept { center, reach, outline: dot.plate_outline.clone() };
-            cells.entry((dot.hit, i, j)).or_default().push(kept);
+            cells.entry((dot.pass, i, j)).or_default().push(kept);
             Ok(dot)
         })
         .collect()

@@ -1,11 +1,23 @@
 //! Why a dot of the pattern is not laid out.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let layout = Design::load(THUMB24.as_ref())?.layout()?;
+//! for lost in &layout.lost {
+//!     println!("dot {}: {}", lost.id, lost.reason);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::fmt;
 
 use glam::DVec2;
 
 use crate::transfer::TransferLimit;
-use domecast_optics::Limit;
+use domecast_optics::RayLimit;
 
 /// A dot of the pattern that is left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +36,7 @@ pub struct LostDot {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reason {
     /// Lens, layers or dome give no ray for it.
-    Unseen(Limit),
+    Unseen(RayLimit),
     /// Part of it would lie outside the image.
     OutsideImage,
     /// Part of it would lie outside the runtime's mask.
@@ -52,7 +64,7 @@ pub enum Reason {
         /// What can be printed, mm.
         min_mm: f64,
     },
-    /// Further around the dome than the pad can wrap, from every hit.
+    /// Further around the dome than the pad can wrap, from every print pass.
     BeyondWrap {
         /// Largest angle between its normals and the stroke, rad.
         wrap_rad: f64,

@@ -1,5 +1,14 @@
-//! Who is next to whom: Delaunay's triangulation of the dots in the image, less the edges that only close the
-//! hull.
+//! Neighbours of dots: the Delaunay triangulation in the image, without the edges that only close the hull.
+//!
+//! # Example
+//! ```
+//! use domecast_design::glam::DVec2;
+//! use domecast_design::layout::neighbors::neighbors;
+//!
+//! // a square without its diagonals
+//! let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(DVec2::from);
+//! assert_eq!(neighbors(&corners, 1.2)[0], [1, 3]);
+//! ```
 
 use glam::DVec2;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};

@@ -1,4 +1,18 @@
 //! Closed outlines made of cubic Bezier curves.
+//!
+//! # Example
+//! ```
+//! use domecast_design::glam::DVec2;
+//! use domecast_design::layout::outline::{CurvePoint, Outline};
+//!
+//! let circle = |angle| {
+//!     let at = DVec2::from_angle(angle);
+//!     Ok::<_, ()>(CurvePoint { at, slope: at.perp() })
+//! };
+//! let (outline, fit) = Outline::of_curve(circle, 1e-3).map_err(|()| "no curve")?;
+//! assert!(fit.reached && (outline.equivalent_diameter() - 2.0).abs() < 1e-3);
+//! # Ok::<(), &str>(())
+//! ```
 
 use std::f64::consts::TAU;
 

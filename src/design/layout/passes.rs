@@ -1,27 +1,27 @@
-//! The pad's hits: one from straight above, or the fewest tilted ones that reach every dot.
+//! Print passes: one from straight above, or the fewest tilted ones that reach every dot.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DMat3;
 
-/// One hit of the pad.
+/// One print pass: a stroke of the pad from one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hit {
+pub struct PrintPass {
     /// Angle between the dome's axis and the stroke, rad.
     pub tilt_rad: f64,
     /// Azimuth towards which the stroke's contact moves from the pole, rad from +x.
     pub azimuth_rad: f64,
-    /// Turns a direction of the sensor frame into the hit's frame, whose +z is the stroke reversed. Zero tilt
-    /// is the identity; else the meridian towards the hit stays where it is.
-    pub hit_from_sensor: DMat3,
+    /// Turns a direction of the sensor frame into the pass's frame, whose +z is the stroke reversed. Zero tilt
+    /// is the identity; else the meridian towards the pass stays where it is.
+    pub pass_from_sensor: DMat3,
 }
 
-impl Hit {
-    /// The hit whose pad comes down along the normal at this polar angle and azimuth.
+impl PrintPass {
+    /// The pass whose pad comes down along the normal at this polar angle and azimuth.
     pub fn new(tilt_rad: f64, azimuth_rad: f64) -> Self {
         let turn = DMat3::from_rotation_z(azimuth_rad);
-        let hit_from_sensor = turn * DMat3::from_rotation_y(-tilt_rad) * turn.transpose();
-        Self { tilt_rad, azimuth_rad, hit_from_sensor }
+        let pass_from_sensor = turn * DMat3::from_rotation_y(-tilt_rad) * turn.transpose();
+        Self { tilt_rad, azimuth_rad, pass_from_sensor }
     }
 }
 
@@ -31,7 +31,7 @@ const MAX_SECTORS: u32 = 12;
 /// Halvings in the search for the tilt.
 const HALVINGS: u32 = 60;
 
-/// The hits for dots whose centres lie up to `polar_rad` from the pole, where each hit reaches centres up to
+/// The passes for dots whose centres lie up to `polar_rad` from the pole, where each pass reaches centres up to
 /// `reach_rad` from its stroke: a centre, and sectors around it, as few as cover everything.
 ///
 /// The sectors stand at equal azimuths, the first at +x. Halfway between two of them, a sector must meet the
@@ -39,8 +39,8 @@ const HALVINGS: u32 = 60;
 /// the ends, so that two distances decide. The tilt is the one that makes them equal. Where no number of
 /// sectors within `max_tilt_rad` covers everything, the most sectors at the steepest tilt are given: the
 /// layout then names the dots that are left.
-pub(super) fn split(polar_rad: f64, reach_rad: f64, max_tilt_rad: f64) -> Vec<Hit> {
-    let centre = Hit::new(0.0, 0.0);
+pub(super) fn split(polar_rad: f64, reach_rad: f64, max_tilt_rad: f64) -> Vec<PrintPass> {
+    let centre = PrintPass::new(0.0, 0.0);
     if polar_rad <= reach_rad || reach_rad <= 0.0 {
         return vec![centre];
     }
@@ -49,7 +49,7 @@ pub(super) fn split(polar_rad: f64, reach_rad: f64, max_tilt_rad: f64) -> Vec<Hi
         .map(|count| (count, best_tilt_rad(polar_rad, reach_rad, count).min(steepest)))
         .find(|(count, tilt)| furthest_rad(*tilt, polar_rad, reach_rad, *count) <= reach_rad)
         .unwrap_or((MAX_SECTORS, best_tilt_rad(polar_rad, reach_rad, MAX_SECTORS).min(steepest)));
-    let sectors = (0..count).map(|k| Hit::new(tilt_rad, TAU * f64::from(k) / f64::from(count)));
+    let sectors = (0..count).map(|k| PrintPass::new(tilt_rad, TAU * f64::from(k) / f64::from(count)));
     std::iter::once(centre).chain(sectors).collect()
 }
 

@@ -1,6 +1,24 @@
 //! A pattern in the image, before anything is known of lens and dome.
 //!
 //! Points are offsets from the pattern's centre, px of the frame in which the pattern is even.
+//!
+//! # Example
+//! ```
+//! use domecast_design::layout::boundary::Boundary;
+//! use domecast_design::layout::pattern::Pattern;
+//! use domecast_design::sections::{CentredOn, PatternKind};
+//!
+//! let pattern = Pattern {
+//!     kind: PatternKind::Hexagonal,
+//!     pitch_px: 10.0,
+//!     centred_on: CentredOn::Dot,
+//!     rotation_rad: 0.0,
+//!     wanted: None,
+//! };
+//! let places = pattern.places(&Boundary::new(|_| 11.0)).map_err(|_| "no dot fits")?;
+//! assert_eq!(places.len(), 7);
+//! # Ok::<(), &str>(())
+//! ```
 
 use std::f64::consts::PI;
 

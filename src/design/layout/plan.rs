@@ -11,12 +11,12 @@ use super::error::LayoutError;
 use super::frame::EvenFrame;
 use super::lost::{LostDot, Rule};
 use super::neighbors::neighbors;
-use super::passes::{self, Hit};
+use super::passes::{self, PrintPass};
 use super::pattern::{Pattern, PatternError};
 use super::spec::LayoutSpec;
 use super::{gaps, zones};
 use crate::spec::Design;
-use crate::spec::sections::{Hits, OnLost, PatternKind};
+use crate::spec::sections::{OnLost, PatternKind, PrintPasses};
 use crate::transfer::TransferMap;
 
 /// Delaunay edges up to this multiple of the nearest distance count as neighbours: below the diagonal of a
@@ -32,8 +32,8 @@ pub struct Layout {
     pub dots: Vec<Dot>,
     /// The dots of the pattern that are left out, with their reasons.
     pub lost: Vec<LostDot>,
-    /// The pad's hits.
-    pub hits: Vec<Hit>,
+    /// The print passes.
+    pub passes: Vec<PrintPass>,
     /// Distance of neighbours in the even frame, px; solved if the design gives a number of dots.
     pub pitch_px: f64,
     /// Size of the dots.
@@ -42,7 +42,7 @@ pub struct Layout {
     pub center_px: DVec2,
     /// Edge of the pattern in the even frame, around its centre.
     pub edge: Boundary,
-    /// The pad's map, the same for each hit.
+    /// The pad's map, the same for each print pass.
     pub transfer: TransferMap,
     /// What a person should know, in words.
     pub warnings: Vec<String>,
@@ -102,11 +102,11 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
             format!("below the pitch, {pitch_px} px"),
         ));
     }
-    let hits = plan_hits(spec, &projector, center_px, &places);
+    let passes = plan_passes(spec, &projector, center_px, &places);
     let zones = zones::image_zones(spec);
     let checked: Vec<Result<Dot, LostDot>> = places
         .par_iter()
-        .map(|place| check_dot(spec, &projector, &hits, &zones, center_px + *place))
+        .map(|place| check_dot(spec, &projector, &passes, &zones, center_px + *place))
         .collect();
     let checked = gaps::keep_apart(checked, spec.print.min_gap_mm);
     let mut dots = Vec::with_capacity(checked.len());
@@ -144,18 +144,18 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
             dots.len() + lost.len()
         ));
     }
-    Ok(Layout { dots, lost, hits, pitch_px, size, center_px, edge, transfer, warnings })
+    Ok(Layout { dots, lost, passes, pitch_px, size, center_px, edge, transfer, warnings })
 }
 
-/// The hits that the dots of the pattern need, those left aside that the lens does not see.
-fn plan_hits(
+/// The print passes that the dots of the pattern need, those that the lens does not see left out.
+fn plan_passes(
     spec: &LayoutSpec,
     projector: &DotProjector<'_>,
     center_px: DVec2,
     places: &[DVec2],
-) -> Vec<Hit> {
-    if spec.print.hits == Hits::Single {
-        return vec![Hit::new(0.0, 0.0)];
+) -> Vec<PrintPass> {
+    if spec.print.hits == PrintPasses::Single {
+        return vec![PrintPass::new(0.0, 0.0)];
     }
     let radius_mm = spec.optics.dome_radius_mm();
     let polar_and_own = |place: &DVec2| -> Option<(f64, f64)> {

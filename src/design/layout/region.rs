@@ -1,4 +1,17 @@
 //! Where in the image a pattern ends.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::region::dome_point;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! let point = dome_point(design.optics().dome_radius_mm(), 0.5, 1.0);
+//! let pixel = design.optics().project(point)?;
+//! assert!((design.optics().trace(pixel)?.surface_mm - point).length() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::f64::consts::TAU;
 
@@ -6,7 +19,7 @@ use glam::{DVec2, DVec3};
 
 use super::boundary::Boundary;
 use super::frame::EvenFrame;
-use domecast_optics::{Limit, SensorOptics};
+use domecast_optics::{RayLimit, SensorOptics};
 
 /// Points of a circle of the dome that are projected into the image.
 const AROUND: u32 = 720;
@@ -21,7 +34,7 @@ pub struct DomeEdge {
     pub boundary: Boundary,
     /// Where the lens sees less than the parallel: the smallest polar angle that it reaches (rad), and what
     /// stops it there.
-    pub cut: Option<(f64, Limit)>,
+    pub cut: Option<(f64, RayLimit)>,
 }
 
 /// The point of the dome at a polar angle and an azimuth, mm.
@@ -41,14 +54,14 @@ pub fn parallel(
     frame: &EvenFrame<'_>,
     center_px: DVec2,
     polar_rad: f64,
-) -> Result<DomeEdge, Limit> {
+) -> Result<DomeEdge, RayLimit> {
     let radius_mm = optics.dome_radius_mm();
-    let place = |polar: f64, azimuth: f64| -> Result<DVec2, Limit> {
+    let place = |polar: f64, azimuth: f64| -> Result<DVec2, RayLimit> {
         let pixel = optics.project(dome_point(radius_mm, polar, azimuth))?;
         Ok(frame.even_from_raw(pixel)? - center_px)
     };
     place(0.0, 0.0)?;
-    let mut cut: Option<(f64, Limit)> = None;
+    let mut cut: Option<(f64, RayLimit)> = None;
     let mut offsets = Vec::with_capacity(AROUND as usize);
     for k in 0..AROUND {
         let azimuth = TAU * f64::from(k) / f64::from(AROUND);
@@ -68,7 +81,7 @@ pub fn parallel(
         };
         offsets.push(offset);
     }
-    let boundary = around(&offsets).ok_or(Limit::Unreachable)?;
+    let boundary = around(&offsets).ok_or(RayLimit::Unreachable)?;
     Ok(DomeEdge { boundary, cut })
 }
 

@@ -1,8 +1,24 @@
-//! What a layout came to, for people who judge it and programs that draw it.
+//! The report of a layout: what is written to `artwork/layout.json`.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::report::LayoutReport;
+//! use domecast_design::layout::{Layout, LayoutSpec};
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! let spec = LayoutSpec::of_design(&design)?;
+//! let report = LayoutReport::new(&design, &spec, &Layout::new(&spec)?);
+//! for line in report.headlines() {
+//!     println!("{line}");
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use serde::Serialize;
 
-use super::coverage::{Coverage, coverage};
+use super::coverage::{DomeCoverage, coverage};
 use super::evenness::{self, EvennessReport, PinholeComparison};
 use super::tolerances::{self, ToleranceReport};
 use super::window::Window;
@@ -24,11 +40,12 @@ pub struct LayoutReport {
     pub dot_diameter_mm: [f64; 2],
     /// Dots of the pattern that are left out.
     pub lost: Vec<LostRecord>,
-    /// The pad's hits.
-    pub hits: Vec<HitRecord>,
+    /// The print passes.
+    #[serde(rename = "hits")]
+    pub passes: Vec<PassRecord>,
     /// How even the pattern is by design; null where no dot has a neighbour.
     pub evenness: Option<EvennessReport>,
-    /// The same pattern laid out by the pinhole alone, seen through the real stack.
+    /// The same pattern laid out without refraction, seen through the real layers.
     pub pinhole_alone: Option<PinholeComparison>,
     /// What the design's tolerances do to it.
     pub tolerances: Option<ToleranceReport>,
@@ -51,9 +68,9 @@ pub struct LostRecord {
     pub because: String,
 }
 
-/// A hit of the pad.
+/// A print pass.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HitRecord {
+pub struct PassRecord {
     /// Its film, from 1.
     pub film: usize,
     /// Tilt of the dome under the pad, degrees.
@@ -72,7 +89,7 @@ pub struct CoverageRecord {
     /// `at rest`, or the name of the claimed load.
     pub load: String,
     /// The coverage; null where the load has no balance or leaves no room for the camera.
-    pub coverage: Option<Coverage>,
+    pub coverage: Option<DomeCoverage>,
 }
 
 impl LayoutReport {
@@ -101,7 +118,7 @@ impl LayoutReport {
                     because: dot.reason.to_string(),
                 })
                 .collect(),
-            hits: hits(layout),
+            passes: passes(layout),
             evenness: evenness::by_design(layout),
             pinhole_alone: evenness::by_pinhole(spec, layout),
             tolerances: tolerances::under_tolerances(spec, layout, &design.sections().tolerances),
@@ -146,18 +163,18 @@ impl LayoutReport {
     }
 }
 
-fn hits(layout: &Layout) -> Vec<HitRecord> {
-    let record = |(index, hit): (usize, &super::Hit)| {
-        let dots = || layout.dots.iter().filter(move |dot| dot.hit == index);
-        HitRecord {
+fn passes(layout: &Layout) -> Vec<PassRecord> {
+    let record = |(index, pass): (usize, &super::PrintPass)| {
+        let dots = || layout.dots.iter().filter(move |dot| dot.pass == index);
+        PassRecord {
             film: index + 1,
-            tilt_deg: hit.tilt_rad.to_degrees(),
-            azimuth_deg: hit.azimuth_rad.to_degrees(),
+            tilt_deg: pass.tilt_rad.to_degrees(),
+            azimuth_deg: pass.azimuth_rad.to_degrees(),
             dots: dots().count(),
             wrap_deg: dots().map(|dot| dot.wrap_rad).fold(0.0, f64::max).to_degrees(),
         }
     };
-    layout.hits.iter().enumerate().map(record).collect()
+    layout.passes.iter().enumerate().map(record).collect()
 }
 
 fn coverages(design: &Design, spec: &LayoutSpec, layout: &Layout) -> Vec<CoverageRecord> {

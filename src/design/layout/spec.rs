@@ -1,25 +1,15 @@
 //! What a layout is made from.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::dot::DotSize;
 use super::error::LayoutError;
-use super::frame::Undistorted;
+use super::frame::UndistortedFrame;
 use crate::spec::Design;
 use crate::spec::sections::{PatternSection, PrintSection, TransferMapName};
 use crate::transfer::{Correction, Nominal, TransferError, TransferMap};
 use domecast_optics::SensorOptics;
-
-/// A white marker on the sheet's top.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WhiteMarker {
-    /// Its number.
-    pub id: u32,
-    /// Its centre, sensor frame, mm.
-    pub position_mm: DVec3,
-    /// Its diameter, mm.
-    pub diameter_mm: f64,
-}
+use domecast_optics::pose::Marker;
 
 /// The circle outside which the runtime does not look, in the undistorted frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,11 +26,11 @@ pub struct LayoutSpec {
     /// Lens, layers and dome at rest, reference channel.
     pub optics: SensorOptics,
     /// The runtime's undistorted frame.
-    pub undistorted: Undistorted,
+    pub undistorted: UndistortedFrame,
     /// The runtime's mask; dots outside are not seen.
     pub mask: Option<Mask>,
     /// The white markers, which may hide dots.
-    pub white_markers: Vec<WhiteMarker>,
+    pub white_markers: Vec<Marker>,
     /// The design's pattern.
     pub pattern: PatternSection,
     /// The design's print.
@@ -55,7 +45,7 @@ impl LayoutSpec {
     pub fn of_design(design: &Design) -> Result<Self, LayoutError> {
         let sections = design.sections();
         let matrix = design.undistorted_matrix();
-        let undistorted = Undistorted::new(&matrix).ok_or_else(|| {
+        let undistorted = UndistortedFrame::new(&matrix).ok_or_else(|| {
             LayoutError::new(
                 "runtime.mask_field_angle_deg",
                 sections.runtime.mask_field_angle_deg,
@@ -72,9 +62,7 @@ impl LayoutSpec {
                 center_px: DVec2::new(matrix[0][2], matrix[1][2]),
                 radius_px: sections.runtime.mask_radius_px,
             }),
-            white_markers: markers
-                .map(|(id, position_mm)| WhiteMarker { id, position_mm, diameter_mm })
-                .collect(),
+            white_markers: markers.map(|(id, position_mm)| Marker { id, position_mm, diameter_mm }).collect(),
             pattern: sections.pattern.clone(),
             print: sections.print.clone(),
         })

@@ -1,4 +1,17 @@
 //! The test target: marks on rings and spokes by which a pad's map is measured.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::LayoutSpec;
+//! use domecast_design::layout::target::print_target;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let spec = LayoutSpec::of_design(&Design::load(THUMB24.as_ref())?)?;
+//! let marks = print_target(&spec.transfer()?, &spec.print);
+//! assert_eq!(marks[0].ring, 0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -17,7 +30,7 @@ pub struct TargetMark {
     pub ring: u32,
     /// Its place on the ring, from +x.
     pub spoke: u32,
-    /// Where it should land on the dome, frame of the hit, mm.
+    /// Where it should land on the dome, frame of the print pass, mm.
     pub surface_mm: DVec3,
     /// Where it stands on the plate by the design's map, mm.
     pub plate_mm: DVec2,

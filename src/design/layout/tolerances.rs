@@ -1,4 +1,19 @@
-//! What is left of a pattern's evenness when the sensor is not as designed: sensors drawn within the tolerances.
+//! The evenness of a pattern in sensors that are drawn within the tolerances (Monte Carlo).
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::tolerances::under_tolerances;
+//! use domecast_design::layout::{Layout, LayoutSpec};
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! let spec = LayoutSpec::of_design(&design)?;
+//! let report = under_tolerances(&spec, &Layout::new(&spec)?, &design.sections().tolerances);
+//! let worst = report.ok_or("no dot has a neighbour")?.ranking[0].tolerance;
+//! println!("{worst} costs most");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
@@ -202,7 +217,7 @@ fn sensor(
 
     // Each print pass has its own registration.
     let moved: Vec<(DVec2, DVec2)> = layout
-        .hits
+        .passes
         .iter()
         .map(|_| {
             let shift_mm = random.normal_pair() * tolerances.print_registration_mm * counts(5);
@@ -219,11 +234,11 @@ fn sensor(
             if !needed {
                 return Some(None);
             }
-            let (shift_mm, turn) = *moved.get(dot.hit)?;
+            let (shift_mm, turn) = *moved.get(dot.pass)?;
             let scatter_mm = random.normal_pair() * tolerances.print_scatter_mm * counts(7);
             let plate_mm = turn.rotate(dot.plate_mm) + shift_mm + scatter_mm;
-            let on_hit = layout.transfer.dome_from_plate(plate_mm).ok()?;
-            let surface = layout.hits.get(dot.hit)?.hit_from_sensor.transpose() * on_hit * larger;
+            let on_pass = layout.transfer.dome_from_plate(plate_mm).ok()?;
+            let surface = layout.passes.get(dot.pass)?.pass_from_sensor.transpose() * on_pass * larger;
             Some(Some(optics.project(surface).ok()?))
         })
         .collect();

@@ -4,6 +4,17 @@
 //! and `platforms.window_margin_mm` more. The light on its way from a dot to the pupil crosses the rim's circle on
 //! the sheet, so that a platform made like that hides no dot; the gaps here say by how much. That the parts leave
 //! this opening free is checked where they are made.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::layout::window::Window;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! assert!(Window::of_design(&design, [design.optics()].into_iter()).is_some());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::f64::consts::TAU;
 

@@ -8,8 +8,9 @@ use glam::{DVec2, DVec3};
 
 use super::lost::{Reason, Zone};
 use super::outline::Outline;
-use super::spec::{LayoutSpec, WhiteMarker};
+use super::spec::LayoutSpec;
 use domecast_optics::SensorOptics;
+use domecast_optics::pose::Marker;
 
 /// Points on the rim of a white marker.
 const RIM_POINTS: u32 = 48;
@@ -43,8 +44,8 @@ impl ImageZone {
 
 /// The images of the white markers at the pose of `optics`. A marker that the lens does not see makes
 /// none.
-pub(super) fn marker_zones(optics: &SensorOptics, markers: &[WhiteMarker]) -> Vec<ImageZone> {
-    let zone = |marker: &WhiteMarker| {
+pub(super) fn marker_zones(optics: &SensorOptics, markers: &[Marker]) -> Vec<ImageZone> {
+    let zone = |marker: &Marker| {
         let reason = Reason::HiddenByMarker { marker: marker.id };
         Some(ImageZone::new(reason, rim_px(optics, marker)?, 0.0))
     };
@@ -52,7 +53,7 @@ pub(super) fn marker_zones(optics: &SensorOptics, markers: &[WhiteMarker]) -> Ve
 }
 
 /// The rim of a white marker in the raw image, px; `None` if the lens does not see all of it.
-fn rim_px(optics: &SensorOptics, marker: &WhiteMarker) -> Option<Vec<DVec2>> {
+fn rim_px(optics: &SensorOptics, marker: &Marker) -> Option<Vec<DVec2>> {
     (0..RIM_POINTS)
         .map(|k| DVec2::from_angle(TAU * f64::from(k) / f64::from(RIM_POINTS)) * (0.5 * marker.diameter_mm))
         .map(|out| optics.project(marker.position_mm + DVec3::new(out.x, out.y, 0.0)).ok())

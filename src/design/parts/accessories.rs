@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::measures::Measures;
 use super::{Blueprint, Feature, PartError};
-use crate::layout::Hit;
+use crate::layout::PrintPass;
 use domecast_mesh::{Fit, Shape};
 
 /// The clear sheet, in the sensor frame: cut by laser, so no process limits of
@@ -123,7 +123,7 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
 ///
 /// Frame: top of the base plate z = 0, register pins on the x axis, the hit's
 /// direction through the dome's centre is the z axis.
-pub(super) fn jig(m: &Measures, name: &str, hit: &Hit) -> Result<Blueprint, PartError> {
+pub(super) fn jig(m: &Measures, name: &str, hit: &PrintPass) -> Result<Blueprint, PartError> {
     let j = &m.jig;
     let mut b =
         Blueprint::new(name, "pad-printing jig: holds sheet and dome under the pad; printed", m.chord);
@@ -136,7 +136,7 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &Hit) -> Result<Blueprint, Part
     let grip = 0.6 * m.sheet_thickness_mm;
     let (seat, top) = (-m.sheet_thickness_mm, -m.sheet_thickness_mm + grip);
 
-    let turn = hit.hit_from_sensor;
+    let turn = hit.pass_from_sensor;
     let lowest = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)]
         .map(|(x, y)| (turn * DVec3::new(x * block.x, y * block.y, seat)).z)
         .into_iter()
@@ -185,6 +185,6 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &Hit) -> Result<Blueprint, Part
     }
     // The block of a tilted hit may hang over a hole, which then goes through it once more: whether it does
     // is a question of angles, and the mesh answers it.
-    b.genus_is_least = hit.tilt_rad != 0.0;
+    b.genus_is_min = hit.tilt_rad != 0.0;
     Ok(b)
 }

@@ -110,3 +110,8 @@ impl From<PartError> for DesignError {
         }
     }
 }
+
+/// A dimension that the process or the assembly does not allow.
+pub(super) fn infeasible(part: &str, place: String, value_mm: f64, limit_mm: f64, field: &str) -> PartError {
+    PartError::Infeasible { part: part.to_owned(), place, value_mm, limit_mm, field: field.to_owned() }
+}

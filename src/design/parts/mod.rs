@@ -38,7 +38,7 @@ use std::io::{self, Write};
 use glam::DAffine3;
 use rayon::prelude::*;
 
-pub use assembly::{Assembly, Item};
+pub use assembly::{Assembly, AssemblyItem};
 pub use checks::check_assembly;
 pub use error::PartError;
 use feature::{Blueprint, Feature};
@@ -48,7 +48,7 @@ pub use poses::Pose;
 pub use sight::{EdgeRay, MarkerView, markers_of};
 pub use view::ViewCone;
 
-use crate::layout::Hit;
+use crate::layout::PrintPass;
 use crate::spec::sections::LedsSection;
 use domecast_mesh::{BoundingBox, Construction, Inspection, TriMesh, inspect, truck_modeling, write_stl};
 
@@ -90,7 +90,7 @@ impl Blueprint {
         let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
         let genus = match inspect(&mesh).genus() {
-            Some(found) if self.genus_is_least => found.max(self.genus),
+            Some(found) if self.genus_is_min => found.max(self.genus),
             _ => self.genus,
         };
         let part = Part {
@@ -170,7 +170,7 @@ pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
 ///
 /// # Errors
 /// The first part, in that order, that cannot be made.
-pub fn build(m: &Measures, hits: &[Hit]) -> Result<Vec<Part>, PartError> {
+pub fn build(m: &Measures, hits: &[PrintPass]) -> Result<Vec<Part>, PartError> {
     let makers: [Maker; 7] = [
         upper::blueprint,
         lower::blueprint,

@@ -10,6 +10,30 @@ use domecast_mesh::{Fit, Profile, Shape};
 /// side faces are then clearly apart, not almost in one plane.
 const CHANNEL_STEP: f64 = 0.04;
 
+/// Cuts that may run into each other.
+const OPEN_TO_EACH_OTHER: [(&str, &str); 20] = [
+    ("sheet recess", "window"),
+    ("sheet recess", "push-out hole"),
+    ("sheet recess", "LED pit"),
+    ("sheet recess", "light channel"),
+    ("sheet recess", "rim notch"),
+    ("sheet recess", "marker window"),
+    ("window", "marker window"),
+    ("marker window", "marker window"),
+    ("marker window", "push-out hole"),
+    ("marker window", "LED pit"),
+    ("marker window", "light channel"),
+    ("window", "push-out hole"),
+    ("window", "LED pit"),
+    ("window", "light channel"),
+    ("window", "rim notch"),
+    ("LED pit", "light channel"),
+    ("LED pit", "rim notch"),
+    ("LED pit", "LED wire hole"),
+    ("light channel", "rim notch"),
+    ("light channel", "light channel"),
+];
+
 pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     let upper = &m.platforms.upper;
     let (bottom, seat, over) = (upper.underside_z_mm, m.seat_z_mm(), m.overcut_mm);
@@ -21,28 +45,7 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     );
     // All of it is open to the recess above; pockets and wire holes must keep
     // their distance. Lip and rim are left to the check of wall thickness.
-    b.may_meet = &[
-        ("sheet recess", "window"),
-        ("sheet recess", "push-out hole"),
-        ("sheet recess", "LED pit"),
-        ("sheet recess", "light channel"),
-        ("sheet recess", "rim notch"),
-        ("sheet recess", "marker window"),
-        ("window", "marker window"),
-        ("marker window", "marker window"),
-        ("marker window", "push-out hole"),
-        ("marker window", "LED pit"),
-        ("marker window", "light channel"),
-        ("window", "push-out hole"),
-        ("window", "LED pit"),
-        ("window", "light channel"),
-        ("window", "rim notch"),
-        ("LED pit", "light channel"),
-        ("LED pit", "rim notch"),
-        ("LED pit", "LED wire hole"),
-        ("light channel", "rim notch"),
-        ("light channel", "light channel"),
-    ];
+    b.may_meet = &OPEN_TO_EACH_OTHER;
     if bottom >= seat {
         let field = "platforms.upper.underside_z_mm";
         return Err(b.infeasible(

@@ -8,8 +8,8 @@ use super::lints::lints;
 use super::rules;
 use super::sections::{CameraSection, DesignFile, DomeSection, ModelName, OpticsSection};
 use super::settings::Settings;
-use domecast_optics::camera::{LensSpec, Model};
-use domecast_optics::{Layer, OpticsSpec, SensorOptics};
+use domecast_optics::camera::{LensModel, LensSpec};
+use domecast_optics::{FlatLayer, OpticsSpec, SensorOptics};
 
 /// The optics of a design.
 pub(super) fn optics(
@@ -19,7 +19,7 @@ pub(super) fn optics(
 ) -> Result<SensorOptics, DesignError> {
     rules::layers(&optics.layers)?;
     rules::camera_below_sheet(camera, optics)?;
-    let layers = optics.layers.iter().map(|layer| Layer {
+    let layers = optics.layers.iter().map(|layer| FlatLayer {
         name: layer.name.clone(),
         index: layer.index.rgb(),
         thickness_mm: layer.thickness_mm,
@@ -27,9 +27,9 @@ pub(super) fn optics(
     let spec = OpticsSpec {
         lens: LensSpec {
             model: match camera.model {
-                ModelName::Pinhole => Model::Pinhole,
-                ModelName::BrownConrady => Model::BrownConrady,
-                ModelName::KannalaBrandt => Model::KannalaBrandt,
+                ModelName::Pinhole => LensModel::Pinhole,
+                ModelName::BrownConrady => LensModel::BrownConrady,
+                ModelName::KannalaBrandt => LensModel::KannalaBrandt,
             },
             width: camera.width,
             height: camera.height,

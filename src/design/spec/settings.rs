@@ -3,6 +3,16 @@
 //! Each value of a setting has a bound on its error; the cheapest value whose bound, times a safety factor, meets the
 //! design's `accuracy` is chosen. The bounds need no test run: a tolerance is met by construction, and its effect in
 //! the image follows from the derivatives of the optics.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! assert_eq!(design.settings().lines().len(), 4);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use glam::{DMat3, DVec3};
 
@@ -131,14 +141,14 @@ fn reason(field: &str, value: f64, why: &str) -> String {
     format!("chosen for accuracy.{field} = {value} with a safety factor of {SAFETY}: {why}")
 }
 
-/// The largest of 1, 2, 5 times a power of ten that is not above a limit, within bounds.
-fn fine(limit: f64, least: f64, most: f64) -> f64 {
+/// The largest of 1, 2, 5 times a power of ten that is not above a limit, clamped.
+fn fine(limit: f64, min: f64, max: f64) -> f64 {
     let decade = 10_f64.powf(limit.log10().floor());
     let step = [5.0, 2.0, 1.0].into_iter().find(|step| step * decade <= limit * (1.0 + 1e-9)).unwrap_or(1.0);
     // to the decimal that a person would write
     let digits = (-limit.log10().floor()).max(0.0);
     let round = 10_f64.powf(digits);
-    ((step * decade * round).round() / round).clamp(least, most)
+    ((step * decade * round).round() / round).clamp(min, max)
 }
 
 fn optical(accuracy: &AccuracySection, sensitivity: &OpticalSensitivity) -> (f64, String) {
@@ -243,7 +253,7 @@ fn spread(
 ) -> f64 {
     let t = &file.tolerances;
     let mut squares = 0.0;
-    for sensor in off_by_tolerances(optics, t).into_iter().flat_map(|off| off.sensors) {
+    for sensor in toleranced_optics(optics, t).into_iter().flat_map(|off| off.sensors) {
         let shifts = points
             .iter()
             .filter_map(|(point, pixel)| Some(sensor.project(*point).ok()?.distance_squared(*pixel)));
@@ -267,7 +277,7 @@ fn spread(
 
 /// The optics with one number off by its tolerance.
 #[derive(Debug, Clone)]
-pub struct Off {
+pub struct TolerancedOptics {
     /// What it is, in words.
     pub what: &'static str,
     /// Its field in the design file.
@@ -277,7 +287,7 @@ pub struct Off {
 }
 
 /// The optics with one number at a time off by its tolerance.
-pub fn off_by_tolerances(optics: &SensorOptics, t: &TolerancesSection) -> Vec<Off> {
+pub fn toleranced_optics(optics: &SensorOptics, t: &TolerancesSection) -> Vec<TolerancedOptics> {
     let spec = optics.spec();
     let with = |change: &dyn Fn(&mut OpticsSpec)| {
         let mut changed = spec.clone();
@@ -310,7 +320,7 @@ pub fn off_by_tolerances(optics: &SensorOptics, t: &TolerancesSection) -> Vec<Of
         })
     };
     let layers = 0..spec.layers.len();
-    let off = |what, field, sensors| Off { what, field, sensors };
+    let off = |what, field, sensors| TolerancedOptics { what, field, sensors };
     vec![
         off("pupil's place", "tolerances.pupil_mm", axes.into_iter().filter_map(moved).collect()),
         off(

@@ -1,5 +1,14 @@
 //! The measured print as a table: `id,x_mm,y_mm` (view from outside) or `id,phi_deg,theta_deg`, optionally
 //! with `print`.
+//!
+//! # Example
+//! ```
+//! use domecast_design::transfer::measured_csv::read;
+//!
+//! let table = read("id,x_mm,y_mm\n0,0.02,-0.01\n1,3.05,0.01\n", 10.0)?;
+//! assert_eq!((table.rows.len(), table.rows[1].id), (2, 1));
+//! # Ok::<(), domecast_design::transfer::measured_csv::PrintTableError>(())
+//! ```
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -7,6 +16,7 @@ use std::fmt;
 use glam::{DVec2, DVec3};
 
 use super::fit::MeasuredIn;
+use domecast_optics::numeric::csv::{CsvRow, repeated, rows as rows_of};
 
 /// A measured table.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +44,7 @@ pub struct MeasuredRow {
 
 /// A fault of a measured table.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TableError {
+pub struct PrintTableError {
     /// Line in the file, from 1.
     pub line: usize,
     /// Column, by its name; empty for the whole line.
@@ -47,7 +57,7 @@ pub struct TableError {
     pub allowed: String,
 }
 
-impl fmt::Display for TableError {
+impl fmt::Display for PrintTableError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "line {}", self.line)?;
         if !self.column.is_empty() {
@@ -60,7 +70,7 @@ impl fmt::Display for TableError {
     }
 }
 
-impl std::error::Error for TableError {}
+impl std::error::Error for PrintTableError {}
 
 const KINDS: &str = "id,x_mm,y_mm or id,phi_deg,theta_deg, and print if there are several";
 
@@ -69,21 +79,17 @@ const KINDS: &str = "id,x_mm,y_mm or id,phi_deg,theta_deg, and print if there ar
 ///
 /// # Errors
 /// The first fault, with its line.
-pub fn read(text: &str, dome_radius_mm: f64) -> Result<MeasuredTable, TableError> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let numbered = (1..).zip(text.lines());
-    let mut lines =
-        numbered.filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
-    let (head_line, head) = lines
+pub fn read(text: &str, dome_radius_mm: f64) -> Result<MeasuredTable, PrintTableError> {
+    let mut lines = rows_of(text);
+    let head = lines
         .next()
         .ok_or_else(|| fault(1, "", "", "the table is empty", "a line with the columns' names first"))?;
-    let names: Vec<String> = cells(head).map(str::to_ascii_lowercase).collect();
+    let names: Vec<String> = head.cells.iter().map(|name| name.to_ascii_lowercase()).collect();
     let column = |name: &str| names.iter().position(|n| n == name);
-    let repeated = names.iter().enumerate().find(|(i, n)| names[..*i].contains(n));
-    if let Some((_, name)) = repeated {
-        return Err(fault(head_line, name, name, "the column is there twice", "each column once"));
+    if let Some(name) = repeated(&names) {
+        return Err(fault(head.line, name, name, "the column is there twice", "each column once"));
     }
-    let missing = |name: &str| fault(head_line, name, head, "the column is missing", KINDS);
+    let missing = |name: &str| fault(head.line, name, head.text, "the column is missing", KINDS);
     let id_at = column("id").ok_or_else(|| missing("id"))?;
     let (measured_in, names_of_place) =
         match (column("x_mm"), column("y_mm"), column("phi_deg"), column("theta_deg")) {
@@ -100,8 +106,7 @@ pub fn read(text: &str, dome_radius_mm: f64) -> Result<MeasuredTable, TableError
     let mut prints: Vec<String> = Vec::new();
     let mut seen: BTreeMap<(u32, usize), usize> = BTreeMap::new();
     let mut rows = Vec::new();
-    for (line, content) in lines {
-        let values: Vec<&str> = cells(content).collect();
+    for CsvRow { line, text: content, cells: values } in lines {
         if values.len() != names.len() {
             let problem = format!("{} cells, the head has {}", values.len(), names.len());
             return Err(fault(line, "", content, &problem, "as many cells as the head"));
@@ -133,8 +138,8 @@ pub fn read(text: &str, dome_radius_mm: f64) -> Result<MeasuredTable, TableError
     Ok(MeasuredTable { measured_in, rows, prints })
 }
 
-fn fault(line: usize, column: &str, value: &str, problem: &str, allowed: &str) -> TableError {
-    TableError {
+fn fault(line: usize, column: &str, value: &str, problem: &str, allowed: &str) -> PrintTableError {
+    PrintTableError {
         line,
         column: column.into(),
         value: value.chars().take(60).collect(),
@@ -170,8 +175,4 @@ fn direction(
             Ok((DVec2::from_angle(theta_deg.to_radians()) * sin).extend(cos))
         }
     }
-}
-
-fn cells(line: &str) -> impl Iterator<Item = &str> {
-    line.split(',').map(|cell| cell.trim().trim_matches('"').trim())
 }

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use tiny_skia::Pixmap;
 
-use super::RenderError;
 use super::canvas::{color, fill, fill_outline, stroke};
+use super::error::RenderError;
 use domecast_design::layout::frame::EvenFrame;
 use domecast_design::layout::{Layout, LayoutSpec, region};
 use domecast_design::sections::EvenIn;
@@ -53,7 +53,7 @@ pub fn camera_view(spec: &LayoutSpec, layout: &Layout) -> Result<Vec<u8>, Render
         }
     }
     if let Some(mask) = &spec.mask {
-        let undistorted = EvenFrame::new(optics.lens(), EvenIn::Undistorted, spec.undistorted);
+        let undistorted = EvenFrame::new(optics.lens(), EvenIn::UndistortedFrame, spec.undistorted);
         let corners: Vec<DVec2> = around()
             .filter_map(|out| undistorted.raw_from_even(mask.center_px + out * mask.radius_px).ok())
             .collect();

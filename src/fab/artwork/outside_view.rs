@@ -6,7 +6,8 @@ use glam::DVec2;
 use tiny_skia::Pixmap;
 
 use super::canvas::{color, fill, stroke};
-use super::{RenderError, strokes};
+use super::error::RenderError;
+use super::strokes;
 use domecast_design::layout::Layout;
 
 /// Side of the picture, px.
@@ -39,18 +40,18 @@ pub fn outside_view(layout: &Layout) -> Result<Vec<u8>, RenderError> {
         stroke(&mut picture, &circle(radius_mm * polar_deg.to_radians().sin()), true, 1.0, LINE);
     }
     for dot in &layout.dots {
-        let Some(hit) = layout.hits.get(dot.hit) else { continue };
-        let sensor_from_hit = hit.hit_from_sensor.transpose();
+        let Some(hit) = layout.passes.get(dot.pass) else { continue };
+        let sensor_from_pass = hit.pass_from_sensor.transpose();
         let corners: Option<Vec<DVec2>> = dot
             .plate_outline
             .polygon(6)
             .into_iter()
             .map(|p| layout.transfer.dome_from_plate(p).ok())
-            .map(|point| point.map(|point| px((sensor_from_hit * point).truncate())))
+            .map(|point| point.map(|point| px((sensor_from_pass * point).truncate())))
             .collect();
         // Every dot of a layout came over the map and goes back.
         if let Some(corners) = corners {
-            fill(&mut picture, &corners, HITS[dot.hit % HITS.len()]);
+            fill(&mut picture, &corners, HITS[dot.pass % HITS.len()]);
         }
     }
     let mut words = |text: &str, at: DVec2, height_px: f64| {

@@ -2,6 +2,17 @@
 //!
 //! Everything here comes from the resolved design and its layout, so that a runtime which sees nothing
 //! but the constants works with the same numbers that the artwork and the parts were made from.
+//!
+//! ```
+//! use domecast_fab::constants;
+//! use std::str::FromStr;
+//!
+//! let design = domecast_design::Design::from_str(include_str!("../../../designs/thumb24.json"))?;
+//! let constants = constants::of(&design, &design.layout()?)?;
+//! assert_eq!(constants.white_markers.len(), 4);
+//! assert!(constants.springs.is_some());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod envelope_picture;
 mod force_report;
@@ -19,7 +30,7 @@ pub use springs::{DesignSprings, claimed_loads, springs_of};
 
 use domecast_design::layout::Layout;
 use domecast_design::{Design, DesignError};
-use domecast_optics::Channel;
+use domecast_optics::ColorChannel;
 use domecast_runtime::constants::{
     BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants,
     OpticsConstants, VERSION, WhiteMarker,
@@ -75,8 +86,9 @@ pub fn with_springs(
                 .iter()
                 .map(|layer| LayerConstants {
                     name: layer.name.clone(),
-                    index: layer.index_for(Channel::Green),
-                    index_rgb: (layer.index != [layer.index_for(Channel::Green); 3]).then_some(layer.index),
+                    index: layer.index_for(ColorChannel::Green),
+                    index_rgb: (layer.index != [layer.index_for(ColorChannel::Green); 3])
+                        .then_some(layer.index),
                     thickness_mm: layer.thickness_mm,
                 })
                 .collect(),

@@ -40,8 +40,8 @@ pub(super) fn dots(subject: &ReportSubject<'_>) -> Html {
         typeset(judged.pitch_px),
         typeset(judged.dot_diameter_mm[0]),
         typeset(judged.dot_diameter_mm[1]),
-        judged.hits.len(),
-        if judged.hits.len() == 1 { "" } else { "s" },
+        judged.passes.len(),
+        if judged.passes.len() == 1 { "" } else { "s" },
         charts.iter().flatten().map(crate::chart::Chart::to_html).collect::<Html>(),
         evenness(subject),
         tolerances(subject),
@@ -81,7 +81,7 @@ fn nearest(subject: &ReportSubject<'_>, place: Place) -> Vec<f64> {
             dot.neighbors
                 .iter()
                 .filter_map(|id| dots.get(*id as usize))
-                .filter(|other| !matches!(place, Place::Plate) || other.hit == dot.hit)
+                .filter(|other| !matches!(place, Place::Plate) || other.pass == dot.pass)
                 .map(|other| match place {
                     Place::Image => dot.image_px.distance(other.image_px),
                     Place::Dome => dot.surface_mm.distance(other.surface_mm),

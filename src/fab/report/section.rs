@@ -1,4 +1,17 @@
 //! The sensor cut along its x axis, with the rays that its camera sees by.
+//!
+//! ```
+//! use domecast_fab::report::section;
+//! use glam::DVec2;
+//! use std::str::FromStr;
+//!
+//! let design = domecast_design::Design::from_str(include_str!("../../../designs/thumb24.json"))?;
+//! let ray = section::ray_points(design.optics(), DVec2::new(400.0, 240.0)).expect("inside the image");
+//! // from the pupil through both faces of the sheet to the dome
+//! assert_eq!(ray.len(), 4);
+//! assert!((ray[3].length() - 10.0).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::fmt::Write as _;
 
@@ -8,7 +21,7 @@ use crate::html::{AsHtml, Html};
 use crate::numbers::typeset;
 use domecast_design::Design;
 use domecast_optics::camera::Lens;
-use domecast_optics::{Channel, SensorOptics};
+use domecast_optics::{ColorChannel, SensorOptics};
 
 /// Rays on either side of the axis.
 const RAYS_A_SIDE: u32 = 8;
@@ -29,7 +42,8 @@ pub fn ray_points(optics: &SensorOptics, pixel: DVec2) -> Option<Vec<DVec3>> {
         faces_mm.push(below);
     }
     faces_mm.reverse();
-    let indices: Vec<f64> = optics.layers().iter().map(|layer| layer.index_for(Channel::Green)).collect();
+    let indices: Vec<f64> =
+        optics.layers().iter().map(|layer| layer.index_for(ColorChannel::Green)).collect();
     for (face_mm, pair) in faces_mm.iter().zip(indices.windows(2)) {
         if along.z <= 0.0 {
             return None;
@@ -54,8 +68,8 @@ pub fn drawing(design: &Design) -> Html {
     let half = 0.5 * s.envelope.size_mm[0];
     let underside = s.platforms.upper.underside_z_mm;
     let lower_top = design.lower_top_z_mm();
-    let [least, most] = design.bounds_mm();
-    let (top, bottom) = (most.z, least.z);
+    let [low, high] = design.bounds_mm();
+    let (top, bottom) = (high.z, low.z);
     let margin = 0.06 * (top - bottom);
     let sheet_half = 0.5 * s.sheet.size_mm[0];
     let mut art = String::new();

@@ -9,8 +9,8 @@ use proptest::prelude::*;
 const CENTRE: DVec2 = DVec2::new(321.25, 238.5);
 
 fn lenses() -> Vec<Lens> {
-    use Model::{BrownConrady, KannalaBrandt, Pinhole};
-    let sets: [(Model, &[f64], f64); 13] = [
+    use LensModel::{BrownConrady, KannalaBrandt, Pinhole};
+    let sets: [(LensModel, &[f64], f64); 13] = [
         (Pinhole, &[], 160.0),
         (Pinhole, &[], 179.9),
         (BrownConrady, &[0.0; 5], 160.0),
@@ -155,7 +155,7 @@ proptest! {
             prop_assert!((back.length() - 1.0).abs() < 1e-15);
             let solved = lens.unproject_solved(pixel).unwrap();
             let (_, forward) = lens.project_with_jacobian(back).unwrap();
-            prop_assert_eq!(solved.value, back);
+            prop_assert_eq!(solved.ray, back);
             prop_assert!(solved.iterations <= Lens::MAX_UNPROJECT_ITERATIONS);
             prop_assert!(solved.residual_px <= (8.0 * f64::EPSILON * forward.norm()).max(1e-9));
         }

@@ -9,7 +9,7 @@ use super::lanes::Lanes;
 use super::limit::Domain;
 use super::pinhole::Pinhole;
 use super::pupil::PupilPolynomial;
-use super::{LensError, LensLimit, LensSpec, Model};
+use super::{LensError, LensLimit, LensModel, LensSpec};
 use crate::numeric::LengthMismatch;
 use crate::numeric::batch::{fill, fill_runs};
 
@@ -30,14 +30,14 @@ pub struct Lens {
 /// Pixels that are computed side by side.
 pub(crate) const LANES: usize = 16;
 
-/// What an inverse found, and how.
+/// The direction that a pixel sees, and how it was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solved<T> {
-    /// The answer.
-    pub value: T,
+pub struct SolvedRay {
+    /// Unit direction, camera frame.
+    pub ray: DVec3,
     /// Evaluations of the formula that it took.
     pub iterations: u32,
-    /// Distance, in pixels, from the input to where the answer maps.
+    /// Distance from the pixel to the projection of the ray, px.
     pub residual_px: f64,
 }
 
@@ -67,10 +67,10 @@ impl Lens {
         spec.check()?;
         let view = spec.field_of_view_rad;
         let formula = match (spec.model, spec.distortion.as_slice()) {
-            (Model::KannalaBrandt, &[k1, k2, k3, k4]) => {
+            (LensModel::KannalaBrandt, &[k1, k2, k3, k4]) => {
                 KannalaBrandt::new([k1, k2, k3, k4], view).map(Formula::KannalaBrandt)
             }
-            (Model::BrownConrady, distortion) => {
+            (LensModel::BrownConrady, distortion) => {
                 BrownConrady::new(distortion, view).map(Formula::BrownConrady)
             }
             _ => Some(Formula::Pinhole(Pinhole::new(view))),
@@ -166,7 +166,7 @@ impl Lens {
     ///
     /// # Errors
     /// As [`Lens::unproject`].
-    pub fn unproject_solved(&self, pixel: DVec2) -> Result<Solved<DVec3>, LensLimit> {
+    pub fn unproject_solved(&self, pixel: DVec2) -> Result<SolvedRay, LensLimit> {
         let ray = self.unproject(pixel)?;
         let (image, slack) = (self.image_of(pixel), self.slack(pixel));
         let iterations = match &self.formula {
@@ -174,7 +174,7 @@ impl Lens {
             Formula::BrownConrady(model) => model.plane_of(image, slack)?.1,
             Formula::KannalaBrandt(model) => model.angle_of(image, slack)?.1,
         };
-        Ok(Solved { value: ray, iterations, residual_px: (self.project(ray)? - pixel).length() })
+        Ok(SolvedRay { ray, iterations, residual_px: (self.project(ray)? - pixel).length() })
     }
 
     /// [`Lens::project`] and the derivative of the pixel by the ray's three

@@ -1,8 +1,28 @@
 //! Lens models: the direction of a ray in air to a pixel, and back.
 //!
-//! One type, [`Lens`], serves three forms ([`Model`]): a pinhole, Brown-Conrady
+//! One type, [`Lens`], serves three forms ([`LensModel`]): a pinhole, Brown-Conrady
 //! with 5 or 8 coefficients, and Kannala-Brandt with 4. All share one
 //! interface, one set of limits ([`LensLimit`]) and one conformance suite.
+//!
+//! # Example
+//! ```
+//! use domecast_optics::camera::{Lens, LensSpec, LensModel};
+//! use domecast_optics::glam::DVec2;
+//!
+//! let lens = Lens::new(LensSpec {
+//!     model: LensModel::KannalaBrandt,
+//!     width: 640,
+//!     height: 480,
+//!     matrix: [[230.0, 0.0, 319.5], [0.0, 230.0, 239.5], [0.0, 0.0, 1.0]],
+//!     distortion: vec![-0.01, 0.002, 0.0, 0.0],
+//!     field_of_view_rad: 3.0,
+//!     pupil_shift_mm: vec![],
+//! })?;
+//! let pixel = DVec2::new(100.0, 50.0);
+//! let ray = lens.unproject(pixel)?;
+//! assert!((lens.project(ray)? - pixel).length() < 1e-10);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! # Domain
 //! A distortion polynomial is a lens only up to its *fold*, the first place
@@ -37,9 +57,9 @@ mod pinhole;
 mod pupil;
 mod spec;
 
-pub use lens::{Lens, Solved};
+pub use lens::{Lens, SolvedRay};
 pub use limit::LensLimit;
-pub use spec::{LensError, LensSpec, Model};
+pub use spec::{LensError, LensModel, LensSpec};
 
 #[cfg(test)]
 mod conformance;

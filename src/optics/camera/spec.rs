@@ -2,7 +2,7 @@
 
 /// The form of the lens model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Model {
+pub enum LensModel {
     /// Perspective, no distortion coefficients.
     Pinhole,
     /// D. C. Brown, "Decentering distortion of lenses" (1966), as in OpenCV's
@@ -14,7 +14,7 @@ pub enum Model {
     KannalaBrandt,
 }
 
-impl Model {
+impl LensModel {
     /// The name in files.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -41,7 +41,7 @@ impl Model {
     }
 }
 
-impl std::fmt::Display for Model {
+impl std::fmt::Display for LensModel {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.as_str())
     }
@@ -51,14 +51,14 @@ impl std::fmt::Display for Model {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LensSpec {
     /// Form of the model.
-    pub model: Model,
+    pub model: LensModel,
     /// Image width in pixels.
     pub width: u32,
     /// Image height in pixels.
     pub height: u32,
     /// Camera matrix `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]`, pixels.
     pub matrix: [[f64; 3]; 3],
-    /// Coefficients in OpenCV's order, see [`Model`].
+    /// Coefficients in OpenCV's order, see [`LensModel`].
     pub distortion: Vec<f64>,
     /// Full angle of the cone that the lens sees, in radians.
     pub field_of_view_rad: f64,

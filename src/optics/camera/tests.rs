@@ -1,7 +1,7 @@
 use super::*;
 use glam::{DVec2, DVec3};
 
-fn lens(model: Model, distortion: &[f64], field_of_view_deg: f64) -> Lens {
+fn lens(model: LensModel, distortion: &[f64], field_of_view_deg: f64) -> Lens {
     Lens::new(LensSpec {
         model,
         width: 640,
@@ -17,20 +17,20 @@ fn lens(model: Model, distortion: &[f64], field_of_view_deg: f64) -> Lens {
 #[test]
 fn folds_are_where_the_derivative_says() {
     // k1 alone: 1 + 3 k1 u = 0.
-    let barrel = lens(Model::BrownConrady, &[-0.1, 0.0, 0.0, 0.0, 0.0], 170.0);
+    let barrel = lens(LensModel::BrownConrady, &[-0.1, 0.0, 0.0, 0.0, 0.0], 170.0);
     let fold = (1.0_f64 / 0.3).sqrt().atan();
     assert!((barrel.fold_angle_rad().unwrap() - fold).abs() < 1e-15);
     assert_eq!(barrel.max_field_angle_rad(), barrel.fold_angle_rad().unwrap());
     assert_eq!(barrel.end_limit(), LensLimit::BeyondFold);
-    let fish = lens(Model::KannalaBrandt, &[-0.1, 0.0, 0.0, 0.0], 300.0);
+    let fish = lens(LensModel::KannalaBrandt, &[-0.1, 0.0, 0.0, 0.0], 300.0);
     assert!((fish.fold_angle_rad().unwrap() - (1.0_f64 / 0.3).sqrt()).abs() < 1e-15);
     // Within the field of view nothing folds, the field of view ends it.
-    let narrow = lens(Model::BrownConrady, &[-0.1, 0.0, 0.0, 0.0, 0.0], 90.0);
+    let narrow = lens(LensModel::BrownConrady, &[-0.1, 0.0, 0.0, 0.0, 0.0], 90.0);
     assert_eq!(narrow.end_limit(), LensLimit::BeyondFieldOfView);
     assert!((narrow.max_field_angle_rad() - 45_f64.to_radians()).abs() < 1e-15);
     assert!((narrow.fold_angle_rad().unwrap() - fold).abs() < 1e-15);
     // Tangential terms alone: the determinant is first zero at 6 q r = 1.
-    let skew = lens(Model::BrownConrady, &[0.0, 0.0, 0.03, 0.04, 0.0], 178.0);
+    let skew = lens(LensModel::BrownConrady, &[0.0, 0.0, 0.03, 0.04, 0.0], 178.0);
     let fold = (1.0_f64 / (6.0 * 0.05)).atan();
     assert!((skew.fold_angle_rad().unwrap() - fold).abs() < 1e-14);
 }
@@ -38,12 +38,12 @@ fn folds_are_where_the_derivative_says() {
 #[test]
 fn rays_and_pixels_come_back() {
     let lenses = [
-        lens(Model::Pinhole, &[], 160.0),
-        lens(Model::BrownConrady, &[-0.2917, 0.0878, 0.0, 0.0, -0.01156], 160.0),
-        lens(Model::BrownConrady, &[-0.2917, 0.0878, 1e-3, -2e-3, -0.01156], 160.0),
-        lens(Model::BrownConrady, &[0.8, 0.1, 1e-4, 2e-4, 0.003, 1.1, 0.25, 0.01], 160.0),
-        lens(Model::KannalaBrandt, &[0.0; 4], 250.0),
-        lens(Model::KannalaBrandt, &[-0.01, 0.002, -0.001, 0.0001], 200.0),
+        lens(LensModel::Pinhole, &[], 160.0),
+        lens(LensModel::BrownConrady, &[-0.2917, 0.0878, 0.0, 0.0, -0.01156], 160.0),
+        lens(LensModel::BrownConrady, &[-0.2917, 0.0878, 1e-3, -2e-3, -0.01156], 160.0),
+        lens(LensModel::BrownConrady, &[0.8, 0.1, 1e-4, 2e-4, 0.003, 1.1, 0.25, 0.01], 160.0),
+        lens(LensModel::KannalaBrandt, &[0.0; 4], 250.0),
+        lens(LensModel::KannalaBrandt, &[-0.01, 0.002, -0.001, 0.0001], 200.0),
     ];
     for lens in &lenses {
         let end = lens.max_field_angle_rad();
@@ -70,7 +70,7 @@ fn rays_and_pixels_come_back() {
 
 #[test]
 fn bad_lenses_are_named() {
-    let good = lens(Model::BrownConrady, &[0.0; 5], 90.0).spec().clone();
+    let good = lens(LensModel::BrownConrady, &[0.0; 5], 90.0).spec().clone();
     let fails = |change: &dyn Fn(&mut LensSpec)| {
         let mut spec = good.clone();
         change(&mut spec);

@@ -1,4 +1,14 @@
 //! One function over many independent inputs.
+//!
+//! # Example
+//! ```
+//! use domecast_optics::numeric::batch::fill;
+//!
+//! let mut squares = [0.0; 3];
+//! fill(&[1.0, 2.0, 3.0], &mut squares, |x| x * x)?;
+//! assert_eq!(squares, [1.0, 4.0, 9.0]);
+//! # Ok::<(), domecast_optics::numeric::LengthMismatch>(())
+//! ```
 
 use rayon::prelude::*;
 

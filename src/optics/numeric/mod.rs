@@ -5,8 +5,19 @@
 //! [`Root`], which carries its residual and the iterations it took, or with a
 //! [`RootError`] that names what went wrong. No function returns NaN for a
 //! finite input.
+//!
+//! # Example
+//! ```
+//! use domecast_optics::numeric::bracketed_newton;
+//!
+//! // the square root of 2: a function with its derivative, a bracket and a start
+//! let root = bracketed_newton(|x| (x * x - 2.0, 2.0 * x), 0.0, 2.0, 1.0)?;
+//! assert!((root.value - 2.0_f64.sqrt()).abs() < 1e-15);
+//! # Ok::<(), domecast_optics::numeric::RootError>(())
+//! ```
 
 pub mod batch;
+pub mod csv;
 mod polynomial;
 mod random;
 mod rigid;

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use nalgebra::Matrix2x6;
 
-use crate::refraction::{Limit, SensorOptics};
+use crate::refraction::{RayLimit, SensorOptics};
 
 /// A white disc on the sheet's top face.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +41,7 @@ impl Marker {
     ///
     /// # Errors
     /// The limit of the first outline point that the camera cannot see.
-    pub fn outline_px(&self, optics: &SensorOptics) -> Result<[DVec2; OUTLINE], Limit> {
+    pub fn outline_px(&self, optics: &SensorOptics) -> Result<[DVec2; OUTLINE], RayLimit> {
         let radius = 0.5 * self.diameter_mm;
         let mut outline = [DVec2::ZERO; OUTLINE];
         for (point, [cos, sin]) in outline.iter_mut().zip(DIRECTIONS) {
@@ -54,7 +54,7 @@ impl Marker {
     ///
     /// # Errors
     /// The limit that the disc's centre or a point of its outline is past.
-    pub fn image(&self, optics: &SensorOptics) -> Result<DiscImage, Limit> {
+    pub fn image(&self, optics: &SensorOptics) -> Result<DiscImage, RayLimit> {
         let center_px = optics.project(self.position_mm)?;
         let outline = self.outline_px(optics)?;
         let centroid_px = center_px + centroid_offset(center_px, &outline);
@@ -69,7 +69,7 @@ impl Marker {
     ///
     /// # Errors
     /// As [`Marker::image`].
-    pub fn centroid_offset_px(&self, optics: &SensorOptics, center_px: DVec2) -> Result<DVec2, Limit> {
+    pub fn centroid_offset_px(&self, optics: &SensorOptics, center_px: DVec2) -> Result<DVec2, RayLimit> {
         if self.diameter_mm == 0.0 {
             return Ok(DVec2::ZERO);
         }
@@ -81,7 +81,7 @@ impl Marker {
     ///
     /// # Errors
     /// As [`Marker::image`].
-    pub fn centroid_with_motion(&self, optics: &SensorOptics) -> Result<(DVec2, Matrix2x6<f64>), Limit> {
+    pub fn centroid_with_motion(&self, optics: &SensorOptics) -> Result<(DVec2, Matrix2x6<f64>), RayLimit> {
         let motion = optics.project_with_motion(self.position_mm)?;
         let offset = self.centroid_offset_px(optics, motion.pixel)?;
         Ok((motion.pixel + offset, motion.by_pose))

@@ -1,6 +1,6 @@
 //! Why there is no pose.
 
-use crate::refraction::Limit;
+use crate::refraction::RayLimit;
 
 /// Why markers and pixels give no pose that deserves the name.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +32,7 @@ pub enum PoseError {
         /// The marker.
         id: u32,
         /// What it is past.
-        limit: Limit,
+        limit: RayLimit,
     },
     /// The pixels fit well once these markers change places.
     Swapped {
@@ -51,7 +51,7 @@ pub enum PoseError {
         /// The marker that a start would hide.
         id: u32,
         /// What it would be past.
-        limit: Limit,
+        limit: RayLimit,
     },
     /// The pixels fit a pose that the platform cannot reach.
     OutOfReach {

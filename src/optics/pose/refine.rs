@@ -6,14 +6,14 @@ use nalgebra::Matrix6;
 use super::disc::{DIRECTIONS, Marker, OUTLINE, centroid_offset};
 use super::sheet::{ObservedRay, PlacedSheet, SheetView};
 use crate::numeric::{Rigid, rotation_from_vector, vector_from_rotation};
-use crate::refraction::{Limit, SensorOptics};
+use crate::refraction::{RayLimit, SensorOptics};
 
 const MAX_STEPS: u32 = 40;
 /// A step this short ends the refinement, mm: the pose is then right to 1e-8 mm.
 const CONVERGED_MM: f64 = 2e-6;
 
 /// Why residuals do not exist at a pose: which marker, which limit.
-pub(super) type HiddenMarker = (u32, Limit);
+pub(super) type HiddenMarker = (u32, RayLimit);
 
 /// Sum of squared residuals (px^2), normal matrix (its lower half) and right side.
 pub(super) struct NormalEquations {
@@ -96,7 +96,7 @@ pub(super) struct PixelResiduals<'a> {
 impl ResidualModel for PixelResiduals<'_> {
     fn at(&mut self, pose: &Rigid, _first_look: bool) -> Result<(NormalEquations, bool), HiddenMarker> {
         let first = self.seen.first().map_or(0, |(m, _)| m.id);
-        let optics = self.optics.at_pose(pose).map_err(|_| (first, Limit::PupilInsideSheet))?;
+        let optics = self.optics.at_pose(pose).map_err(|_| (first, RayLimit::PupilInsideSheet))?;
         let mut normal = NormalEquations::empty();
         for (marker, px) in self.seen {
             let (centroid, motion) =
@@ -139,7 +139,7 @@ impl<'a> TangentResiduals<'a> {
             let radius = 0.5 * marker.diameter_mm;
             let steps: [DVec2; OUTLINE] = DIRECTIONS.map(|[cos, sin]| DVec2::new(radius * cos, radius * sin));
             let found = self.sheet.pixels(placed, marker.position_mm, steps, observed, *near);
-            let (center, first_order, outline) = found.ok_or((marker.id, Limit::BeyondFieldOfView))?;
+            let (center, first_order, outline) = found.ok_or((marker.id, RayLimit::BeyondFieldOfView))?;
             // The exact centroid less what the first order says of the centre.
             *offset = center - *px - first_order;
             if radius > 0.0 {
@@ -153,7 +153,7 @@ impl<'a> TangentResiduals<'a> {
 impl ResidualModel for TangentResiduals<'_> {
     fn at(&mut self, pose: &Rigid, first_evaluation: bool) -> Result<(NormalEquations, bool), HiddenMarker> {
         let first = self.seen.first().map_or(0, |(m, _)| m.id);
-        let placed = self.sheet.placed(pose).ok_or((first, Limit::PupilInsideSheet))?;
+        let placed = self.sheet.placed(pose).ok_or((first, RayLimit::PupilInsideSheet))?;
         if first_evaluation {
             self.nears.fill(self.sheet.paraxial_tangent_per_mm(&placed));
         } else {
@@ -165,7 +165,7 @@ impl ResidualModel for TangentResiduals<'_> {
             let (from_observed, motion) = self
                 .sheet
                 .offset(&placed, marker.position_mm, observed, near)
-                .ok_or((marker.id, Limit::BeyondFieldOfView))?;
+                .ok_or((marker.id, RayLimit::BeyondFieldOfView))?;
             let left = -(from_observed + *offset);
             for (axis, [v, w]) in motion.iter().enumerate() {
                 normal.add([v.x, v.y, v.z, w.x, w.y, w.z], left[axis]);

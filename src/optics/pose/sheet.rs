@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::camera::Lens;
 use crate::numeric::Rigid;
-use crate::refraction::{Limit, SensorOptics};
+use crate::refraction::{RayLimit, SensorOptics};
 
 /// Newton steps; each squares the error.
 const MAX_CLIMB_STEPS: u32 = 40;
@@ -66,7 +66,7 @@ impl SheetView {
             layer.thickness_mm.filter(|d| *d > 0.0).map(|d| [n * n, (n - 1.0) * (n + 1.0), d])
         });
         let plates: Vec<[f64; 3]> = flat.collect();
-        // Newton climbs from below where no layer is thinner than air.
+        // Newton converges from below where no layer is thinner than air.
         if plates.iter().any(|[_, excess, _]| *excess < 0.0) {
             return None;
         }
@@ -94,7 +94,7 @@ impl SheetView {
     }
 
     /// The direction that a pixel sees, with the pixel's derivative by it.
-    pub fn observed_ray(&self, pixel: DVec2) -> Result<ObservedRay, Limit> {
+    pub fn observed_ray(&self, pixel: DVec2) -> Result<ObservedRay, RayLimit> {
         let ray = self.lens.unproject(pixel)?;
         let (_, m) = self.lens.project_with_jacobian(ray)?;
         let row = |i: usize| DVec3::new(m[(i, 0)], m[(i, 1)], m[(i, 2)]);
@@ -102,7 +102,7 @@ impl SheetView {
     }
 
     /// X(t) = air t + sum d t / sqrt(n^2 + (n^2 - 1) t^2) = reach, by Newton: X rises and is concave, so from
-    /// anywhere the first step lands at or below the answer, and the others climb to it.
+    /// anywhere the first step lands at or below the answer, and the others rise to it.
     fn air_ray(&self, air_mm: f64, reach_mm: f64, start: f64) -> Option<SheetRay> {
         let mut t = start;
         for _ in 0..MAX_CLIMB_STEPS {

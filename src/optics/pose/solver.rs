@@ -10,7 +10,7 @@ use super::refine::{PixelResiduals, RefinedPose, TangentResiduals, refine};
 use super::sheet::SheetView;
 use super::start::{planar_poses, widest_four};
 use crate::numeric::{Rigid, vector_from_rotation};
-use crate::refraction::{Limit, SensorOptics};
+use crate::refraction::{RayLimit, SensorOptics};
 
 /// Finds the platform's pose from its white markers; needs only what the constants hold.
 #[derive(Debug, Clone)]
@@ -56,7 +56,7 @@ impl PoseSolver {
         if !spans_plane(&four.map(|i| flat[i])) {
             return Err(PoseError::Collinear);
         }
-        let lift = |layer: &crate::refraction::Layer| {
+        let lift = |layer: &crate::refraction::FlatLayer| {
             let index = layer.index_for(optics.channel());
             layer.thickness_mm.map_or(0.0, |thickness| thickness * (1.0 - 1.0 / index))
         };
@@ -159,7 +159,7 @@ impl PoseSolver {
             let flat: Vec<DVec2> = seen.iter().map(|(m, _)| m.position_mm.truncate()).collect();
             widest_four(&flat).ok_or(PoseError::Collinear)?
         };
-        let hidden = |i: usize, limit: Limit| PoseError::NotVisible { id: seen[i].0.id, limit };
+        let hidden = |i: usize, limit: RayLimit| PoseError::NotVisible { id: seen[i].0.id, limit };
         let mut rays = [DVec3::ZERO; 4];
         let mut tangent_residuals = None;
         if let Some(sheet) = &self.sheet {
@@ -201,7 +201,7 @@ impl PoseSolver {
             (Some(a), b) => (a, b),
             (None, Some(b)) => (b, None),
             (None, None) => {
-                let (id, limit) = limit.unwrap_or((seen[0].0.id, Limit::NotConverged));
+                let (id, limit) = limit.unwrap_or((seen[0].0.id, RayLimit::NotConverged));
                 return Err(PoseError::NoViewFits { id, limit });
             }
         };

@@ -3,19 +3,19 @@ use glam::{DVec2, DVec3};
 use nalgebra::{Matrix6, Vector6};
 
 use super::*;
-use crate::camera::{LensSpec, Model};
+use crate::camera::{LensModel, LensSpec};
 use crate::numeric::{Rigid, rotation_from_vector, vector_from_rotation};
-use crate::refraction::{Layer, OpticsSpec, SensorOptics};
+use crate::refraction::{FlatLayer, OpticsSpec, SensorOptics};
 
-fn thumb(model: Model) -> SensorOptics {
+fn thumb(model: LensModel) -> SensorOptics {
     let f = 229.18;
     let distortion = match model {
-        Model::Pinhole => vec![],
-        Model::BrownConrady => vec![-0.2917, 0.0878, 0.0, 0.0, -0.01156],
-        Model::KannalaBrandt => vec![0.0; 4],
+        LensModel::Pinhole => vec![],
+        LensModel::BrownConrady => vec![-0.2917, 0.0878, 0.0, 0.0, -0.01156],
+        LensModel::KannalaBrandt => vec![0.0; 4],
     };
     let layer =
-        |name: &str, index, thickness_mm| Layer { name: name.into(), index: [index; 3], thickness_mm };
+        |name: &str, index, thickness_mm| FlatLayer { name: name.into(), index: [index; 3], thickness_mm };
     SensorOptics::new(&OpticsSpec {
         lens: LensSpec {
             model,
@@ -43,7 +43,7 @@ fn square(half_mm: f64, diameter_mm: f64) -> Vec<Marker> {
     (0..4).zip(signs).map(marker).collect()
 }
 
-fn solver(model: Model) -> PoseSolver {
+fn solver(model: LensModel) -> PoseSolver {
     PoseSolver::new(&thumb(model), &square(7.5, 0.8), PoseOptions::new(0.1, 5.0)).unwrap()
 }
 
@@ -64,7 +64,7 @@ fn miss(a: &Rigid, b: &Rigid) -> (f64, f64) {
 
 #[test]
 fn exact_pixels_give_the_pose_at_every_tilt() {
-    for model in [Model::Pinhole, Model::BrownConrady, Model::KannalaBrandt] {
+    for model in [LensModel::Pinhole, LensModel::BrownConrady, LensModel::KannalaBrandt] {
         let solver = solver(model);
         for tilt in [0.0, 1e-8, 1e-6, 1e-3, 0.05, 0.1] {
             for axis in [DVec3::X, DVec3::Y, -DVec3::X, DVec3::new(0.6, -0.8, 0.0), DVec3::Z] {
@@ -84,7 +84,7 @@ fn exact_pixels_give_the_pose_at_every_tilt() {
 // The camera upside down under a plane that faces away in x: the other orientation of the plane.
 #[test]
 fn the_plane_may_be_turned_in_the_camera() {
-    let base = thumb(Model::KannalaBrandt);
+    let base = thumb(LensModel::KannalaBrandt);
     for turn in [DVec3::new(0.0, 0.0, 3.1), DVec3::new(0.02, -0.03, 1.5), DVec3::new(1e-8, 0.0, -2.0)] {
         let spec = OpticsSpec {
             lens: base.lens().spec().clone(),
@@ -105,7 +105,7 @@ fn the_plane_may_be_turned_in_the_camera() {
 
 #[test]
 fn noise_gives_the_bound_and_no_flips() {
-    for model in [Model::BrownConrady, Model::KannalaBrandt] {
+    for model in [LensModel::BrownConrady, LensModel::KannalaBrandt] {
         let solver = solver(model);
         for x in [[0.0; 6], [0.2, 0.1, -1.5, 0.03, -0.02, 0.02]] {
             let truth = pose(x);
@@ -155,7 +155,7 @@ fn the_displacement_covariance_is_that_of_the_displacement() {
 
 #[test]
 fn faults_have_names() {
-    let solver = solver(Model::BrownConrady);
+    let solver = solver(LensModel::BrownConrady);
     let good = sightings(&solver, &pose([0.1, 0.0, -1.0, 0.02, 0.01, 0.0]));
     let name = |seen: &[Sighting]| solver.solve(seen).unwrap_err().as_str();
     assert_eq!(name(&good[..3]), "missing_marker");
@@ -183,7 +183,7 @@ fn faults_have_names() {
 
 #[test]
 fn swapped_markers_are_told() {
-    let solver = solver(Model::BrownConrady);
+    let solver = solver(LensModel::BrownConrady);
     let good = sightings(&solver, &pose([0.1, 0.0, -1.0, 0.02, 0.01, 0.0]));
     for order in [[1, 0, 2, 3], [0, 1, 3, 2], [2, 1, 0, 3], [1, 2, 3, 0], [2, 3, 0, 1], [3, 1, 2, 0]] {
         let permuted: Vec<Sighting> =
@@ -196,7 +196,7 @@ fn swapped_markers_are_told() {
 // Far away and noisy, a plane's tilt cannot be told from its mirror: both poses, and the word.
 #[test]
 fn a_far_plane_is_ambiguous() {
-    let base = thumb(Model::KannalaBrandt);
+    let base = thumb(LensModel::KannalaBrandt);
     let spec = OpticsSpec {
         lens: base.lens().spec().clone(),
         sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -120.0)),
@@ -216,7 +216,8 @@ fn a_far_plane_is_ambiguous() {
 fn five_markers_use_all_five() {
     let mut markers = square(7.5, 0.8);
     markers.push(Marker { id: 4, position_mm: DVec3::new(3.0, -9.0, 0.0), diameter_mm: 0.8 });
-    let solver = PoseSolver::new(&thumb(Model::BrownConrady), &markers, PoseOptions::new(0.1, 5.0)).unwrap();
+    let solver =
+        PoseSolver::new(&thumb(LensModel::BrownConrady), &markers, PoseOptions::new(0.1, 5.0)).unwrap();
     let truth = pose([0.1, 0.0, -1.0, 0.02, 0.01, 0.0]);
     let seen = sightings(&solver, &truth);
     assert!(miss(&solver.solve(&seen).unwrap().pose, &truth).0 < 2e-8);
@@ -225,7 +226,7 @@ fn five_markers_use_all_five() {
 
 #[test]
 fn bad_marker_sets_are_refused() {
-    let optics = thumb(Model::BrownConrady);
+    let optics = thumb(LensModel::BrownConrady);
     let options = PoseOptions::new(0.1, 5.0);
     let make = |markers: &[Marker]| PoseSolver::new(&optics, markers, options).unwrap_err().as_str();
     let mut line = square(7.5, 0.8);
@@ -242,7 +243,7 @@ fn bad_marker_sets_are_refused() {
 // The centroid of an oblique disc of 1 mm against a fine sum over its area.
 #[test]
 fn the_centroid_model_matches_a_sum_over_the_disc() {
-    let optics = thumb(Model::BrownConrady).at_pose(&pose([0.1, 0.2, -1.0, 0.06, -0.04, 0.0])).unwrap();
+    let optics = thumb(LensModel::BrownConrady).at_pose(&pose([0.1, 0.2, -1.0, 0.06, -0.04, 0.0])).unwrap();
     let marker = Marker { id: 0, position_mm: DVec3::new(7.5, 7.5, 0.0), diameter_mm: 1.0 };
     let image = marker.image(&optics).unwrap();
     let (mut moment, mut area) = (DVec2::ZERO, 0.0);

@@ -7,7 +7,7 @@
 use glam::{DMat3, DVec2, DVec3};
 use nalgebra::{Matrix2x3, Matrix2x6, Matrix3x2};
 
-use super::limit::Limit;
+use super::limit::RayLimit;
 use super::sensor::SensorOptics;
 use super::stack::{travel, travel_by_cos};
 use super::trace::SurfacePoint;
@@ -64,9 +64,9 @@ impl SensorOptics {
     /// pixel, mm/px.
     ///
     /// # Errors
-    /// As `trace`; and [`Limit::MissesDome`] where the ray is tangent to the
+    /// As `trace`; and [`RayLimit::MissesDome`] where the ray is tangent to the
     /// dome and no derivative exists.
-    pub fn trace_with_jacobian(&self, pixel: DVec2) -> Result<(SurfacePoint, Matrix3x2<f64>), Limit> {
+    pub fn trace_with_jacobian(&self, pixel: DVec2) -> Result<(SurfacePoint, Matrix3x2<f64>), RayLimit> {
         let (ray, ray_by_pixel) = self.lens.unproject_with_jacobian(pixel)?;
         let field_angle_rad = Lens::field_angle_of_unit_rad(ray);
         let hit = self.intersect_dome(ray, field_angle_rad)?;
@@ -97,7 +97,7 @@ impl SensorOptics {
         if jacobian.iter().all(|v| v.is_finite()) {
             Ok((self.surface_point(pixel, field_angle_rad, &hit), jacobian))
         } else {
-            Err(Limit::MissesDome)
+            Err(RayLimit::MissesDome)
         }
     }
 
@@ -107,7 +107,7 @@ impl SensorOptics {
     ///
     /// # Errors
     /// As `project`.
-    pub fn project_with_jacobian(&self, point_mm: DVec3) -> Result<(DVec2, Matrix2x3<f64>), Limit> {
+    pub fn project_with_jacobian(&self, point_mm: DVec3) -> Result<(DVec2, Matrix2x3<f64>), RayLimit> {
         let motion = self.project_with_motion(point_mm)?;
         Ok((motion.pixel, motion.by_point))
     }
@@ -117,7 +117,7 @@ impl SensorOptics {
     ///
     /// # Errors
     /// As `project`.
-    pub fn project_with_motion(&self, point_mm: DVec3) -> Result<PixelMotion, Limit> {
+    pub fn project_with_motion(&self, point_mm: DVec3) -> Result<PixelMotion, RayLimit> {
         let point = self.usable_point(point_mm)?;
         let (pupil, _) = self.chief_pupil(point)?;
         let sideways = DVec2::new(point.x - pupil.x, point.y - pupil.y);
@@ -179,7 +179,7 @@ impl SensorOptics {
         if pixel_by_point.iter().chain(by_pose.iter()).all(|v| v.is_finite()) {
             Ok(PixelMotion { pixel, by_point: pixel_by_point, by_pose })
         } else {
-            Err(Limit::NotConverged)
+            Err(RayLimit::NotConverged)
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::camera::LensLimit;
 
 /// Why a pixel has no surface point, or a point no pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Limit {
+pub enum RayLimit {
     /// Past the fold of the lens model.
     BeyondFold,
     /// Past the lens's field of view.
@@ -29,7 +29,7 @@ pub enum Limit {
     NotConverged,
 }
 
-impl Limit {
+impl RayLimit {
     /// The name in files.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -47,7 +47,7 @@ impl Limit {
     }
 }
 
-impl From<LensLimit> for Limit {
+impl From<LensLimit> for RayLimit {
     fn from(limit: LensLimit) -> Self {
         match limit {
             LensLimit::BeyondFold => Self::BeyondFold,
@@ -59,10 +59,10 @@ impl From<LensLimit> for Limit {
     }
 }
 
-impl std::fmt::Display for Limit {
+impl std::fmt::Display for RayLimit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.as_str())
     }
 }
 
-impl std::error::Error for Limit {}
+impl std::error::Error for RayLimit {}

@@ -6,16 +6,16 @@
 //! pole, millimetres.
 //!
 //! * [`SensorOptics::trace`]: a pixel's chief ray, by Snell's law in closed
-//!   form (the momentum along the layers is the same in all of them), to the
+//!   form (index times sine is the same in all layers), to the
 //!   dome.
 //! * [`SensorOptics::project`]: a point on the dome, inside it, or on the
 //!   sheet's top, to its pixel. The unknown is the tangent of the ray in the
 //!   layer of lowest index; the sideways reach is a rising, concave function of
-//!   it, so Newton's method from below climbs to the one solution without ever
+//!   it, so Newton's method from below converges to the one solution without ever
 //!   passing it.
 //!
 //! A point is seen only if its chief ray lies in the domain of the lens. Every
-//! way in which there is no answer has its name ([`Limit`]).
+//! way in which there is no answer has its name ([`RayLimit`]).
 
 mod jacobian;
 mod limit;
@@ -27,10 +27,10 @@ mod trace;
 mod tube;
 
 pub use jacobian::PixelMotion;
-pub use limit::Limit;
+pub use limit::RayLimit;
 pub use project::SolvedPixel;
 pub use sensor::SensorOptics;
-pub use spec::{Channel, Layer, OpticsError, OpticsSpec};
+pub use spec::{ColorChannel, FlatLayer, OpticsError, OpticsSpec};
 pub use trace::SurfacePoint;
 pub use tube::LightTube;
 

@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::limit::Limit;
+use super::limit::RayLimit;
 use super::sensor::SensorOptics;
-use super::stack::{LayerPath, MAX_CLIMB_STEPS, Plate};
+use super::stack::{LayerPath, MAX_NEWTON_STEPS, Plate};
 use crate::camera::Lens;
 use crate::numeric::batch::fill;
 use crate::numeric::{LengthMismatch, MAX_ITERATIONS, RootError, bracketed_newton};
@@ -18,11 +18,11 @@ const ON_DOME_TOLERANCE: f64 = 1e-6;
 pub struct SolvedPixel {
     /// The pixel.
     pub pixel: DVec2,
-    /// Newton steps of the climb through the layers, at most
-    /// [`SensorOptics::MAX_CLIMB_ITERATIONS`].
-    pub climb_iterations: u32,
+    /// Newton steps for the ray through the layers, at most
+    /// [`SensorOptics::MAX_NEWTON_ITERATIONS`].
+    pub newton_iterations: u32,
     /// Steps to the place of the entrance pupil, at most
-    /// [`SensorOptics::MAX_PUPIL_ITERATIONS`]; each is a climb of its own. Zero
+    /// [`SensorOptics::MAX_PUPIL_ITERATIONS`]; each solves for a ray of its own. Zero
     /// for a central lens.
     pub pupil_iterations: u32,
     /// By how much the ray misses the point, in millimetres along the sheet.
@@ -36,7 +36,7 @@ impl SensorOptics {
     ///
     /// # Errors
     /// The limit that the point is past.
-    pub fn project(&self, point_mm: DVec3) -> Result<DVec2, Limit> {
+    pub fn project(&self, point_mm: DVec3) -> Result<DVec2, RayLimit> {
         Ok(self.lens.project(self.chief_ray(point_mm)?)?)
     }
 
@@ -44,32 +44,32 @@ impl SensorOptics {
     /// the point, also where it bulges past the undeformed dome.
     ///
     /// # Errors
-    /// As `project`, but never [`Limit::OutsideDome`].
-    pub fn project_deformed(&self, point_mm: DVec3) -> Result<DVec2, Limit> {
+    /// As `project`, but never [`RayLimit::OutsideDome`].
+    pub fn project_deformed(&self, point_mm: DVec3) -> Result<DVec2, RayLimit> {
         if !point_mm.is_finite() {
-            return Err(Limit::NotFinite);
+            return Err(RayLimit::NotFinite);
         }
         let (pupil, _) = self.chief_pupil(point_mm)?;
         Ok(self.lens.project(self.central_ray(point_mm, pupil)?)?)
     }
 
-    /// No climb through the layers takes more steps.
-    pub const MAX_CLIMB_ITERATIONS: u32 = MAX_CLIMB_STEPS;
+    /// Bound on the Newton steps for the ray through the layers.
+    pub const MAX_NEWTON_ITERATIONS: u32 = MAX_NEWTON_STEPS;
 
-    /// No search for the place of the entrance pupil takes more steps.
+    /// Bound on the steps to the place of the entrance pupil.
     pub const MAX_PUPIL_ITERATIONS: u32 = MAX_ITERATIONS;
 
     /// [`SensorOptics::project`] and how it was found.
     ///
     /// # Errors
     /// As `project`.
-    pub fn project_solved(&self, point_mm: DVec3) -> Result<SolvedPixel, Limit> {
+    pub fn project_solved(&self, point_mm: DVec3) -> Result<SolvedPixel, RayLimit> {
         let point = self.usable_point(point_mm)?;
         let (pupil, pupil_iterations) = self.chief_pupil(point)?;
         let pixel = self.lens.project(self.central_ray(point, pupil)?)?;
         let reach_mm = DVec2::new(point.x - pupil.x, point.y - pupil.y).length();
-        let (climb_iterations, residual_mm) = self.path(point, pupil)?.climb_record(reach_mm)?;
-        Ok(SolvedPixel { pixel, climb_iterations, pupil_iterations, residual_mm })
+        let (newton_iterations, residual_mm) = self.path(point, pupil)?.steps_and_residual(reach_mm)?;
+        Ok(SolvedPixel { pixel, newton_iterations, pupil_iterations, residual_mm })
     }
 
     /// [`SensorOptics::project`] for each point.
@@ -79,13 +79,13 @@ impl SensorOptics {
     pub fn project_all(
         &self,
         points_mm: &[DVec3],
-        pixels: &mut [Result<DVec2, Limit>],
+        pixels: &mut [Result<DVec2, RayLimit>],
     ) -> Result<(), LengthMismatch> {
         fill(points_mm, pixels, |&point| self.project(point))
     }
 
     /// Direction in air, camera frame, of the ray through a point.
-    fn chief_ray(&self, point_mm: DVec3) -> Result<DVec3, Limit> {
+    fn chief_ray(&self, point_mm: DVec3) -> Result<DVec3, RayLimit> {
         let point = self.usable_point(point_mm)?;
         let (pupil, _) = self.chief_pupil(point)?;
         self.central_ray(point, pupil)
@@ -93,7 +93,7 @@ impl SensorOptics {
 
     /// The entrance pupil of the ray through a usable point, sensor frame, and
     /// the steps that it took.
-    pub(super) fn chief_pupil(&self, point: DVec3) -> Result<(DVec3, u32), Limit> {
+    pub(super) fn chief_pupil(&self, point: DVec3) -> Result<(DVec3, u32), RayLimit> {
         if self.lens.is_central() {
             return Ok((self.sensor_from_camera.translation_mm, 0));
         }
@@ -109,13 +109,13 @@ impl SensorOptics {
             let mismatch = |theta: f64| (seen(theta) - theta, -1.0);
             let root =
                 bracketed_newton(mismatch, 0.0, end, seen(0.0).min(end)).map_err(|error| match error {
-                    RootError::NotFinite { .. } => Limit::NotFinite,
-                    _ => Limit::NotConverged,
+                    RootError::NotFinite { .. } => RayLimit::NotFinite,
+                    _ => RayLimit::NotConverged,
                 })?;
             (theta, steps) = (root.value, root.iterations);
         }
         let pupil = self.pupil_mm(shift_at(theta));
-        if pupil.z > self.bottom_mm { Err(Limit::PupilInsideSheet) } else { Ok((pupil, steps)) }
+        if pupil.z > self.bottom_mm { Err(RayLimit::PupilInsideSheet) } else { Ok((pupil, steps)) }
     }
 
     /// Field angle at which a point is seen from a shifted pupil. A pupil that
@@ -131,9 +131,9 @@ impl SensorOptics {
         Lens::field_angle_rad(ray)
     }
 
-    pub(super) fn usable_point(&self, point: DVec3) -> Result<DVec3, Limit> {
+    pub(super) fn usable_point(&self, point: DVec3) -> Result<DVec3, RayLimit> {
         if !point.is_finite() {
-            return Err(Limit::NotFinite);
+            return Err(RayLimit::NotFinite);
         }
         let slack = ON_DOME_TOLERANCE * self.dome_radius_mm;
         // Above the top, one has to be in the dome.
@@ -142,14 +142,14 @@ impl SensorOptics {
         } else if point.z <= slack {
             Ok(DVec3::new(point.x, point.y, 0.0))
         } else {
-            Err(Limit::OutsideDome)
+            Err(RayLimit::OutsideDome)
         }
     }
 
     /// The layers between a pupil and a point.
-    pub(super) fn path(&self, point: DVec3, pupil: DVec3) -> Result<LayerPath<'_>, Limit> {
+    pub(super) fn path(&self, point: DVec3, pupil: DVec3) -> Result<LayerPath<'_>, RayLimit> {
         if point.z <= pupil.z {
-            return Err(Limit::BehindCamera);
+            return Err(RayLimit::BehindCamera);
         }
         Ok(LayerPath {
             air_mm: self.bottom_mm.min(point.z) - pupil.z,
@@ -160,7 +160,7 @@ impl SensorOptics {
     }
 
     /// Direction in air, camera frame, of the ray from a point to a pupil.
-    fn central_ray(&self, point: DVec3, pupil: DVec3) -> Result<DVec3, Limit> {
+    fn central_ray(&self, point: DVec3, pupil: DVec3) -> Result<DVec3, RayLimit> {
         let sideways = DVec2::new(point.x - pupil.x, point.y - pupil.y);
         let per_mm = self.path(point, pupil)?.tangent_per_mm(sideways.length())?;
         let tangent = sideways * per_mm;

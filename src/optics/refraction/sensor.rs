@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::spec::{Channel, Layer, OpticsError, OpticsSpec};
+use super::spec::{ColorChannel, FlatLayer, OpticsError, OpticsSpec};
 use super::stack::Plate;
 use crate::camera::Lens;
 use crate::numeric::Rigid;
@@ -13,10 +13,10 @@ use crate::numeric::Rigid;
 #[derive(Debug, Clone)]
 pub struct SensorOptics {
     pub(super) lens: Arc<Lens>,
-    channel: Channel,
+    channel: ColorChannel,
     pub(super) rest_from_camera: Rigid,
     pub(super) sensor_from_camera: Rigid,
-    layers: Vec<Layer>,
+    layers: Vec<FlatLayer>,
     pub(super) plates: Vec<Plate>,
     pub(super) fill: Plate,
     pub(super) bottom_mm: f64,
@@ -49,13 +49,13 @@ impl SensorOptics {
     fn assemble(spec: &OpticsSpec, lens: Arc<Lens>) -> Result<Self, OpticsError> {
         let sheet = &spec.layers[..spec.layers.len() - 1];
         let bottom_mm = -sheet.iter().filter_map(|l| l.thickness_mm).sum::<f64>();
-        let air = Layer { name: "air".to_owned(), index: [1.0; 3], thickness_mm: None };
+        let air = FlatLayer { name: "air".to_owned(), index: [1.0; 3], thickness_mm: None };
         let mut layers = vec![air];
         layers.extend_from_slice(&spec.layers);
         let rest_from_camera = spec.sensor_from_camera.orthonormalized();
         let optics = Self {
             lens,
-            channel: Channel::Green,
+            channel: ColorChannel::Green,
             rest_from_camera,
             sensor_from_camera: rest_from_camera,
             layers,
@@ -64,7 +64,7 @@ impl SensorOptics {
             bottom_mm,
             dome_radius_mm: spec.dome_radius_mm,
         };
-        let mut optics = optics.for_channel(Channel::Green);
+        let mut optics = optics.for_channel(ColorChannel::Green);
         optics.place(rest_from_camera)?;
         Ok(optics)
     }
@@ -113,7 +113,7 @@ impl SensorOptics {
     }
 
     /// The same sensor as another colour channel sees it.
-    pub fn for_channel(&self, channel: Channel) -> Self {
+    pub fn for_channel(&self, channel: ColorChannel) -> Self {
         let mut other = self.clone();
         other.channel = channel;
         let last = self.layers.len() - 1;
@@ -126,7 +126,7 @@ impl SensorOptics {
     }
 
     /// The channel that the indices are for.
-    pub fn channel(&self) -> Channel {
+    pub fn channel(&self) -> ColorChannel {
         self.channel
     }
 
@@ -164,7 +164,7 @@ impl SensorOptics {
 
     /// All layers from the camera outwards, the air first with its present
     /// thickness, the medium of the dome last.
-    pub fn layers(&self) -> &[Layer] {
+    pub fn layers(&self) -> &[FlatLayer] {
         &self.layers
     }
 

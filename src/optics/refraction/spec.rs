@@ -5,24 +5,24 @@ use crate::numeric::Rigid;
 
 /// Colour channel of the camera; an index of refraction belongs to each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Channel {
-    /// Index 0 of [`Layer::index`].
+pub enum ColorChannel {
+    /// Index 0 of [`FlatLayer::index`].
     Red,
-    /// Index 1 of [`Layer::index`]; the reference.
+    /// Index 1 of [`FlatLayer::index`]; the reference.
     #[default]
     Green,
-    /// Index 2 of [`Layer::index`].
+    /// Index 2 of [`FlatLayer::index`].
     Blue,
 }
 
-impl Channel {
-    /// All channels, in the order of [`Layer::index`].
+impl ColorChannel {
+    /// All channels, in the order of [`FlatLayer::index`].
     pub const ALL: [Self; 3] = [Self::Red, Self::Green, Self::Blue];
 }
 
 /// A flat layer of clear material.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Layer {
+pub struct FlatLayer {
     /// What it is called.
     pub name: String,
     /// Index of refraction against air for red, green and blue, at least 1.
@@ -32,9 +32,9 @@ pub struct Layer {
     pub thickness_mm: Option<f64>,
 }
 
-impl Layer {
+impl FlatLayer {
     /// The index for one channel.
-    pub fn index_for(&self, channel: Channel) -> f64 {
+    pub fn index_for(&self, channel: ColorChannel) -> f64 {
         self.index[channel as usize]
     }
 }
@@ -49,7 +49,7 @@ pub struct OpticsSpec {
     pub sensor_from_camera: Rigid,
     /// From the camera outwards, without the air; the last one fills the dome
     /// and has no thickness of its own, all others have one.
-    pub layers: Vec<Layer>,
+    pub layers: Vec<FlatLayer>,
     /// Radius of the dome's outer face in millimetres.
     pub dome_radius_mm: f64,
 }

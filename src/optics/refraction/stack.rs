@@ -1,10 +1,10 @@
 //! Flat layers between the pupil and a height, and the ray through them.
 
-use super::limit::Limit;
+use super::limit::RayLimit;
 
-/// Newton steps of the climb to a point. Observed in millions of random stacks:
+/// Most Newton steps for the ray to a point. Observed in millions of random stacks:
 /// at most 14; each step past the first few doubles the digits.
-pub(super) const MAX_CLIMB_STEPS: u32 = 24;
+pub(super) const MAX_NEWTON_STEPS: u32 = 24;
 
 /// A flat layer for one channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,9 +37,9 @@ pub(super) struct LayerPath<'a> {
     pub fill: Plate,
 }
 
-/// Where a climb ended.
+/// The tangent of a ray, with the reach and its derivative there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Climbed {
+pub(super) struct SolvedTangent {
     /// The lowest index in the way, whose layer the tangent is for.
     pub index: f64,
     /// Tangent there.
@@ -108,35 +108,35 @@ impl LayerPath<'_> {
     }
 
     /// Lowest index in the way.
-    fn lowest_index(&self) -> Result<f64, Limit> {
+    fn lowest_index(&self) -> Result<f64, RayLimit> {
         if self.air_mm > 0.0 {
             return Ok(1.0);
         }
         let mut lowest = f64::INFINITY;
         self.for_each(|n, _| lowest = lowest.min(n));
-        if lowest.is_finite() { Ok(lowest) } else { Err(Limit::Unreachable) }
+        if lowest.is_finite() { Ok(lowest) } else { Err(RayLimit::Unreachable) }
     }
 
-    /// The climb: tangent in the layer of index `n0` whose reach is `reach_mm`.
+    /// Tangent in the layer of index `n0` whose reach is `reach_mm`.
     ///
     /// `X` rises and is concave, so each Newton step from below ends below.
-    fn climb(&self, n0: f64, reach_mm: f64) -> Result<f64, Limit> {
-        Ok(self.climb_counted(n0, reach_mm)?.0)
+    fn tangent(&self, n0: f64, reach_mm: f64) -> Result<f64, RayLimit> {
+        Ok(self.tangent_with_steps(n0, reach_mm)?.0)
     }
 
-    /// [`LayerPath::climb`] and the steps that it took.
-    fn climb_counted(&self, n0: f64, reach_mm: f64) -> Result<(f64, u32), Limit> {
+    /// [`LayerPath::tangent`] and the steps that it took.
+    fn tangent_with_steps(&self, n0: f64, reach_mm: f64) -> Result<(f64, u32), RayLimit> {
         let (at_axis, _) = self.reach(n0, 0.0);
         // X(t) <= t X'(0): a lower bound of the solution.
-        self.climb_above(n0, reach_mm, reach_mm / at_axis)
+        self.tangent_from_below(n0, reach_mm, reach_mm / at_axis)
     }
 
-    /// The climb from `t`, which must not lie above the solution, and its steps.
-    fn climb_above(&self, n0: f64, reach_mm: f64, mut t: f64) -> Result<(f64, u32), Limit> {
+    /// Newton's method from `t`, which must not be above the solution: the tangent and the steps.
+    fn tangent_from_below(&self, n0: f64, reach_mm: f64, mut t: f64) -> Result<(f64, u32), RayLimit> {
         if t == 0.0 {
             return Ok((0.0, 0));
         }
-        for steps in 1..=MAX_CLIMB_STEPS {
+        for steps in 1..=MAX_NEWTON_STEPS {
             let (by_t, slope) = self.reach(n0, t);
             let step = (reach_mm - by_t * t) / slope;
             t += step;
@@ -147,21 +147,21 @@ impl LayerPath<'_> {
                 return Ok((t, steps));
             }
         }
-        Err(Limit::NotConverged)
+        Err(RayLimit::NotConverged)
     }
 
     /// Tangent in air of the ray with this reach, per millimetre of reach.
-    pub fn tangent_per_mm(&self, reach_mm: f64) -> Result<f64, Limit> {
+    pub fn tangent_per_mm(&self, reach_mm: f64) -> Result<f64, RayLimit> {
         let n0 = self.lowest_index()?;
-        let t = self.climb(n0, reach_mm)?;
+        let t = self.tangent(n0, reach_mm)?;
         finite(in_air(n0, t)?.0 / self.reach_by(n0, t, reach_mm))
     }
 
-    /// The climb from a neighbour's tangent, with what a tube of light needs of its end.
+    /// The tangent from that of a neighbour, with what a tube of light needs.
     ///
-    /// The tangent line of a concave function lies above it, so one Newton step from anywhere, be it above the
-    /// solution, ends below; from there the climb is the usual one.
-    pub fn climb_from(&self, reach_mm: f64, near_tangent: f64) -> Result<Climbed, Limit> {
+    /// The tangent line of a concave function lies above it, so one Newton step from anywhere, even above the
+    /// solution, ends below; the next steps rise to it.
+    pub fn tangent_from_neighbor(&self, reach_mm: f64, near_tangent: f64) -> Result<SolvedTangent, RayLimit> {
         let index = self.lowest_index()?;
         let (at_axis, _) = self.reach(index, 0.0);
         let lowest = reach_mm / at_axis;
@@ -170,16 +170,15 @@ impl LayerPath<'_> {
             let (by_t, slope) = self.reach(index, near_tangent);
             start = (near_tangent + (reach_mm - by_t * near_tangent) / slope).max(lowest);
         }
-        let (tangent, _) = self.climb_above(index, reach_mm, start)?;
+        let (tangent, _) = self.tangent_from_below(index, reach_mm, start)?;
         let (reach_per_tangent, slope) = self.reach(index, tangent);
-        Ok(Climbed { index, tangent, reach_per_tangent, slope })
+        Ok(SolvedTangent { index, tangent, reach_per_tangent, slope })
     }
 
-    /// Steps of the climb to this reach, and by how much the reach is missed, in
-    /// millimetres.
-    pub fn climb_record(&self, reach_mm: f64) -> Result<(u32, f64), Limit> {
+    /// Newton steps for this reach, and the residual of the reach, in millimetres.
+    pub fn steps_and_residual(&self, reach_mm: f64) -> Result<(u32, f64), RayLimit> {
         let n0 = self.lowest_index()?;
-        let (t, steps) = self.climb_counted(n0, reach_mm)?;
+        let (t, steps) = self.tangent_with_steps(n0, reach_mm)?;
         Ok((steps, (self.reach(n0, t).0 * t - reach_mm).abs()))
     }
 
@@ -189,9 +188,9 @@ impl LayerPath<'_> {
     }
 
     /// [`LayerPath::tangent_per_mm`] with derivatives.
-    pub fn air_ray(&self, reach_mm: f64) -> Result<AirRay, Limit> {
+    pub fn air_ray(&self, reach_mm: f64) -> Result<AirRay, RayLimit> {
         let n0 = self.lowest_index()?;
-        let t = self.climb(n0, reach_mm)?;
+        let t = self.tangent(n0, reach_mm)?;
         let (scale, slope) = in_air(n0, t)?;
         let (_, reach_slope) = self.reach(n0, t);
         let tangent_in = |n: f64| n0 * t / (n * n + (n - n0) * (n + n0) * (t * t)).sqrt();
@@ -214,13 +213,13 @@ impl LayerPath<'_> {
 /// From the tangent `t` in index `n0` to the tangent in air: the factor, and
 /// the derivative. The sine in air is `n0 sin`, and
 /// `1 - n0^2 sin^2 = (1 - (n0^2 - 1) t^2) / (1 + t^2)`.
-fn in_air(n0: f64, t: f64) -> Result<(f64, f64), Limit> {
+fn in_air(n0: f64, t: f64) -> Result<(f64, f64), RayLimit> {
     if n0 == 1.0 {
         return Ok((1.0, 1.0));
     }
     let left = 1.0 - (n0 - 1.0) * (n0 + 1.0) * t * t;
     if left <= 0.0 {
-        return Err(Limit::TotalInternalReflection);
+        return Err(RayLimit::TotalInternalReflection);
     }
     let root = left.sqrt();
     Ok((n0 / root, n0 / (root * left)))
@@ -228,12 +227,12 @@ fn in_air(n0: f64, t: f64) -> Result<(f64, f64), Limit> {
 
 /// A value that overflowed belongs to a ray along the layers, which no point
 /// at a finite distance has.
-fn finite(value: f64) -> Result<f64, Limit> {
-    if value.is_finite() { Ok(value) } else { Err(Limit::Unreachable) }
+fn finite(value: f64) -> Result<f64, RayLimit> {
+    if value.is_finite() { Ok(value) } else { Err(RayLimit::Unreachable) }
 }
 
-/// Sideways travel of a ray through whole plates, per unit of its momentum
-/// along them (the sine in air); `cos` is the cosine in air.
+/// Sideways travel of a ray through whole plates, per unit of its sine
+/// in air; `cos` is the cosine in air.
 #[inline]
 pub(super) fn travel(plates: &[Plate], cos: f64) -> f64 {
     let square = cos * cos;

@@ -1,11 +1,11 @@
 use super::*;
-use crate::camera::{LensSpec, Model};
+use crate::camera::{LensModel, LensSpec};
 use crate::numeric::Rigid;
 use glam::{DMat3, DVec2, DVec3};
 
-fn spec(model: Model, distortion: &[f64]) -> OpticsSpec {
+fn spec(model: LensModel, distortion: &[f64]) -> OpticsSpec {
     let layer =
-        |name: &str, index: [f64; 3], thickness_mm| Layer { name: name.to_owned(), index, thickness_mm };
+        |name: &str, index: [f64; 3], thickness_mm| FlatLayer { name: name.to_owned(), index, thickness_mm };
     OpticsSpec {
         lens: LensSpec {
             model,
@@ -29,12 +29,12 @@ const BROWN: [f64; 5] = [-0.2917, 0.0878, 0.0, 0.0, -0.01156];
 
 fn lenses() -> Vec<OpticsSpec> {
     vec![
-        spec(Model::Pinhole, &[]),
-        spec(Model::BrownConrady, &BROWN),
-        spec(Model::BrownConrady, &[-0.2917, 0.0878, 1e-3, -5e-4, -0.01156]),
-        spec(Model::BrownConrady, &[0.8, 0.1, 1e-4, 2e-4, 0.003, 1.1, 0.25, 0.01]),
-        spec(Model::KannalaBrandt, &[0.0; 4]),
-        spec(Model::KannalaBrandt, &[-0.01, 0.002, -0.001, 0.0001]),
+        spec(LensModel::Pinhole, &[]),
+        spec(LensModel::BrownConrady, &BROWN),
+        spec(LensModel::BrownConrady, &[-0.2917, 0.0878, 1e-3, -5e-4, -0.01156]),
+        spec(LensModel::BrownConrady, &[0.8, 0.1, 1e-4, 2e-4, 0.003, 1.1, 0.25, 0.01]),
+        spec(LensModel::KannalaBrandt, &[0.0; 4]),
+        spec(LensModel::KannalaBrandt, &[-0.01, 0.002, -0.001, 0.0001]),
     ]
 }
 
@@ -63,7 +63,7 @@ fn pixel_to_dome_and_back() {
     for spec in lenses() {
         let optics = SensorOptics::new(&spec).unwrap();
         assert!(round_trips(&optics) > 200, "{:?}", spec.lens);
-        for channel in Channel::ALL {
+        for channel in ColorChannel::ALL {
             round_trips(&optics.for_channel(channel));
         }
     }
@@ -108,7 +108,7 @@ fn no_refraction_is_a_straight_line() {
 #[test]
 fn snell_holds_by_hand() {
     // 30 degrees in air, 9 mm of air and 1 mm of acrylic.
-    let optics = SensorOptics::new(&spec(Model::Pinhole, &[])).unwrap();
+    let optics = SensorOptics::new(&spec(LensModel::Pinhole, &[])).unwrap();
     let half = 0.5_f64;
     let x = 9.0 * half.asin().tan() + (half / 1.491).asin().tan();
     let pixel = optics.project(DVec3::new(x, 0.0, 0.0)).unwrap();
@@ -122,17 +122,17 @@ fn snell_holds_by_hand() {
 
 #[test]
 fn white_markers_beside_the_dome_are_seen() {
-    let optics = SensorOptics::new(&spec(Model::BrownConrady, &BROWN)).unwrap();
+    let optics = SensorOptics::new(&spec(LensModel::BrownConrady, &BROWN)).unwrap();
     let pixel = optics.project(DVec3::new(7.5, 7.5, 0.0)).unwrap();
     assert!(pixel.is_finite());
     // The same pixel's ray leaves the sheet outside the dome.
-    assert_eq!(optics.trace(pixel), Err(Limit::MissesDome));
-    assert_eq!(optics.project(DVec3::new(7.5, 7.5, 0.1)), Err(Limit::OutsideDome));
+    assert_eq!(optics.trace(pixel), Err(RayLimit::MissesDome));
+    assert_eq!(optics.project(DVec3::new(7.5, 7.5, 0.1)), Err(RayLimit::OutsideDome));
 }
 
 #[test]
 fn the_rim_is_reached_from_both_sides() {
-    let optics = SensorOptics::new(&spec(Model::BrownConrady, &BROWN)).unwrap();
+    let optics = SensorOptics::new(&spec(LensModel::BrownConrady, &BROWN)).unwrap();
     for k in 0..360 {
         let (sin, cos) = f64::from(k).to_radians().sin_cos();
         let rim = DVec3::new(10.0 * cos, 10.0 * sin, 0.0);
@@ -144,7 +144,7 @@ fn the_rim_is_reached_from_both_sides() {
 
 #[test]
 fn the_axis_is_exact() {
-    let optics = SensorOptics::new(&spec(Model::KannalaBrandt, &[0.1, 0.0, 0.0, 0.0])).unwrap();
+    let optics = SensorOptics::new(&spec(LensModel::KannalaBrandt, &[0.1, 0.0, 0.0, 0.0])).unwrap();
     let hit = optics.trace(DVec2::new(319.5, 239.5)).unwrap();
     assert_eq!(hit.surface_mm, DVec3::new(0.0, 0.0, 10.0));
     assert_eq!(hit.field_angle_rad, 0.0);
@@ -153,7 +153,7 @@ fn the_axis_is_exact() {
 
 #[test]
 fn limits_have_their_names() {
-    let optics = SensorOptics::new(&spec(Model::BrownConrady, &BROWN)).unwrap();
+    let optics = SensorOptics::new(&spec(LensModel::BrownConrady, &BROWN)).unwrap();
     let of = |u: f64, v: f64| optics.trace(DVec2::new(u, v)).unwrap_err().as_str();
     assert_eq!(of(-400.0, 0.0), "beyond_fold");
     assert_eq!(of(f64::NAN, 0.0), "not_finite");
@@ -166,21 +166,21 @@ fn limits_have_their_names() {
     assert_eq!(of(f64::NAN, 0.0, 0.0), "not_finite");
     let touching = OpticsSpec {
         sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -1.0)),
-        ..spec(Model::Pinhole, &[])
+        ..spec(LensModel::Pinhole, &[])
     };
     let touching = SensorOptics::new(&touching).unwrap();
     assert_eq!(touching.air_gap_mm(), 0.0);
-    assert_eq!(touching.project(DVec3::new(5.0, 0.0, 0.0)), Err(Limit::TotalInternalReflection));
+    assert_eq!(touching.project(DVec3::new(5.0, 0.0, 0.0)), Err(RayLimit::TotalInternalReflection));
     assert!(touching.project(DVec3::new(0.5, 0.0, 0.0)).is_ok());
 }
 
 #[test]
 fn a_pupil_in_the_sheet_is_refused() {
-    let mut bad = spec(Model::Pinhole, &[]);
+    let mut bad = spec(LensModel::Pinhole, &[]);
     bad.sensor_from_camera.translation_mm.z = -0.5;
     let error = SensorOptics::new(&bad).unwrap_err();
     assert_eq!(error.field, "camera.position_mm[2]");
-    let optics = SensorOptics::new(&spec(Model::Pinhole, &[])).unwrap();
+    let optics = SensorOptics::new(&spec(LensModel::Pinhole, &[])).unwrap();
     assert!((optics.air_gap_mm() - 9.0).abs() < 1e-15);
     let down = |z: f64| Rigid::from_translation(DVec3::new(0.0, 0.0, z));
     assert!((optics.at_pose(&down(-2.0)).unwrap().air_gap_mm() - 7.0).abs() < 1e-14);
@@ -319,12 +319,12 @@ proptest::proptest! {
         azimuth in -3.2..3.2f64,
         height in 0.0..1.0f64,
     ) {
-        let mut spec = spec(Model::KannalaBrandt, &[0.0; 4]);
+        let mut spec = spec(LensModel::KannalaBrandt, &[0.0; 4]);
         spec.lens.field_of_view_rad = 179_f64.to_radians();
         spec.layers = indices
             .iter()
             .enumerate()
-            .map(|(i, &n)| Layer {
+            .map(|(i, &n)| FlatLayer {
                 name: i.to_string(),
                 index: [n; 3],
                 thickness_mm: (i + 1 < indices.len()).then_some(thickness),

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::limit::Limit;
+use super::limit::RayLimit;
 use super::sensor::SensorOptics;
 use super::stack::travel;
 use crate::camera::Lens;
@@ -49,12 +49,12 @@ impl SensorOptics {
     ///
     /// # Errors
     /// The limit that the pixel is past.
-    pub fn trace(&self, pixel: DVec2) -> Result<SurfacePoint, Limit> {
+    pub fn trace(&self, pixel: DVec2) -> Result<SurfacePoint, RayLimit> {
         self.trace_ray(pixel, self.lens.unproject(pixel)?)
     }
 
     #[inline]
-    fn trace_ray(&self, pixel: DVec2, ray: DVec3) -> Result<SurfacePoint, Limit> {
+    fn trace_ray(&self, pixel: DVec2, ray: DVec3) -> Result<SurfacePoint, RayLimit> {
         let field_angle_rad = Lens::field_angle_of_unit_rad(ray);
         let hit = self.intersect_dome(ray, field_angle_rad)?;
         Ok(self.surface_point(pixel, field_angle_rad, &hit))
@@ -67,7 +67,7 @@ impl SensorOptics {
     /// # Errors
     /// As `trace`, less the rays that pass the base but not the sphere.
     #[inline]
-    pub fn trace_continued(&self, pixel: DVec2) -> Result<(DVec3, DVec3), Limit> {
+    pub fn trace_continued(&self, pixel: DVec2) -> Result<(DVec3, DVec3), RayLimit> {
         self.follow_continued(self.lens.unproject(pixel)?)
     }
 
@@ -77,7 +77,7 @@ impl SensorOptics {
     /// # Errors
     /// As `trace_continued`, less the lens's.
     #[inline]
-    pub fn follow_continued(&self, ray: DVec3) -> Result<(DVec3, DVec3), Limit> {
+    pub fn follow_continued(&self, ray: DVec3) -> Result<(DVec3, DVec3), RayLimit> {
         // Only a pupil that moves asks for the angle.
         let field_angle_rad = if self.lens.is_central() { 0.0 } else { Lens::field_angle_rad(ray) };
         let (hit, _) = self.intersect_sphere(ray, field_angle_rad)?;
@@ -95,17 +95,17 @@ impl SensorOptics {
 
     /// A ray of the camera, through the layers and on to the dome.
     #[inline]
-    pub(super) fn intersect_dome(&self, ray: DVec3, field_angle_rad: f64) -> Result<RayHit, Limit> {
+    pub(super) fn intersect_dome(&self, ray: DVec3, field_angle_rad: f64) -> Result<RayHit, RayLimit> {
         match self.intersect_sphere(ray, field_angle_rad)? {
             (hit, false) => Ok(hit),
-            (_, true) => Err(Limit::MissesDome),
+            (_, true) => Err(RayLimit::MissesDome),
         }
     }
 
     /// [`Self::intersect_dome`]; a ray that comes up beside the dome's base is followed back to the sphere below, and
     /// the second value is then true.
     #[inline]
-    fn intersect_sphere(&self, ray: DVec3, field_angle_rad: f64) -> Result<(RayHit, bool), Limit> {
+    fn intersect_sphere(&self, ray: DVec3, field_angle_rad: f64) -> Result<(RayHit, bool), RayLimit> {
         let direction = self.sensor_from_camera.vector(ray);
         let origin = if self.lens.is_central() {
             self.sensor_from_camera.translation_mm
@@ -114,10 +114,10 @@ impl SensorOptics {
         };
         let gap_mm = self.bottom_mm - origin.z;
         if gap_mm < 0.0 {
-            return Err(Limit::PupilInsideSheet);
+            return Err(RayLimit::PupilInsideSheet);
         }
         if direction.z <= 0.0 {
-            return Err(Limit::MissesDome);
+            return Err(RayLimit::MissesDome);
         }
         let p = DVec2::new(direction.x, direction.y);
         let base =
@@ -126,7 +126,7 @@ impl SensorOptics {
         let distance = base.length();
         // From a ray so grazing that its travel overflowed.
         if !distance.is_finite() {
-            return Err(Limit::MissesDome);
+            return Err(RayLimit::MissesDome);
         }
         let beside = distance > radius * (1.0 + RIM_ROUNDING);
         let n = self.fill.index;
@@ -138,7 +138,7 @@ impl SensorOptics {
         if !beside {
             c = c.max(0.0);
         } else if b <= 0.0 || b * b + c <= 0.0 {
-            return Err(Limit::MissesDome);
+            return Err(RayLimit::MissesDome);
         }
         let root = (b * b + c).sqrt();
         // The root that does not cancel.
@@ -164,7 +164,7 @@ impl SensorOptics {
     pub fn trace_all(
         &self,
         pixels: &[DVec2],
-        hits: &mut [Result<SurfacePoint, Limit>],
+        hits: &mut [Result<SurfacePoint, RayLimit>],
     ) -> Result<(), LengthMismatch> {
         fill_runs(pixels, hits, |pixels, hits| {
             let mut rays = [Ok(DVec3::Z); TRACE_RUN];
@@ -172,7 +172,7 @@ impl SensorOptics {
                 let rays = &mut rays[..pixels.len()];
                 self.lens.unproject_run(pixels, rays);
                 for ((hit, &pixel), &ray) in hits.iter_mut().zip(pixels).zip(&*rays) {
-                    *hit = ray.map_err(Limit::from).and_then(|ray| self.trace_ray(pixel, ray));
+                    *hit = ray.map_err(RayLimit::from).and_then(|ray| self.trace_ray(pixel, ray));
                 }
             }
         })

@@ -1,5 +1,7 @@
 //! Tables of measurements: comma-separated, with a header.
 
+use domecast_optics::numeric::csv::{self, CsvRow};
+
 /// A table with named columns; an empty cell is a missing value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
@@ -39,26 +41,19 @@ impl Table {
     /// # Errors
     /// No header, a row with more cells than the header, or a column named twice.
     pub fn parse(text: &str) -> Result<Self, TableError> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let mut lines = text
-            .lines()
-            .enumerate()
-            .map(|(i, line)| (i + 1, line.trim()))
-            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-        let cells = |line: &str| line.split(',').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
+        let mut rows = csv::rows(text);
+        let cells = |cells: &[&str]| cells.iter().map(|cell| (*cell).to_owned()).collect::<Vec<_>>();
         let fault = |line, problem: &str| TableError { line, column: None, problem: problem.into() };
-        let (first, header) = lines
+        let header = rows
             .next()
             .ok_or_else(|| fault(1, "the file is empty; it starts with a line of column names"))?;
-        let columns = cells(header);
-        for (i, name) in columns.iter().enumerate() {
-            if columns[..i].contains(name) {
-                return Err(fault(first, &format!("the column \"{name}\" stands there twice")));
-            }
+        let columns = cells(&header.cells);
+        if let Some(name) = csv::repeated(&columns) {
+            return Err(fault(header.line, &format!("the column \"{name}\" stands there twice")));
         }
         let mut table = Self { columns, rows: Vec::new(), lines: Vec::new() };
-        for (line, text) in lines {
-            let mut row = cells(text);
+        for CsvRow { line, cells: found, .. } in rows {
+            let mut row = cells(&found);
             if row.len() > table.columns.len() {
                 let problem = format!("{} cells, but the header names {}", row.len(), table.columns.len());
                 return Err(fault(line, &problem));

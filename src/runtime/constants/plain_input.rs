@@ -5,7 +5,7 @@ use nalgebra::Matrix6;
 
 use super::model::StiffnessAt;
 use domecast_optics::pose::{Marker, PoseError};
-use domecast_optics::{Limit, OpticsError, SensorOptics};
+use domecast_optics::{OpticsError, RayLimit, SensorOptics};
 
 /// Why there is no fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +15,7 @@ pub enum PlainError {
         /// The marker.
         id: u32,
         /// The limit that it is past.
-        limit: Limit,
+        limit: RayLimit,
     },
     /// A load's pose puts the camera into the sheet.
     Optics(OpticsError),

@@ -4,10 +4,10 @@ use glam::{DVec2, DVec3};
 use nalgebra::Vector6;
 
 use super::plain_input::{PlainError, PlainInput};
-use domecast_optics::camera::{LensSpec, Model};
+use domecast_optics::camera::{LensModel, LensSpec};
 use domecast_optics::numeric::Rigid;
 use domecast_optics::pose::{Marker, PoseOptions, PoseSolver, Sighting};
-use domecast_optics::{Layer, Limit, OpticsSpec, SensorOptics};
+use domecast_optics::{FlatLayer, OpticsSpec, RayLimit, SensorOptics};
 use domecast_springs::Displacement;
 
 /// What the runtime sees at one pose.
@@ -32,7 +32,7 @@ impl PlainRuntimeSolver {
         let lens = input.optics.lens().spec();
         let spec = OpticsSpec {
             lens: LensSpec {
-                model: Model::Pinhole,
+                model: LensModel::Pinhole,
                 matrix: input.undistorted_matrix,
                 distortion: vec![],
                 pupil_shift_mm: vec![],
@@ -41,7 +41,7 @@ impl PlainRuntimeSolver {
                 ..lens.clone()
             },
             sensor_from_camera: *input.optics.rest_from_camera(),
-            layers: vec![Layer { name: "nothing".into(), index: [1.0; 3], thickness_mm: None }],
+            layers: vec![FlatLayer { name: "nothing".into(), index: [1.0; 3], thickness_mm: None }],
             // Nothing is above the sheet for it; apparent positions may lie there.
             dome_radius_mm: 1e3 * input.optics.dome_radius_mm(),
         };
@@ -89,7 +89,7 @@ pub(super) fn undistorted(input: &PlainInput, pose: &Rigid) -> Result<Frame, Pla
         let image = marker.image(&optics).map_err(hidden)?;
         let ray = optics.lens().unproject(image.centroid_px).map_err(|limit| hidden(limit.into()))?;
         if ray.z <= 0.0 {
-            return Err(hidden(Limit::BeyondFieldOfView));
+            return Err(hidden(RayLimit::BeyondFieldOfView));
         }
         let centroid_px = DVec2::new(fx * ray.x / ray.z + cx, fy * ray.y / ray.z + cy);
         sightings.push(Sighting { id: marker.id, centroid_px });

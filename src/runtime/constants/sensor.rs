@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use super::model::Constants;
-use domecast_optics::camera::{LensSpec, Model};
+use domecast_optics::camera::{LensModel, LensSpec};
 use domecast_optics::numeric::Rigid;
 use domecast_optics::pose::Marker;
-use domecast_optics::{Layer, OpticsSpec, SensorOptics};
+use domecast_optics::{FlatLayer, OpticsSpec, SensorOptics};
 
 impl Constants {
     /// What the optics are made from.
@@ -17,7 +17,7 @@ impl Constants {
     /// A sentence that names the field at fault.
     pub fn optics_spec(&self) -> Result<OpticsSpec, String> {
         let camera = &self.camera;
-        let model = Model::parse(&camera.model)
+        let model = LensModel::parse(&camera.model)
             .ok_or_else(|| format!("camera.model \"{}\" is not a lens model", camera.model))?;
         let camera_from_sensor = Rigid::from_rows_4x4(&camera.camera_from_sensor)
             .map_err(|error| format!("camera.camera_from_sensor: {error}"))?;
@@ -29,7 +29,7 @@ impl Constants {
             // The air gap is what the camera's place leaves.
             layers = rest;
         }
-        let layer = |l: &super::LayerConstants| Layer {
+        let layer = |l: &super::LayerConstants| FlatLayer {
             name: l.name.clone(),
             index: l.index_rgb.unwrap_or([l.index; 3]),
             thickness_mm: l.thickness_mm,

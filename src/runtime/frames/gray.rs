@@ -1,7 +1,7 @@
 //! A frame of one channel.
 
 /// Pixels that a frame may have.
-pub const MOST_PIXELS: usize = 1 << 26;
+pub const MAX_PIXELS: usize = 1 << 26;
 
 /// A frame of one channel: values from 0 (black) to 1 (the file's largest value), row by row from the top.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,7 +16,7 @@ pub struct Gray {
 pub enum FrameError {
     /// It cannot be decoded.
     NotPng(String),
-    /// It has no pixels, or more than [`MOST_PIXELS`].
+    /// It has no pixels, or more than [`MAX_PIXELS`].
     Size {
         /// Its width, px.
         width: usize,
@@ -35,7 +35,7 @@ impl std::fmt::Display for FrameError {
         match self {
             Self::NotPng(why) => write!(f, "is not a PNG picture ({why})"),
             Self::Size { width, height } => {
-                write!(f, "has {width} x {height} pixels; allowed: 1 to {MOST_PIXELS} in all")
+                write!(f, "has {width} x {height} pixels; allowed: 1 to {MAX_PIXELS} in all")
             }
             Self::Count { values } => write!(f, "has {values} values, not one for each pixel"),
         }
@@ -50,7 +50,7 @@ impl Gray {
     /// # Errors
     /// [`FrameError::Size`] or [`FrameError::Count`].
     pub fn new(width: usize, height: usize, values: Vec<f32>) -> Result<Self, FrameError> {
-        let count = width.checked_mul(height).filter(|count| (1..=MOST_PIXELS).contains(count));
+        let count = width.checked_mul(height).filter(|count| (1..=MAX_PIXELS).contains(count));
         match count {
             None => Err(FrameError::Size { width, height }),
             Some(count) if count != values.len() => Err(FrameError::Count { values: values.len() }),
@@ -65,13 +65,13 @@ impl Gray {
     /// [`FrameError`] for what is no such picture or has no sensible size.
     pub fn from_png(bytes: &[u8]) -> Result<Self, FrameError> {
         let fault = |error: png::DecodingError| FrameError::NotPng(error.to_string());
-        let limits = png::Limits { bytes: 8 * MOST_PIXELS };
+        let limits = png::Limits { bytes: 8 * MAX_PIXELS };
         let mut decoder = png::Decoder::new_with_limits(std::io::Cursor::new(bytes), limits);
         // Palettes and fewer than 8 bits become 8 bits a channel.
         decoder.set_transformations(png::Transformations::EXPAND);
         let mut reader = decoder.read_info().map_err(fault)?;
         let (width, height) = (reader.info().width as usize, reader.info().height as usize);
-        if width.checked_mul(height).is_none_or(|count| count == 0 || count > MOST_PIXELS) {
+        if width.checked_mul(height).is_none_or(|count| count == 0 || count > MAX_PIXELS) {
             return Err(FrameError::Size { width, height });
         }
         let Some(size) = reader.output_buffer_size() else { return Err(FrameError::Size { width, height }) };

@@ -11,7 +11,7 @@ mod levels;
 
 pub use blobs::{Blob, Side, blobs};
 pub use centroid::{Centroid, centroid};
-pub use gray::{FrameError, Gray, MOST_PIXELS};
+pub use gray::{FrameError, Gray, MAX_PIXELS};
 pub use levels::{Levels, local_levels};
 
 #[cfg(test)]

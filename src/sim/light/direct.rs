@@ -191,7 +191,7 @@ impl DirectLight<'_> {
         let tube = self.optics.light_tube(source, point_mm, *near).ok()?;
         *near = tube.tangent;
         let per_sr = emitter.lobe.per_sr(tube.leaving.dot(emitter.platform_from_emitter.matrix3.z_axis));
-        let passed = if self.fresnel { fresnel::through(indices, tube.momentum) } else { 1.0 };
+        let passed = if self.fresnel { fresnel::through(indices, tube.snell_invariant) } else { 1.0 };
         let flux = tube.arriving * (per_sr * passed * tube.sr_per_mm2);
         Some(Share { flux, way_mm: tube.underside_mm - source })
     }

@@ -218,5 +218,5 @@ fn mirrored(
     if down.is_empty() {
         down.push(1.0);
     }
-    (value * fresnel::returned(&down, &back, tube.momentum), tube.tangent)
+    (value * fresnel::returned(&down, &back, tube.snell_invariant), tube.tangent)
 }

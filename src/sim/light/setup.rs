@@ -2,10 +2,10 @@
 
 use glam::{DVec2, DVec3};
 
-use super::LightUse;
 use super::cavity::Cavities;
 use super::direct::Emitter;
 use super::lobe::{Diffuser, Lobe};
+use super::parts::LightUse;
 use super::tables::{Source, Ways};
 use crate::SimError;
 use crate::scene::Scene;
@@ -13,23 +13,23 @@ use domecast_design::parts;
 use domecast_design::parts::Measures;
 use domecast_design::sections::LedColor;
 use domecast_design::{Design, DesignError};
-use domecast_optics::{Channel, SensorOptics};
+use domecast_optics::{ColorChannel, SensorOptics};
 
 /// Channels of the camera.
 pub type Channels = [f64; 3];
 
 /// The colours that a light sends.
-fn colors(color: LedColor) -> &'static [Channel] {
+fn colors(color: LedColor) -> &'static [ColorChannel] {
     match color {
-        LedColor::Red => &[Channel::Red],
-        LedColor::Green => &[Channel::Green],
-        LedColor::Blue => &[Channel::Blue],
-        LedColor::White => &Channel::ALL,
+        LedColor::Red => &[ColorChannel::Red],
+        LedColor::Green => &[ColorChannel::Green],
+        LedColor::Blue => &[ColorChannel::Blue],
+        LedColor::White => &ColorChannel::ALL,
     }
 }
 
 /// How the channels see a colour of light.
-fn seen(color: Channel, crosstalk: f64) -> Channels {
+fn seen(color: ColorChannel, crosstalk: f64) -> Channels {
     std::array::from_fn(|channel| match channel.abs_diff(color as usize) {
         0 => 1.0,
         1 => crosstalk,
@@ -171,7 +171,7 @@ pub fn mean_reflectance(scene: &Scene) -> Channels {
 
 /// Layers and dome for every channel.
 pub fn channel_optics(design: &Design) -> [SensorOptics; 3] {
-    Channel::ALL.map(|channel| design.optics().for_channel(channel))
+    ColorChannel::ALL.map(|channel| design.optics().for_channel(channel))
 }
 
 /// Index of the medium that a point is seen in: the dome's, or the sheet's top layer's where `beside` it.

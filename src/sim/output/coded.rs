@@ -4,10 +4,10 @@ use std::io;
 
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 
-use crate::frame::Image8;
-use crate::render::Drawn;
+use crate::output::render::Drawn;
+use crate::output::truth::FrameTruth;
+use crate::raster::frame::Image8;
 use crate::scene::Scene;
-use crate::truth::FrameTruth;
 use crate::work::Work;
 
 /// Quality of the video's JPEGs: the PNG frames are the exact ones.
@@ -66,7 +66,7 @@ fn png_bytes(image: &Image8) -> Result<Vec<u8>, png::EncodingError> {
     Ok(bytes)
 }
 
-/// A picture as JPEG, no colour thinned out.
+/// A picture as JPEG, of its colours every other pixel each way, as videos have it.
 fn jpeg_bytes(image: &Image8) -> io::Result<Vec<u8>> {
     let side = |n: usize| {
         let long = || io::Error::new(io::ErrorKind::InvalidInput, "a JPEG side has at most 65535 pixels");
@@ -74,7 +74,7 @@ fn jpeg_bytes(image: &Image8) -> io::Result<Vec<u8>> {
     };
     let mut jpeg = Vec::with_capacity(image.bytes.len() / 8);
     let mut encoder = Encoder::new(&mut jpeg, QUALITY);
-    encoder.set_sampling_factor(SamplingFactor::F_1_1);
+    encoder.set_sampling_factor(SamplingFactor::F_2_2);
     let color = if image.channels == 3 { ColorType::Rgb } else { ColorType::Luma };
     encoder
         .encode(&image.bytes, side(image.width)?, side(image.height)?, color)

@@ -6,24 +6,27 @@ mod under_load;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::frame::Undistorted;
+use super::frame::UndistortedFrame;
 use super::*;
 use crate::spec::sections::{PatternSection, PrintSection};
-use domecast_optics::camera::{LensSpec, Model};
+use domecast_optics::camera::{LensModel, LensSpec};
 use domecast_optics::numeric::Rigid;
-use domecast_optics::{Layer, OpticsSpec, SensorOptics};
+use domecast_optics::{FlatLayer, OpticsSpec, SensorOptics};
 
-const MODELS: [Model; 3] = [Model::Pinhole, Model::BrownConrady, Model::KannalaBrandt];
+const MODELS: [LensModel; 3] = [LensModel::Pinhole, LensModel::BrownConrady, LensModel::KannalaBrandt];
 const KINDS: [&str; 4] = ["square", "hexagonal", "rings", "fill"];
 
-fn optics(model: Model, pupil_mm: DVec3, rotation: DMat3) -> SensorOptics {
+fn optics(model: LensModel, pupil_mm: DVec3, rotation: DMat3) -> SensorOptics {
     let distortion = match model {
-        Model::Pinhole => vec![],
-        Model::BrownConrady => vec![-0.2917, 0.0878, 0.0, 0.0, -0.01156],
-        Model::KannalaBrandt => vec![0.0; 4],
+        LensModel::Pinhole => vec![],
+        LensModel::BrownConrady => vec![-0.2917, 0.0878, 0.0, 0.0, -0.01156],
+        LensModel::KannalaBrandt => vec![0.0; 4],
     };
-    let layer =
-        |name: &str, index: f64, thickness_mm| Layer { name: name.into(), index: [index; 3], thickness_mm };
+    let layer = |name: &str, index: f64, thickness_mm| FlatLayer {
+        name: name.into(),
+        index: [index; 3],
+        thickness_mm,
+    };
     SensorOptics::new(&OpticsSpec {
         lens: LensSpec {
             model,
@@ -42,7 +45,7 @@ fn optics(model: Model, pupil_mm: DVec3, rotation: DMat3) -> SensorOptics {
 }
 
 /// A design's part, with the fields of `change` set in its pattern.
-fn spec(model: Model, change: serde_json::Value) -> LayoutSpec {
+fn spec(model: LensModel, change: serde_json::Value) -> LayoutSpec {
     let mut json = serde_json::json!({
         "kind": "hexagonal", "pitch_px": 16.0, "dot_diameter_px": 7.0, "polar_angle_deg": 60.0,
     });
@@ -58,7 +61,8 @@ fn spec(model: Model, change: serde_json::Value) -> LayoutSpec {
     let focal = 138.56;
     LayoutSpec {
         optics: optics(model, DVec3::new(0.0, 0.0, -10.0), DMat3::IDENTITY),
-        undistorted: Undistorted::new(&[[focal, 0.0, 319.5], [0.0, focal, 239.5], [0.0, 0.0, 1.0]]).unwrap(),
+        undistorted: UndistortedFrame::new(&[[focal, 0.0, 319.5], [0.0, focal, 239.5], [0.0, 0.0, 1.0]])
+            .unwrap(),
         mask: Some(Mask { center_px: DVec2::new(319.5, 239.5), radius_px: 240.0 }),
         white_markers: vec![],
         pattern,
@@ -118,7 +122,8 @@ fn dots_agree_with_the_optics_and_the_map() {
 
 #[test]
 fn undistorted_patterns_are_even_there_and_not_in_the_raw_image() {
-    let spec = spec(Model::KannalaBrandt, serde_json::json!({"even_in": "undistorted", "kind": "square"}));
+    let spec =
+        spec(LensModel::KannalaBrandt, serde_json::json!({"even_in": "undistorted", "kind": "square"}));
     let layout = Layout::new(&spec).unwrap();
     let lens = spec.optics.lens();
     let flat: Vec<DVec2> =
@@ -136,13 +141,14 @@ fn undistorted_patterns_are_even_there_and_not_in_the_raw_image() {
 fn rings_and_fill_keep_their_distance_up_to_the_edge() {
     for centred_on in ["dot", "gap"] {
         let rings =
-            spec(Model::KannalaBrandt, serde_json::json!({"kind": "rings", "centred_on": centred_on}));
+            spec(LensModel::KannalaBrandt, serde_json::json!({"kind": "rings", "centred_on": centred_on}));
         let rings = Layout::new(&rings).unwrap();
         let points: Vec<DVec2> = rings.dots.iter().map(|dot| dot.image_px).collect();
         for nearest in nearest_px(&points) {
             assert!((15.999..17.5).contains(&nearest), "{nearest}");
         }
-        let fill = spec(Model::KannalaBrandt, serde_json::json!({"kind": "fill", "centred_on": centred_on}));
+        let fill =
+            spec(LensModel::KannalaBrandt, serde_json::json!({"kind": "fill", "centred_on": centred_on}));
         let fill = Layout::new(&fill).unwrap();
         let points: Vec<DVec2> = fill.dots.iter().map(|dot| dot.even_px).collect();
         let nearest = nearest_px(&points);
@@ -169,7 +175,7 @@ fn wanted_numbers_are_met() {
             let change = serde_json::json!({
                 "kind": kind, "pitch_px": null, "count": wanted, "dot_diameter_px": 2.0,
             });
-            let mut spec = spec(Model::KannalaBrandt, change);
+            let mut spec = spec(LensModel::KannalaBrandt, change);
             spec.print.min_dot_mm = 0.01;
             let layout = Layout::new(&spec).unwrap();
             let off = layout.dots.len().abs_diff(wanted);
@@ -182,9 +188,9 @@ fn wanted_numbers_are_met() {
 
 #[test]
 fn a_camera_off_the_axis_still_gives_an_even_image() {
-    let mut spec = spec(Model::KannalaBrandt, serde_json::json!({"kind": "fill"}));
+    let mut spec = spec(LensModel::KannalaBrandt, serde_json::json!({"kind": "fill"}));
     let tilt = DMat3::from_rotation_x(0.05) * DMat3::from_rotation_y(-0.03);
-    spec.optics = optics(Model::KannalaBrandt, DVec3::new(0.4, -0.3, -10.0), tilt);
+    spec.optics = optics(LensModel::KannalaBrandt, DVec3::new(0.4, -0.3, -10.0), tilt);
     let layout = Layout::new(&spec).unwrap();
     assert!(layout.edge.largest_px() > layout.edge.smallest_px() + 0.2);
     assert!(layout.lost.is_empty());
@@ -197,32 +203,32 @@ fn a_camera_off_the_axis_still_gives_an_even_image() {
 }
 
 #[test]
-fn hits_are_few_and_reach_everything() {
+fn print_passes_are_few_and_reach_everything() {
     for limit_deg in [30.0, 40.0, 50.0] {
         let mut spec =
-            spec(Model::KannalaBrandt, serde_json::json!({"polar_angle_deg": 75.0, "pitch_px": 18.0}));
+            spec(LensModel::KannalaBrandt, serde_json::json!({"polar_angle_deg": 75.0, "pitch_px": 18.0}));
         spec.print.wrap_limit_deg = limit_deg;
         spec.print.min_dot_mm = 0.1;
-        spec.print.hits = crate::spec::sections::Hits::Split;
+        spec.print.hits = crate::spec::sections::PrintPasses::Split;
         spec.print.max_tilt_deg = 80.0;
         let layout = Layout::new(&spec).unwrap();
-        assert!(layout.hits.len() > 1 && layout.lost.is_empty());
-        let mut shares = vec![0; layout.hits.len()];
+        assert!(layout.passes.len() > 1 && layout.lost.is_empty());
+        let mut shares = vec![0; layout.passes.len()];
         for dot in &layout.dots {
-            shares[dot.hit] += 1;
-            let hit = &layout.hits[dot.hit];
+            shares[dot.pass] += 1;
+            let pass = &layout.passes[dot.pass];
             assert!(dot.wrap_rad < limit_deg.to_radians());
-            let on_hit = layout.transfer.dome_from_plate(dot.plate_mm).unwrap();
-            assert!((hit.hit_from_sensor.transpose() * on_hit - dot.surface_mm).length() < 1e-12);
+            let on_pass = layout.transfer.dome_from_plate(dot.plate_mm).unwrap();
+            assert!((pass.pass_from_sensor.transpose() * on_pass - dot.surface_mm).length() < 1e-12);
             // Nearer to its own stroke than to any other.
-            for other in &layout.hits {
-                let z = (other.hit_from_sensor * dot.normal).z;
+            for other in &layout.passes {
+                let z = (other.pass_from_sensor * dot.normal).z;
                 assert!(z.clamp(-1.0, 1.0).acos() >= dot.wrap_rad - 1e-12);
             }
         }
         assert!(shares.iter().all(|share| *share > 0), "{shares:?}");
         // One sector less would not reach: some point between the sectors is further than the limit from all.
-        let sectors = layout.hits.len() - 1;
+        let sectors = layout.passes.len() - 1;
         let own = 0.03;
         let reach = limit_deg.to_radians() - own;
         let reached = |count: usize, tilt: f64| {
@@ -236,11 +242,11 @@ fn hits_are_few_and_reach_everything() {
             assert!(!(0..900).any(|k| reached(sectors - 1, f64::from(k).to_radians() / 10.0)), "{sectors}");
         }
     }
-    // The stroke's axis, in the hit's frame, is its +z; the azimuth keeps its direction.
-    let hit = Hit::new(0.7, 2.0);
+    // The stroke's axis, in the pass's frame, is its +z; the azimuth keeps its direction.
+    let pass = PrintPass::new(0.7, 2.0);
     let axis = region::dome_point(1.0, 0.7, 2.0);
-    assert!((hit.hit_from_sensor * axis - DVec3::Z).length() < 1e-15);
-    let further = hit.hit_from_sensor * region::dome_point(1.0, 0.9, 2.0);
+    assert!((pass.pass_from_sensor * axis - DVec3::Z).length() < 1e-15);
+    let further = pass.pass_from_sensor * region::dome_point(1.0, 0.9, 2.0);
     assert!((further - region::dome_point(1.0, 0.2, 2.0)).length() < 1e-15);
 }
 
@@ -248,8 +254,8 @@ fn hits_are_few_and_reach_everything() {
 fn the_pinhole_alone_misses_by_what_is_known() {
     // Published for a dome of 10 mm radius, 1 mm of acrylic and the pupil 8 mm under the sheet's top: a dot laid
     // out by the pinhole alone lies 1.1, 1.6 and 1.1 mm off at 20, 40 and 50 degrees of field.
-    let mut spec = spec(Model::KannalaBrandt, serde_json::json!({"polar_angle_deg": 60.0}));
-    spec.optics = optics(Model::KannalaBrandt, DVec3::new(0.0, 0.0, -8.0), DMat3::IDENTITY);
+    let mut spec = spec(LensModel::KannalaBrandt, serde_json::json!({"polar_angle_deg": 60.0}));
+    spec.optics = optics(LensModel::KannalaBrandt, DVec3::new(0.0, 0.0, -8.0), DMat3::IDENTITY);
     let layout = Layout::new(&spec).unwrap();
     let comparison = evenness::by_pinhole(&spec, &layout).unwrap();
     assert!((1.3..1.75).contains(&comparison.max_shift_mm), "{comparison:?}");

@@ -4,11 +4,11 @@ use glam::DVec2;
 
 use super::super::*;
 use super::spec;
-use domecast_optics::camera::Model;
+use domecast_optics::camera::LensModel;
 
 #[test]
 fn equal_apparent_size_is_equal_in_the_image_and_grows_on_the_dome() {
-    let layout = Layout::new(&spec(Model::KannalaBrandt, serde_json::json!({}))).unwrap();
+    let layout = Layout::new(&spec(LensModel::KannalaBrandt, serde_json::json!({}))).unwrap();
     for dot in &layout.dots {
         // A circle's cubics enclose 1.00028 of its area in four pieces.
         assert!((dot.image_outline.equivalent_diameter() / 7.0 - 1.0).abs() < 2e-4);
@@ -23,7 +23,7 @@ fn equal_apparent_size_is_equal_in_the_image_and_grows_on_the_dome() {
 fn equal_size_on_the_dome_is_a_circle_on_the_dome() {
     let change =
         serde_json::json!({"dot_diameter_px": null, "dot_diameter_mm": 0.5, "polar_angle_deg": 45.0});
-    let layout = Layout::new(&spec(Model::KannalaBrandt, change)).unwrap();
+    let layout = Layout::new(&spec(LensModel::KannalaBrandt, change)).unwrap();
     for dot in &layout.dots {
         assert_eq!(dot.diameter_mm, 0.5);
         for corner in dot.plate_outline.polygon(8) {
@@ -43,7 +43,7 @@ fn equal_size_on_the_dome_is_a_circle_on_the_dome() {
 fn outlines_on_the_plate_follow_the_exact_curve() {
     for even_in in ["raw", "undistorted"] {
         let change = serde_json::json!({"even_in": even_in, "polar_angle_deg": 58.0, "dot_diameter_px": 6.0});
-        let spec = spec(Model::BrownConrady, change);
+        let spec = spec(LensModel::BrownConrady, change);
         let layout = Layout::new(&spec).unwrap();
         let frame = frame::EvenFrame::new(spec.optics.lens(), spec.pattern.even_in, spec.undistorted);
         for dot in &layout.dots {
@@ -71,7 +71,7 @@ fn what_a_dot_holds_does_not_grow_with_their_number() {
     let held = |count: u32| {
         let change =
             serde_json::json!({"count": count, "pitch_px": null, "dot_diameter_px": 0.5, "kind": "fill"});
-        let mut spec = spec(Model::KannalaBrandt, change);
+        let mut spec = spec(LensModel::KannalaBrandt, change);
         spec.print.min_dot_mm = 1e-4;
         spec.print.min_gap_mm = 1e-4;
         let layout = Layout::new(&spec).unwrap();

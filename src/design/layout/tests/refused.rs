@@ -4,12 +4,12 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::super::*;
 use super::{optics, spec};
-use domecast_optics::camera::Model;
+use domecast_optics::camera::LensModel;
 
 #[test]
 fn a_dot_that_the_lens_cannot_see_is_refused_by_name() {
     let mut wide =
-        spec(Model::BrownConrady, serde_json::json!({"image_radius_px": 260.0, "polar_angle_deg": null}));
+        spec(LensModel::BrownConrady, serde_json::json!({"image_radius_px": 260.0, "polar_angle_deg": null}));
     wide.mask = None;
     let error = Layout::new(&wide).unwrap_err();
     assert_eq!(error.field, "pattern.unseen");
@@ -24,8 +24,8 @@ fn a_dot_that_the_lens_cannot_see_is_refused_by_name() {
         assert_eq!(dot.id, id);
     }
     // A parallel that the lens does not reach is an error of the field that asks for it.
-    let mut narrow = spec(Model::BrownConrady, serde_json::json!({"polar_angle_deg": 80.0}));
-    narrow.optics = optics(Model::BrownConrady, DVec3::new(0.0, 0.0, -3.0), DMat3::IDENTITY);
+    let mut narrow = spec(LensModel::BrownConrady, serde_json::json!({"polar_angle_deg": 80.0}));
+    narrow.optics = optics(LensModel::BrownConrady, DVec3::new(0.0, 0.0, -3.0), DMat3::IDENTITY);
     let error = Layout::new(&narrow).unwrap_err();
     assert_eq!(error.field, "pattern.polar_angle_deg");
     assert!(error.problem.contains("beyond_fold"), "{error}");
@@ -33,10 +33,11 @@ fn a_dot_that_the_lens_cannot_see_is_refused_by_name() {
 
 #[test]
 fn dots_that_touch_are_refused() {
-    let error = Layout::new(&spec(Model::Pinhole, serde_json::json!({"dot_diameter_px": 16.0}))).unwrap_err();
+    let error =
+        Layout::new(&spec(LensModel::Pinhole, serde_json::json!({"dot_diameter_px": 16.0}))).unwrap_err();
     assert_eq!(error.field, "pattern.dot_diameter_px");
     let change = serde_json::json!({"dot_diameter_px": null, "dot_diameter_mm": 1.1});
-    let error = Layout::new(&spec(Model::Pinhole, change)).unwrap_err();
+    let error = Layout::new(&spec(LensModel::Pinhole, change)).unwrap_err();
     assert_eq!(error.field, "pattern.unprintable");
     assert!(error.problem.contains("gap"), "{error}");
 }
@@ -48,9 +49,12 @@ fn white_markers_and_zones_take_dots_away() {
         "keep_out": {"pole_deg": 10.0, "rim_deg": 40.0, "white_marker_margin_px": 4.0,
                      "image_discs": [{"center_px": [250.0, 240.0], "radius_px": 20.0}]},
     });
-    let mut spec = spec(Model::KannalaBrandt, change);
-    spec.white_markers =
-        vec![WhiteMarker { id: 3, position_mm: DVec3::new(3.0, 3.0, 0.0), diameter_mm: 1.0 }];
+    let mut spec = spec(LensModel::KannalaBrandt, change);
+    spec.white_markers = vec![domecast_optics::pose::Marker {
+        id: 3,
+        position_mm: DVec3::new(3.0, 3.0, 0.0),
+        diameter_mm: 1.0,
+    }];
     let layout = Layout::new(&spec).unwrap();
     let reasons: std::collections::BTreeSet<&str> =
         layout.lost.iter().map(|dot| dot.reason.as_str()).collect();
@@ -81,7 +85,7 @@ fn nonsense_gets_a_named_error() {
         (serde_json::json!({"dot_diameter_px": -1.0}), "pattern.dot_diameter_px"),
         (serde_json::json!({"polar_angle_deg": null}), "pattern.polar_angle_deg"),
     ] {
-        match Layout::new(&spec(Model::KannalaBrandt, change.clone())) {
+        match Layout::new(&spec(LensModel::KannalaBrandt, change.clone())) {
             Err(error) => assert_eq!(error.field, field, "{change}: {error}"),
             Ok(layout) => panic!("{change}: {} dots", layout.dots.len()),
         }

@@ -6,12 +6,12 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::super::*;
 use super::spec;
-use domecast_optics::camera::Model;
+use domecast_optics::camera::LensModel;
 use domecast_optics::numeric::Rigid;
 
 #[test]
 fn tolerances_show_what_they_do() {
-    let spec = spec(Model::KannalaBrandt, serde_json::json!({"polar_angle_deg": 50.0}));
+    let spec = spec(LensModel::KannalaBrandt, serde_json::json!({"polar_angle_deg": 50.0}));
     let layout = Layout::new(&spec).unwrap();
     let tolerances = |change: serde_json::Value| {
         let mut json = serde_json::json!({
@@ -51,7 +51,7 @@ fn tolerances_show_what_they_do() {
 
 #[test]
 fn coverage_shrinks_as_the_camera_comes_closer() {
-    let spec = spec(Model::BrownConrady, serde_json::json!({}));
+    let spec = spec(LensModel::BrownConrady, serde_json::json!({}));
     let layout = Layout::new(&spec).unwrap();
     let rest = coverage::coverage(&spec, &layout, &spec.optics, None);
     assert_eq!((rest.seen_by_lens, rest.on_raster, rest.in_mask), (1.0, 1.0, 1.0));
@@ -67,9 +67,12 @@ fn coverage_shrinks_as_the_camera_comes_closer() {
 #[test]
 fn a_load_that_hides_dots_says_which_and_why() {
     // A marker beside the dots at rest; as the sheet comes nearer, it moves outwards faster than they do.
-    let mut spec = spec(Model::KannalaBrandt, serde_json::json!({"unseen": "drop"}));
-    spec.white_markers =
-        vec![WhiteMarker { id: 2, position_mm: DVec3::new(3.1, 2.8, 0.0), diameter_mm: 1.0 }];
+    let mut spec = spec(LensModel::KannalaBrandt, serde_json::json!({"unseen": "drop"}));
+    spec.white_markers = vec![domecast_optics::pose::Marker {
+        id: 2,
+        position_mm: DVec3::new(3.1, 2.8, 0.0),
+        diameter_mm: 1.0,
+    }];
     let layout = Layout::new(&spec).unwrap();
     let rest = coverage::coverage(&spec, &layout, &spec.optics, None);
     assert!(rest.unseen_dots.is_empty(), "{:?}", rest.unseen_dots);

@@ -19,7 +19,7 @@ fn sweep(count: usize) -> (usize, Vec<String>) {
             }
         };
         let made = Measures::of(&design).and_then(|m| {
-            let hits = [Hit::new(0.0, 0.0), Hit::new(0.02 * (index % 40) as f64, index as f64)];
+            let hits = [PrintPass::new(0.0, 0.0), PrintPass::new(0.02 * (index % 40) as f64, index as f64)];
             let parts = build(&m, &hits)?;
             let assembly = Assembly::of(&m, &parts)?;
             check_assembly(&m, &parts, &assembly)?;

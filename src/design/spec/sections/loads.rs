@@ -53,7 +53,7 @@ pub struct LoadClaim {
 /// Standard deviations of what the image processing measures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct NoiseSection {
+pub struct CentroidNoiseSection {
     /// Of a white marker's centroid in each image axis, px.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 100.0))]
     pub white_centroid_px: f64,

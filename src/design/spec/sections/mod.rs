@@ -2,6 +2,16 @@
 //!
 //! Their doc comments are the descriptions in the JSON schema, and the bounds given here are the
 //! bounds of a single field; rules between fields are checked when the design is resolved.
+//!
+//! # Example
+//! ```
+//! use domecast_design::Design;
+//!
+//! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
+//! let design = Design::load(THUMB24.as_ref())?;
+//! assert_eq!(design.sections().dome.radius_mm, 10.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod accuracy;
 mod camera;
@@ -24,7 +34,7 @@ use serde::{Deserialize, Serialize};
 pub use accuracy::AccuracySection;
 pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
 pub use light::{DiffuserSection, PowerRgb, ReflectanceRgb};
-pub use loads::{LoadClaim, LoadsSection, NoiseSection, WhiteMarkersSection};
+pub use loads::{CentroidNoiseSection, LoadClaim, LoadsSection, WhiteMarkersSection};
 pub use making::{
     CouponSection, FillSection, JigSection, MeshSection, MouldSection, PinsSection, ProcessSection,
     StencilSection, VentsSection,
@@ -37,7 +47,7 @@ pub use platforms::{
     CableExitSection, ClampSection, LedColor, LedSection, LedsSection, LowerPlatform, MagnetPocketsSection,
     MountingSection, PlatformsSection, SheetSection, UpperPlatform,
 };
-pub use print::{Hits, MeasuredTransferSection, PrintSection, TransferMapName};
+pub use print::{MeasuredTransferSection, PrintPasses, PrintSection, TransferMapName};
 pub use springs::{
     GravitySection, MagnetFacing, MagnetsSection, SpringEnds, SpringPlaces, SpringRing, SpringsSection,
     WireSection,
@@ -98,7 +108,7 @@ pub struct DesignFile {
     /// The loads that the design claims to carry.
     pub loads: LoadsSection,
     /// What the image processing can measure.
-    pub noise: NoiseSection,
+    pub noise: CentroidNoiseSection,
     /// How far a built sensor may be off.
     pub tolerances: TolerancesSection,
     /// The printed platforms.

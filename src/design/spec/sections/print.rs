@@ -57,14 +57,14 @@ pub struct MeasuredTransferSection {
     pub points_rejected: Option<u32>,
 }
 
-/// One hit of the pad, or as many tilted ones as the wrap limit needs.
+/// One print pass, or as many tilted ones as the wrap limit needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Hits {
-    /// One hit from straight above; dots beyond the wrap limit cannot be printed.
+pub enum PrintPasses {
+    /// One pass from straight above; dots beyond the wrap limit cannot be printed.
     #[default]
     Single,
-    /// A centre hit, and tilted sector hits where the pattern reaches past the wrap limit.
+    /// A centre pass, and tilted sector passes where the pattern reaches past the wrap limit.
     Split,
 }
 
@@ -87,12 +87,12 @@ pub struct PrintSection {
     /// Surface normal against the pad's stroke beyond which a dot gets a warning, degrees.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 90.0))]
     pub wrap_warn_deg: f64,
-    /// .. beyond which it cannot be printed in that hit, degrees; not below wrap_warn_deg.
+    /// .. beyond which it cannot be printed in that pass, degrees; not below wrap_warn_deg.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub wrap_limit_deg: f64,
-    /// One hit or several.
+    /// One print pass or several.
     #[serde(default)]
-    pub hits: Hits,
+    pub hits: PrintPasses,
     /// Steepest tilt that the jig can hold, degrees (only for `split`).
     #[serde(default = "default_max_tilt_deg")]
     #[schemars(range(min = 0.0, max = 90.0))]

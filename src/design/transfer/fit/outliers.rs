@@ -2,8 +2,8 @@
 //!
 //! Pairs of samples, each of which fixes a plain map, vote first; the best of them starts a least trimmed squares fit
 //! of the whole model (P. Rousseeuw and K. Van Driessen, Data Mining and Knowledge Discovery 12, 2006), which reads
-//! the best seven samples of ten only. Mistaken marks cannot pull it over as they pull a fit of least squares, nor,
-//! where they stand far out, one of least absolute deviations. Samples beyond its scatter are then left out, and the
+//! the best seven samples of ten only. Wrong marks bias it less than they bias least squares, or, where they
+//! are far off, least absolute deviations. Samples beyond its scatter are then left out, and the
 //! scatter is computed again.
 
 use glam::DVec2;
@@ -90,7 +90,7 @@ impl FitProblem<'_> {
             }
             small_sample = 1.0;
         }
-        // Over all samples: a wrong nominal map can fit a few rings exactly and disown the rest.
+        // Over all samples: a wrong nominal map can fit a few rings exactly and reject the rest.
         Ok((quantile(&lengths, 1.0 - MAX_OUTLIERS), used))
     }
 

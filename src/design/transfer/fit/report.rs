@@ -8,7 +8,7 @@ use crate::transfer::{Correction, Nominal, Polar};
 
 /// A fitted map and how well it fits.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
+pub struct TransferFit {
     /// The nominal map on which the correction rests.
     pub nominal: Nominal,
     /// The correction.
@@ -41,7 +41,7 @@ impl FitProblem<'_> {
         correction: Correction,
         used: &[bool],
         rejected: Vec<usize>,
-    ) -> Fit {
+    ) -> TransferFit {
         let residuals: Vec<DVec2> = self
             .residuals(model.nominal, &correction)
             .zip(&self.polar)
@@ -70,7 +70,7 @@ impl FitProblem<'_> {
             let expected = scatter * scatter * (1.0 - model.parameters() as f64 / (2 * count) as f64);
             (residual_rms_mm * residual_rms_mm - expected).max(0.0).sqrt()
         });
-        Fit {
+        TransferFit {
             nominal: model.nominal,
             correction,
             residual_rms_mm,

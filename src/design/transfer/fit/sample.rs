@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 pub struct Sample {
     /// Where it stands on the plate, mm.
     pub plate_mm: DVec2,
-    /// Where it landed: direction from the dome's centre, in the frame of the hit; any length but zero.
+    /// Where it landed: direction from the dome's centre, in the frame of the print pass; any length but zero.
     pub landed: DVec3,
     /// Which mark it is; equal for the same mark of several prints.
     pub mark: u32,

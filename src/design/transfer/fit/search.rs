@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::error::{FitError, PLATE_OVER_DOME};
 use super::outliers::{MAX_OUTLIERS, quantile};
-use super::report::Fit;
+use super::report::TransferFit;
 use super::sample::{MeasuredIn, Sample};
 use super::solve::{BEYOND_RAD, FitModel, FitProblem, MAX_POLAR_RAD};
 use crate::transfer::{Correction, Nominal, Polar, TransferError, TransferMap};
@@ -30,7 +30,7 @@ pub fn fit(
     samples: &[Sample],
     measured_in: MeasuredIn,
     reach_rad: f64,
-) -> Result<Fit, FitError> {
+) -> Result<TransferFit, FitError> {
     if samples.len() < MIN_SAMPLES {
         return Err(FitError::TooFew { have: samples.len(), need: MIN_SAMPLES });
     }
@@ -70,7 +70,7 @@ fn fit_as_read(
     samples: &[Sample],
     measured_in: MeasuredIn,
     reach_rad: f64,
-) -> Result<Fit, FitError> {
+) -> Result<TransferFit, FitError> {
     let polar = samples.iter().map(|s| Polar::of_direction(s.landed.normalize())).collect();
     let problem = FitProblem { radius_mm: dome_radius_mm, samples, polar, measured_in };
     let used = problem.inliers()?;
@@ -82,7 +82,7 @@ fn fit_as_read(
     let count = samples.len() - rejected.len();
 
     // The simplest model that the data asks for. A model that folds cannot be used; if it explains the data
-    // decisively better than every one that can, the pad itself folds, and to fit it worse would be to lie.
+    // decisively better than every one that can, the pad itself folds, and a worse fit would hide that.
     let mut best: Option<(f64, FitModel, Correction)> = None;
     let mut folded: Option<(f64, TransferError)> = None;
     let max_radial = problem.max_radial();

@@ -5,11 +5,11 @@ use glam::{DMat2, DVec2};
 use crate::frames::{Blob, Gray, Side, blobs, centroid, local_levels};
 
 /// Least difference between mark and surroundings, of the full range.
-const LEAST_CONTRAST: f32 = 0.08;
+const MIN_CONTRAST: f32 = 0.08;
 /// A blob's area over that of the mark may lie between these.
 const AREA_RANGE: [f64; 2] = [0.35, 2.5];
 /// Least fullness of a mark's blob (see [`Blob::fullness`]).
-const LEAST_FULLNESS: f64 = 0.8;
+const MIN_FULLNESS: f64 = 0.8;
 
 /// A mark that is looked for: where it should be, how large, how far from its neighbour.
 pub(super) struct Wanted {
@@ -59,7 +59,7 @@ impl Blobs {
         // The diameter of a disc of that area, and half of it around.
         let reach = (1.5 * (4.0 * largest / std::f64::consts::PI).sqrt()).ceil() as usize + 2;
         let levels = local_levels(smooth, reach);
-        let all = blobs(smooth, side, |i| (levels.contrast[i] >= LEAST_CONTRAST).then_some(levels.middle[i]));
+        let all = blobs(smooth, side, |i| (levels.contrast[i] >= MIN_CONTRAST).then_some(levels.middle[i]));
         let (width, height) = (smooth.width(), smooth.height());
         let mut owner = vec![0; width * height];
         for (number, blob) in (1..).zip(&all) {
@@ -82,7 +82,7 @@ impl Blobs {
             blob.middle_px.distance(at) <= reach
                 && (AREA_RANGE[0]..=AREA_RANGE[1]).contains(&part)
                 && whole(blob)
-                && blob.fullness() >= LEAST_FULLNESS
+                && blob.fullness() >= MIN_FULLNESS
         };
         self.all.iter().enumerate().filter(move |(_, blob)| fits(blob)).map(|(number, _)| number)
     }

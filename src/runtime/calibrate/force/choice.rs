@@ -1,7 +1,7 @@
 //! The choice of the model by cross-validation, and what its residuals say of the springs.
 
 use super::robust::{dot, median, robust};
-use super::{ForceModel, Pair};
+use super::types::{ForceModel, Pair};
 
 const FOLDS: usize = 5;
 

@@ -1,6 +1,7 @@
 //! The fit: starts, damped steps, covariance, and the constants that come out.
 
 use glam::DVec3;
+use nalgebra::DVector;
 
 use super::normal::{OwnBlock, Reduced};
 use super::problem::{Problem, camera_numbers};
@@ -10,7 +11,7 @@ use domecast_optics::SensorOptics;
 use domecast_optics::numeric::{Rigid, rotation_from_vector};
 use domecast_optics::pose::{PoseOptions, PoseSolver, Sighting};
 
-const MOST_STEPS: u32 = 60;
+const MAX_STEPS: u32 = 60;
 
 /// Fits the sensor to the observations; the first `at_rest` frames (one at least) are without load.
 ///
@@ -23,67 +24,14 @@ pub fn fit(
     at_rest: usize,
 ) -> Result<OpticsFit, OpticsFitError> {
     let problem = Problem::new(constants, observations, priors, at_rest)?;
-    let mut poses = start_poses(&problem, priors)?;
-    let mut x = vec![0.0; problem.numbers()];
-    let hidden = || {
-        let first = observations.first();
-        OpticsFitError::NotVisible {
-            kind: first.map_or(Kind::White, |o| o.kind),
-            id: first.map_or(0, |o| o.id),
-        }
+    let start = Solution {
+        x: vec![0.0; problem.numbers()],
+        poses: start_poses(&problem, priors)?,
+        rms_px: [0.0; 2],
+        iterations: 0,
     };
-    let mut damping = 1e-6;
-    let mut now = problem
-        .reduce(&x, &poses, priors, true, damping)
-        .ok_or_else(|| first_hidden(&problem, &x, &poses).unwrap_or_else(hidden))?;
-    let rms = |r: &Reduced| (r.squares / r.count.max(1) as f64).sqrt();
-    let before = rms(&now);
-    let (mut iterations, mut settled) = (0, false);
-    while iterations < MOST_STEPS && !settled {
-        iterations += 1;
-        let mut damped = now.matrix.clone();
-        for k in 0..problem.numbers() {
-            damped[(k, k)] *= 1.0 + damping;
-        }
-        let step = damped.cholesky().map(|c| c.solve(&now.right));
-        let Some(step) = step else {
-            damping *= 10.0;
-            continue;
-        };
-        let next_x: Vec<f64> = x.iter().zip(step.iter()).map(|(a, b)| a + b).collect();
-        let moved = |(pose, own): (&Rigid, &Option<OwnBlock>)| match own {
-            Some((inverse, coupling, right)) => {
-                let m = inverse * (right - coupling.transpose() * &step);
-                let motion = Rigid::new(
-                    rotation_from_vector(DVec3::new(m[3], m[4], m[5])),
-                    DVec3::new(m[0], m[1], m[2]),
-                );
-                motion.compose(pose)
-            }
-            None => *pose,
-        };
-        let next_poses: Vec<Rigid> = poses.iter().zip(&now.poses).map(moved).collect();
-        let tried = problem.reduce(&next_x, &next_poses, priors, true, damping * 0.1);
-        match tried {
-            Some(next) if next.cost <= now.cost * (1.0 + 1e-12) => {
-                settled = now.cost - next.cost <= 1e-7 * (1.0 + now.cost);
-                (x, poses, now) = (next_x, next_poses, next);
-                damping = (0.1 * damping).max(1e-12);
-            }
-            _ if damping < 1e8 => {
-                damping *= 10.0;
-                // The eliminated blocks carry the damping too.
-                if let Some(again) = problem.reduce(&x, &poses, priors, true, damping) {
-                    now = again;
-                }
-            }
-            _ => settled = true,
-        }
-    }
-    if !settled {
-        return Err(OpticsFitError::NotConverged { rms_px: rms(&now) });
-    }
-    let last = problem.reduce(&x, &poses, priors, true, 0.0).unwrap_or(now);
+    let (solution, last) = solve(&problem, priors, start, observations)?;
+    let x = &solution.x;
     let covariance = last.matrix.clone().cholesky().map(|c| c.inverse());
     let sd = |k: usize| covariance.as_ref().map_or(problem.priors[k], |c| c[(k, k)].max(0.0).sqrt());
     let named = camera_numbers(problem.flat) + 2 * problem.whites.len();
@@ -94,17 +42,96 @@ pub fn fit(
             Parameter { name, nominal, value: nominal + x[k], prior_sd, sd, observed: sd < 0.9 * prior_sd }
         })
         .collect();
-    let constants = measured(constants, &problem, &x)?;
-    let after = rms(&last);
-    let poses = problem.frames.iter().copied().zip(poses).collect();
     Ok(OpticsFit {
-        constants,
+        constants: measured(constants, &problem, x)?,
         parameters,
-        rms_px: [before, after],
-        iterations,
-        poses,
+        rms_px: solution.rms_px,
+        iterations: solution.iterations,
+        poses: problem.frames.iter().copied().zip(solution.poses).collect(),
         outliers: last.outliers,
     })
+}
+
+/// Numbers and poses, and how they were found.
+struct Solution {
+    x: Vec<f64>,
+    poses: Vec<Rigid>,
+    /// Root mean square of the residuals before and after, px.
+    rms_px: [f64; 2],
+    iterations: u32,
+}
+
+fn rms_of(equations: &Reduced) -> f64 {
+    (equations.squares / equations.count.max(1) as f64).sqrt()
+}
+
+/// Each frame's pose after a step of the numbers, with what the elimination left of it.
+fn step_poses(poses: &[Rigid], blocks: &[Option<OwnBlock>], step: &DVector<f64>) -> Vec<Rigid> {
+    let moved = |(pose, own): (&Rigid, &Option<OwnBlock>)| match own {
+        Some((inverse, coupling, right)) => {
+            let m = inverse * (right - coupling.transpose() * step);
+            let turn = rotation_from_vector(DVec3::new(m[3], m[4], m[5]));
+            Rigid::new(turn, DVec3::new(m[0], m[1], m[2])).compose(pose)
+        }
+        None => *pose,
+    };
+    poses.iter().zip(blocks).map(moved).collect()
+}
+
+/// Levenberg-Marquardt from a start, at most [`MAX_STEPS`] steps; the equations without damping come with the solution.
+fn solve(
+    problem: &Problem,
+    priors: &CalibrationPriors,
+    mut at: Solution,
+    observations: &[Observation],
+) -> Result<(Solution, Reduced), OpticsFitError> {
+    let hidden = || {
+        let first = observations.first();
+        OpticsFitError::NotVisible {
+            kind: first.map_or(Kind::White, |o| o.kind),
+            id: first.map_or(0, |o| o.id),
+        }
+    };
+    let mut damping = 1e-6;
+    let mut now = problem
+        .reduce(&at.x, &at.poses, priors, damping)
+        .ok_or_else(|| first_hidden(problem, &at.x, &at.poses).unwrap_or_else(hidden))?;
+    at.rms_px[0] = rms_of(&now);
+    let mut converged = false;
+    while at.iterations < MAX_STEPS && !converged {
+        at.iterations += 1;
+        let mut damped = now.matrix.clone();
+        for k in 0..problem.numbers() {
+            damped[(k, k)] *= 1.0 + damping;
+        }
+        let Some(step) = damped.cholesky().map(|c| c.solve(&now.right)) else {
+            damping *= 10.0;
+            continue;
+        };
+        let next_x: Vec<f64> = at.x.iter().zip(step.iter()).map(|(a, b)| a + b).collect();
+        let next_poses = step_poses(&at.poses, &now.poses, &step);
+        match problem.reduce(&next_x, &next_poses, priors, damping * 0.1) {
+            Some(next) if next.cost <= now.cost * (1.0 + 1e-12) => {
+                converged = now.cost - next.cost <= 1e-7 * (1.0 + now.cost);
+                (at.x, at.poses, now) = (next_x, next_poses, next);
+                damping = (0.1 * damping).max(1e-12);
+            }
+            _ if damping < 1e8 => {
+                damping *= 10.0;
+                // The eliminated blocks carry the damping too.
+                if let Some(again) = problem.reduce(&at.x, &at.poses, priors, damping) {
+                    now = again;
+                }
+            }
+            _ => converged = true,
+        }
+    }
+    if !converged {
+        return Err(OpticsFitError::NotConverged { rms_px: rms_of(&now) });
+    }
+    let last = problem.reduce(&at.x, &at.poses, priors, 0.0).unwrap_or(now);
+    at.rms_px[1] = rms_of(&last);
+    Ok((at, last))
 }
 
 /// The first mark that the nominal sensor does not see.

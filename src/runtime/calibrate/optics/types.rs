@@ -88,7 +88,7 @@ pub enum OpticsFitError {
         /// Its number.
         id: usize,
     },
-    /// The fit did not settle in the allowed steps.
+    /// The fit did not converge in the allowed steps.
     NotConverged {
         /// What was left, px.
         rms_px: f64,
@@ -108,7 +108,9 @@ impl std::fmt::Display for OpticsFitError {
             Self::NotVisible { kind, id } => {
                 write!(f, "the nominal sensor cannot see {} {id} where it was found", word(kind))
             }
-            Self::NotConverged { rms_px } => write!(f, "the fit did not settle; {rms_px:.3} px rms are left"),
+            Self::NotConverged { rms_px } => {
+                write!(f, "the fit did not converge; {rms_px:.3} px rms are left")
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use crate::track::identities::DotTrack;
 use crate::track::model::DotModel;
-use domecast_optics::{Limit, SensorOptics, SurfacePoint};
+use domecast_optics::{RayLimit, SensorOptics, SurfacePoint};
 
 /// Dots whose rays are traced at a time: a longer slice would be shared among threads.
 const TRACE_RUN: usize = 1024;
@@ -15,7 +15,7 @@ pub(in crate::track) struct DotDisplacements {
     /// Dots that were found, their centres in the image, and where those are on the dome.
     found: Vec<usize>,
     centers: Vec<DVec2>,
-    hits: Vec<Result<SurfacePoint, Limit>>,
+    hits: Vec<Result<SurfacePoint, RayLimit>>,
     displacements_mm: Vec<Option<DVec3>>,
 }
 
@@ -46,7 +46,7 @@ impl DotDisplacements {
             }
         }
         self.hits.clear();
-        self.hits.resize(self.centers.len(), Err(Limit::MissesDome));
+        self.hits.resize(self.centers.len(), Err(RayLimit::MissesDome));
         for (centers, hits) in self.centers.chunks(TRACE_RUN).zip(self.hits.chunks_mut(TRACE_RUN)) {
             // Slices of one length are all that it asks for.
             let _ = optics.trace_all(centers, hits);

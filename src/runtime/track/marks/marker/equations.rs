@@ -171,13 +171,14 @@ impl WindowSums {
                 let Some(pixel) = geometry.pixel(from) else { continue };
                 let beside = pixel.dome * (1.0 - pixel.disc);
                 // The light falls off over disc and what it hides alike.
-                let lit = shading.dot(from);
-                let mut row = [1.0 + pixel.disc * lit, pixel.disc * (1.0 + lit), beside, 0.0, 0.0];
+                let shade = shading.dot(from);
+                let mut row = [1.0 + pixel.disc * shade, pixel.disc * (1.0 + shade), beside, 0.0, 0.0];
                 let mut rest = f64::from(plane.at(x, y));
                 if let Some([ground, disc, dome]) = known {
                     // The outline moves with the place: outside falls by the unit normal.
                     let (step, whole) = (disc - pixel.dome * dome, ground + disc);
-                    let by_place = pixel.gradient * (-pixel.disc_slope * (step + whole * lit) / pixel.steep)
+                    let by_place = pixel.gradient
+                        * (-pixel.disc_slope * (step + whole * shade) / pixel.steep)
                         - shading * (pixel.disc * whole);
                     row[3] = by_place.x;
                     row[4] = by_place.y;

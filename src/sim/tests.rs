@@ -7,7 +7,6 @@ use proptest::prelude::*;
 use super::*;
 use crate::raster::coverage::{Coverage, area_moment, clip};
 use crate::raster::outline::RimFit;
-use domecast_design;
 
 fn scene(name: &str) -> Scene {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/scenes").join(name);

@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 
 use crate::scene::SceneFile;
 use crate::*;
-use domecast_design;
 use domecast_design::Design;
 
 /// From a seed: even in the logarithm between two bounds.

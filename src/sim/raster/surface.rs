@@ -77,11 +77,6 @@ impl<'a> ShadedSurface<'a> {
         self.slices.get(self.slices.partition_point(|slice| slice.end <= y)).or(self.slices.last())
     }
 
-    /// Whether a ray may meet the membrane more than once.
-    pub fn may_fold(&self) -> bool {
-        self.slices.iter().filter_map(|slice| slice.map).any(DisplacementMap::may_fold)
-    }
-
     /// Brightness of what a ray of a row shows, red, green and blue; `None` where it misses the dome. Dome and membrane go on
     /// beyond the rim, so that the brightness does.
     #[inline]

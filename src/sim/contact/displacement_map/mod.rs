@@ -207,8 +207,8 @@ fn back_on_sphere(rest_mm: Vec3A, inside: Vec3A, displacement_mm: Vec3A) -> Vec3
 const MAX_STEPS: u32 = 10;
 /// More of them, each half of the plain one's way, where those do not end.
 const PLAIN_STEPS: u32 = 16;
-/// A step no longer than this is the last, mm: over it no membrane turns by more than a few ten-thousandths of a radian, which
-/// are hundredths of a grey level.
-const NEAR_MM: f32 = 1e-4;
+/// A step no longer than this is the last, mm: over it a membrane turns by a thousandth of a radian where it is sharpest, which
+/// is tenths of a grey level.
+const NEAR_MM: f32 = 4e-4;
 /// A step longer than this is none of Newton's, mm.
 const FARTHEST_MM: f32 = 1.0;

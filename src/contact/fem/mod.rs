@@ -11,7 +11,9 @@ mod compliance;
 mod element;
 mod field;
 mod grid;
+mod harmonics;
 mod mesh;
+mod response;
 mod revolved;
 
 pub(crate) use between::Parts;

@@ -92,14 +92,15 @@ fn a_scene_becomes_frames_video_and_truth() {
 
 #[test]
 fn a_contact_that_its_level_does_not_cover_is_named() {
-    // 6 mm deep, the ball's contact is no longer small beside the dome.
-    let deep = scene(|scene| {
+    // The end of a thin bar has a rim, which has no closed form.
+    let thin = scene(|scene| {
         scene["contact"] = json!({ "level": "closed_form" });
-        scene["objects"][0]["path"][1]["position_mm"] = json!([0, 0, 8]);
+        scene["objects"][0]["shape"] = json!({ "kind": "cylinder", "radius_mm": 1, "length_mm": 8 });
+        scene["objects"][0]["path"][0]["position_mm"] = json!([0, 0, 16]);
         scene["frames"]["images"] = json!(false);
     });
     let folder = tempfile::tempdir().expect("a folder");
-    write(folder.path(), &deep);
+    write(folder.path(), &thin);
     let more = ["simulate", "scene.json", "--everything", "--out", "out"];
     let output = domecast(&more, folder.path());
     let message = String::from_utf8(output.stderr).expect("UTF-8");

@@ -1,6 +1,6 @@
 //! The command line of domecast, and what accuracy costs in time.
 
-pub mod accuracy;
+mod accuracy;
 mod commands;
 
 pub use commands::run;

@@ -146,7 +146,7 @@ macro_rules! html {
 }
 pub use crate::html;
 
-/// A table; the first column names the row.
+/// A table; the first column names the row. An empty caption is left out.
 pub fn table(caption: &str, heads: &[&str], rows: &[Vec<Html>]) -> Html {
     let heads: Html = heads.iter().map(|head| html!("<th scope=\"col\">{}</th>", head)).collect();
     let cells = |row: &Vec<Html>| -> Html {
@@ -156,8 +156,9 @@ pub fn table(caption: &str, heads: &[&str], rows: &[Vec<Html>]) -> Html {
         };
         html!("<tr>{}</tr>\n", row.iter().enumerate().map(cell).collect::<Html>())
     };
+    let caption = if caption.is_empty() { Html::default() } else { html!("<caption>{}</caption>", caption) };
     html!(
-        "<div class=\"scroll\"><table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
+        "<div class=\"scroll\"><table>{}<thead><tr>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
         caption,
         heads,
         rows.iter().map(cells).collect::<Html>(),

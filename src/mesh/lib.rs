@@ -24,6 +24,7 @@ mod distance;
 mod dxf;
 mod error;
 mod exact;
+mod faceted;
 mod glb;
 mod meets;
 pub mod number;

@@ -25,7 +25,7 @@ impl RayTarget {
     pub fn first_hit(&self, from_mm: DVec3, to_mm: DVec3) -> Option<(f64, DVec3)> {
         let mut best: Option<(f64, usize)> = None;
         self.visit(from_mm, to_mm, |at, t| {
-            if best.is_none_or(|(least, _)| t < least) {
+            if best.is_none_or(|(nearest, _)| t < nearest) {
                 best = Some((t, at));
             }
             best.map(|(t, _)| t)

@@ -306,9 +306,9 @@ fn list(ids: &[usize]) -> String {
 
 /// A unit vector across another.
 fn across(axis: Vector3) -> Vector3 {
-    let least = if axis.x.abs() < 0.9 { Vector3::unit_x() } else { Vector3::unit_y() };
-    let off = least - axis * axis.dot(least);
-    if off.is_zero() { least } else { off.normalize() }
+    let other = if axis.x.abs() < 0.9 { Vector3::unit_x() } else { Vector3::unit_y() };
+    let off = other - axis * axis.dot(other);
+    if off.is_zero() { other } else { off.normalize() }
 }
 
 /// Text as the exchange structure holds it: quotes doubled, what is not ASCII by its number.

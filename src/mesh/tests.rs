@@ -9,7 +9,7 @@ fn chord(t: f64) -> Chord {
     Chord::new(t).unwrap()
 }
 
-const LADDER: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
+const SWEEP_MM: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 const FITS: [Fit; 3] = [Fit::Inside, Fit::Outside, Fit::Area];
 
 /// A dome on a cylinder: the shape of a mould's cavity.
@@ -32,7 +32,7 @@ fn dome_distance(p: DVec3) -> f64 {
 
 #[test]
 fn sides_keep_the_chord_tolerance_and_no_more() {
-    for tolerance in LADDER {
+    for tolerance in SWEEP_MM {
         for radius in [0.25, 3.0, 12.0, 200.0] {
             let sagitta = |n: f64| radius * (1.0 - (PI / n).cos());
             let n = f64::from(chord(tolerance).circle_segments(radius, Fit::Inside).unwrap());
@@ -48,7 +48,7 @@ fn sides_keep_the_chord_tolerance_and_no_more() {
 
 #[test]
 fn dome_stays_within_tolerance_and_on_the_promised_side() {
-    for tolerance in LADDER {
+    for tolerance in SWEEP_MM {
         for fit in FITS {
             let mesh = dome(fit).triangulate("dome", chord(tolerance)).unwrap();
             let report = inspect(&mesh.welded_f32());
@@ -236,10 +236,10 @@ fn rays_and_boxes_find_what_a_look_at_every_triangle_finds() {
     let (mut hits, mut near) = (0, 0);
     for _ in 0..300 {
         let (from, to) = (point(), point());
-        let least = alone.iter().filter_map(|(one, _)| Some(one.first_hit(from, to)?.0)).reduce(f64::min);
-        assert_eq!(target.first_hit(from, to).map(|(t, _)| t), least, "{from} {to}");
-        assert_eq!(target.is_hit(from, to), least.is_some(), "{from} {to}");
-        hits += usize::from(least.is_some());
+        let nearest = alone.iter().filter_map(|(one, _)| Some(one.first_hit(from, to)?.0)).reduce(f64::min);
+        assert_eq!(target.first_hit(from, to).map(|(t, _)| t), nearest, "{from} {to}");
+        assert_eq!(target.is_hit(from, to), nearest.is_some(), "{from} {to}");
+        hits += usize::from(nearest.is_some());
         let bounds = BoundingBox::of(&[from, from.lerp(to, 0.1)]).unwrap();
         let touched = alone.iter().any(|(_, own)| !own.is_apart_from(&bounds));
         assert_eq!(target.comes_near(&bounds), touched, "{bounds:?}");
@@ -248,4 +248,41 @@ fn rays_and_boxes_find_what_a_look_at_every_triangle_finds() {
     assert!(hits > 50 && (30..270).contains(&near), "{hits} {near}");
     let nothing = RayTarget::new(&TriMesh::default());
     assert!(!nothing.is_hit(DVec3::ZERO, DVec3::ONE) && nothing.first_hit(DVec3::ZERO, DVec3::ONE).is_none());
+}
+
+/// Domes cut from above and from below, a counterbore, a cone and a pin: every kind of revolved face, with the axis'
+/// pole at either end.
+#[test]
+fn exact_solids_hold_every_kind_of_turned_feature() {
+    let dome = |low: f64, high: f64, center_z_mm: f64, poles_low: bool| {
+        let points = if poles_low { [(0.0, low), (3.0, high)] } else { [(3.0, low), (0.0, high)] };
+        Shape::Turned {
+            profile: Profile {
+                points_mm: points.map(|(r, z)| DVec2::new(r, z)).to_vec(),
+                edges: vec![ProfileEdge::Arc { center_z_mm }],
+            },
+            fit: Fit::Area,
+        }
+    };
+    let turned = |points: &[(f64, f64)]| Shape::Turned { profile: Profile::lines(points), fit: Fit::Area };
+    let plate = Shape::rounded_plate(DVec2::new(40.0, 20.0), 2.0, 0.0, 8.0);
+    let part = Construction {
+        added: vec![
+            Piece::new("plate", plate),
+            Piece::new("pin", turned(&[(1.0, 7.0), (1.0, 10.0), (0.5, 10.5)])).at(0.0, 7.0),
+        ],
+        cut: vec![
+            Piece::new("dome from above", dome(5.0, 8.0, 8.0, true)).at(-14.0, 0.0),
+            Piece::new("dome from below", dome(0.0, 3.0, 0.0, false)).at(14.0, 0.0),
+            Piece::new("counterbore", turned(&[(1.0, -1.0), (1.0, 4.0), (2.0, 4.0), (2.0, 9.0)]))
+                .at(-5.0, 0.0),
+            Piece::new("countersink", turned(&[(1.0, -1.0), (1.0, 6.0), (3.0, 8.0)])).at(5.0, 0.0),
+        ],
+    };
+    let solid = part.exact_solid().unwrap();
+    let step = write_step(&solid, "it's").unwrap();
+    assert_eq!(step.matches("=SPHERICAL_SURFACE(").count(), 2 * 3);
+    assert_eq!(step.matches("=CONICAL_SURFACE(").count(), 2 * 3);
+    assert_eq!(step.matches("=CYLINDRICAL_SURFACE(").count(), 4 + 4 * 3);
+    assert_eq!(step.matches("'it''s'").count(), 4);
 }

@@ -3,59 +3,47 @@
 //! A [`Scene`] says what happens; [`Plan::of`] asks each [`Effect`] whether the scene calls for it, how large it
 //! can be and what it costs, and leaves out what the scene's tolerance can spare; the used effects put their
 //! parts into a [`Pipeline`], and a renderer draws frames and tells the exact truth about them.
+//!
+//! Each stage is a folder and knows those before it only:
+//!
+//! ```text
+//! scene ─> contact ─> light ─> raster ─> electronics ─> output
+//!          effects (declare, bound and switch) ─> plan ─^
+//! ```
 
-mod coverage;
-mod dent;
-pub mod edges;
-mod effect;
+mod bound;
+mod contact;
+mod effect_name;
 mod effects;
-mod elastomer;
+pub mod electronics;
 mod error;
-mod eye;
-mod field;
-mod fill;
-mod frame;
-mod geometry_bound;
-mod instant;
 pub mod light;
-mod lit;
-mod outline;
 pub mod output;
-mod picture;
-pub mod pipeline;
 mod plan;
-mod render;
-mod rests;
-mod rolled;
+pub mod raster;
 pub mod scene;
-mod shading;
-mod shapes;
 mod splines;
-mod spots;
-mod touch;
-mod truth;
 mod work;
 
-pub use effect::{Bound, Cost, Effect, EffectChoice, EffectChoices, EffectName};
-pub use elastomer::elastomer_of;
+pub use bound::Bound;
+pub use contact::between::Around;
+pub use contact::elastomer::elastomer_of;
+pub use contact::record::ContactTruth;
+pub use contact::stepper::{Stepper, Touch};
+pub use effect_name::{EffectChoice, EffectChoices, EffectName};
+pub use effects::effect::{Cost, Effect};
+pub use effects::pipeline::{self, Pipeline};
 pub use error::SimError;
-pub use frame::{Frame, Image8};
-pub use instant::Instant;
+pub use light::shading::{Shading, SurfaceSample};
 pub use output as run;
-pub use pipeline::Pipeline;
+pub use output::render::{Drawn, Renderer, Scratch};
+pub use output::truth::{DotTruth, EffectTruth, FrameTruth, MarkerTruth};
 pub use plan::{Entry, Plan};
-pub use render::{Around, Drawn, Renderer, Scratch};
+pub use raster::edges;
+pub use raster::frame::{Frame, Image8};
+pub use raster::sensor_state::SensorState;
 pub use scene::Scene;
-pub use shading::{Shading, SurfaceSample};
-pub use touch::{Stepper, Touch};
-pub use truth::{ContactTruth, DotTruth, EffectTruth, FrameTruth, MarkerTruth};
 pub use work::Work;
 
-#[cfg(test)]
-mod honesty;
-#[cfg(test)]
-mod lit_tests;
-#[cfg(test)]
-mod rolled_tests;
 #[cfg(test)]
 mod tests;

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec4};
 
 /// Weights of the cubic spline's four coefficients about a place between the middle two, along x and along y.
 #[inline]
-pub(super) fn cubics(part: Vec2) -> ([f32; 4], [f32; 4]) {
+pub(crate) fn cubics(part: Vec2) -> ([f32; 4], [f32; 4]) {
     // Both at once.
     let t = Vec4::new(part.x, part.y, 0.0, 0.0);
     let s = Vec4::ONE - t;
@@ -22,7 +22,7 @@ pub(super) fn cubics(part: Vec2) -> ([f32; 4], [f32; 4]) {
 
 /// The derivatives of [`cubics`] along one of the two.
 #[inline]
-pub(super) fn cubic_slopes(t: f32) -> [f32; 4] {
+pub(crate) fn cubic_slopes(t: f32) -> [f32; 4] {
     let s = 1.0 - t;
     [-0.5 * s * s, t * (1.5 * t - 2.0), s * (2.0 - 1.5 * s), 0.5 * t * t]
 }
@@ -30,7 +30,7 @@ pub(super) fn cubic_slopes(t: f32) -> [f32; 4] {
 /// Weights of the quadratic spline's three coefficients about a place, which is so far past the middle between the first
 /// two, along x and along y.
 #[inline]
-pub(super) fn quadratics(part: Vec2) -> ([f32; 3], [f32; 3]) {
+pub(crate) fn quadratics(part: Vec2) -> ([f32; 3], [f32; 3]) {
     let (high, low) = (part * part * 0.5, (1.0 - part) * (1.0 - part) * 0.5);
     let middle = 1.0 - high - low;
     ([low.x, middle.x, high.x], [low.y, middle.y, high.y])
@@ -38,14 +38,14 @@ pub(super) fn quadratics(part: Vec2) -> ([f32; 3], [f32; 3]) {
 
 /// How much more a spline's own coefficient weighs at its node than each of the two beside it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Degree {
+pub(crate) enum Degree {
     Quadratic = 6,
     Cubic = 4,
 }
 
 /// Turns the values of a square table into the coefficients of the spline through them, along each row, then each column.
 /// The ends, where nothing looks, keep their values as coefficients.
-pub(super) fn to_coefficients(values: &mut [Vec4], nodes: usize, degree: Degree) {
+pub(crate) fn to_coefficients(values: &mut [Vec4], nodes: usize, degree: Degree) {
     let own = degree as u8 as f32;
     let mut line = vec![(Vec4::ZERO, 0.0_f32); nodes];
     for (next, step) in [(nodes, 1), (1, nodes)] {

@@ -1,6 +1,6 @@
 //! Work, counted: what each effect did, in units that are the same on every machine.
 
-use super::effect::EffectName;
+use crate::effect_name::EffectName;
 
 /// Counted work, by effect.
 ///

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use super::{circles, graph};
+use super::order::{circles, graph};
 use crate::modules::Crate;
 use crate::tokens::tokens;
 

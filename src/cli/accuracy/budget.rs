@@ -5,14 +5,15 @@ use glam::DVec3;
 use nalgebra::Vector6;
 use serde::Serialize;
 
-use super::ladder::Ladder;
 use super::pose::sightings;
+use super::sweep::Sweep;
 use domecast_design::Design;
 use domecast_design::layout::Layout;
 use domecast_design::layout::report::LayoutReport;
 use domecast_design::settings::{TolerancedOptics, toleranced_optics};
 use domecast_design::{claims_of, suspension_of};
 use domecast_fab::constants::{markers_of, resolution_at};
+use domecast_fab::numbers::significant;
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 use domecast_optics::pose::{Marker, PoseOptions, PoseSolver};
@@ -21,12 +22,12 @@ use domecast_springs::Displacement;
 
 /// What one step adds, as one standard deviation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Share {
+pub struct ErrorShare {
     /// The step, in words.
     pub step: String,
-    /// The field of the design that says how large it is, or the ladder that measured it.
+    /// The field of the design that sets it, or the sweep that measured it.
     pub source: String,
-    /// Whether it is worked out (its exactness can be bought with time) or made and measured (it cannot).
+    /// Whether it comes from computing (more time makes it smaller) or from making and measuring (it does not).
     pub computed: bool,
     /// How much, in the budget's unit.
     pub amount: f64,
@@ -34,24 +35,24 @@ pub struct Share {
 
 /// A sum of independent errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Budget {
+pub struct ErrorBudget {
     /// What is summed up.
     pub title: String,
     /// Unit of all amounts.
     pub unit: &'static str,
     /// The shares, the largest first.
-    pub shares: Vec<Share>,
+    pub shares: Vec<ErrorShare>,
     /// Root of the sum of squares.
     pub total: f64,
-    /// The same of what is worked out alone.
+    /// The same of the shares from computing alone.
     pub computed: f64,
 }
 
-impl Budget {
-    fn of(title: String, unit: &'static str, mut shares: Vec<Share>) -> Self {
+impl ErrorBudget {
+    fn of(title: String, unit: &'static str, mut shares: Vec<ErrorShare>) -> Self {
         shares.retain(|share| share.amount.is_finite());
         shares.sort_by(|a, b| b.amount.total_cmp(&a.amount).then_with(|| a.step.cmp(&b.step)));
-        let root = |which: &dyn Fn(&Share) -> bool| {
+        let root = |which: &dyn Fn(&ErrorShare) -> bool| {
             shares.iter().filter(|s| which(s)).map(|s| s.amount * s.amount).sum::<f64>().sqrt()
         };
         let (total, computed) = (root(&|_| true), root(&|share| share.computed));
@@ -79,17 +80,17 @@ pub fn of_dots(
     design: &Design,
     layout: &Layout,
     judged: &LayoutReport,
-    ladders: &[Ladder],
-) -> Option<Budget> {
+    sweeps: &[Sweep],
+) -> Option<ErrorBudget> {
     let (px_per_mm, px_per_radius_mm) = scales(design.optics(), layout)?;
     let sections = design.sections();
     let mut shares = Vec::new();
     let mut add = |step: &str, source: String, computed: bool, amount: f64| {
-        shares.push(Share { step: step.to_owned(), source, computed, amount });
+        shares.push(ErrorShare { step: step.to_owned(), source, computed, amount });
     };
     let in_use = |name: &str| {
-        let ladder = ladders.iter().find(|ladder| ladder.name == name)?;
-        ladder.in_use.and_then(|index| ladder.rungs.get(index)).map(|rung| rung.rms_error)
+        let sweep = sweeps.iter().find(|sweep| sweep.name == name)?;
+        sweep.in_use.and_then(|index| sweep.samples.get(index)).map(|sample| sample.rms_error)
     };
     for (name, step, per_mm) in [
         ("lens", "inverse of the lens", px_per_mm),
@@ -97,12 +98,12 @@ pub fn of_dots(
         ("outline", "outline on the film", 1.0),
     ] {
         if let Some(error) = in_use(name) {
-            add(step, format!("ladder {name}"), true, error / per_mm);
+            add(step, format!("sweep {name}"), true, error / per_mm);
         }
     }
     // a pixel's rounding is even over its width: its sd is the width over the root of 12
     let film_mm = 25.4 / f64::from(sections.print.dpi) / 12_f64.sqrt();
-    add("raster of the film, at an edge", "print.dpi".into(), true, film_mm);
+    add("pixels of the film, at an edge", "print.dpi".into(), true, film_mm);
     // errors of the dome's radius are seen as shifts of the dots
     let seen = px_per_radius_mm / px_per_mm;
     let chord_mm = design.settings().optical_chord_tolerance_mm.value;
@@ -120,11 +121,11 @@ pub fn of_dots(
         add(&step, format!("tolerances.{}", share.tolerance), false, share.mean_shift_px / px_per_mm);
     }
     let title = "Where a dot ends up on the dome, one standard deviation".to_owned();
-    Some(Budget::of(title, "mm", shares))
+    Some(ErrorBudget::of(title, "mm", shares))
 }
 
 /// What a force reads, N, under the design's largest claimed force; `None` where the pose cannot be followed.
-pub fn of_force(design: &Design, constants: &Constants, ladders: &[Ladder]) -> Option<Budget> {
+pub fn of_force(design: &Design, constants: &Constants, sweeps: &[Sweep]) -> Option<ErrorBudget> {
     let sections = design.sections();
     let suspension = suspension_of(design).ok()?;
     let (claim, case) = sections
@@ -154,12 +155,12 @@ pub fn of_force(design: &Design, constants: &Constants, ladders: &[Ladder]) -> O
     };
     let mut shares = Vec::new();
     let mut add = |step: &str, source: &str, computed: bool, amount: f64| {
-        shares.push(Share { step: step.into(), source: source.into(), computed, amount });
+        shares.push(ErrorShare { step: step.into(), source: source.into(), computed, amount });
     };
-    if let Some(rung) =
-        ladders.iter().find(|l| l.name == "pose").and_then(|l| l.rungs.get(l.in_use.unwrap_or(usize::MAX)))
+    if let Some(sample) =
+        sweeps.iter().find(|l| l.name == "pose").and_then(|l| l.samples.get(l.in_use.unwrap_or(usize::MAX)))
     {
-        add("pose solver", "ladder pose", true, rung.rms_error);
+        add("pose solver", "sweep pose", true, sample.rms_error);
     }
     if let Some(found) = resolution_at(optics, &markers, noise_px, &suspension, &pose) {
         let sd = found.wrench_sd[..3].iter().map(|sd| sd * sd).sum::<f64>().sqrt();
@@ -192,9 +193,9 @@ pub fn of_force(design: &Design, constants: &Constants, ladders: &[Ladder]) -> O
     let title = format!(
         "Force read under \"{}\" ({} N), relative to rest, one standard deviation",
         claim.name,
-        super::sparse(force_n)
+        significant(force_n)
     );
-    Some(Budget::of(title, "N", shares))
+    Some(ErrorBudget::of(title, "N", shares))
 }
 
 fn size(force_n: &[f64; 3]) -> f64 {

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// Time of one piece of work over repeated runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Timing {
+pub struct RunTime {
     /// Median, s.
     pub median_s: f64,
     /// A quarter of the runs took less, s.
@@ -20,33 +20,33 @@ pub struct Timing {
 
 /// How much time a measurement may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Patience {
-    /// For all runs of one rung together.
-    pub per_rung: Duration,
+pub struct TimeLimit {
+    /// For all runs of one sample together.
+    pub per_sample: Duration,
     /// Fewest runs, however long they take.
-    pub least_runs: usize,
+    pub min_runs: usize,
     /// Most runs.
-    pub most_runs: usize,
+    pub max_runs: usize,
 }
 
-impl Patience {
+impl TimeLimit {
     /// For curves that are to be trusted.
-    pub const FULL: Self = Self { per_rung: Duration::from_millis(120), least_runs: 5, most_runs: 101 };
+    pub const FULL: Self = Self { per_sample: Duration::from_millis(120), min_runs: 5, max_runs: 101 };
     /// For a first look.
-    pub const QUICK: Self = Self { per_rung: Duration::from_millis(12), least_runs: 3, most_runs: 31 };
+    pub const QUICK: Self = Self { per_sample: Duration::from_millis(12), min_runs: 3, max_runs: 31 };
 }
 
 /// A run shorter than this is repeated within one reading of the clock.
 const SHORTEST: Duration = Duration::from_micros(200);
 
-/// Times `work`: once to warm up, then until the patience ends; work too short for the clock is timed in batches.
-pub fn time<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing {
+/// Times `work`: once to warm up, then until the time_limit ends; work too short for the clock is timed in batches.
+pub fn time<T>(time_limit: TimeLimit, mut work: impl FnMut() -> T) -> RunTime {
     black_box(work());
-    time_again(patience, work)
+    time_again(time_limit, work)
 }
 
 /// [`time`] of work that has just been done.
-pub fn time_again<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing {
+pub fn time_again<T>(time_limit: TimeLimit, mut work: impl FnMut() -> T) -> RunTime {
     let first = Instant::now();
     black_box(work());
     let once = first.elapsed().max(Duration::from_nanos(20));
@@ -54,8 +54,8 @@ pub fn time_again<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing 
     let began = Instant::now();
     // A run that is long enough for the clock counts.
     let mut seconds = if batch == 1 { vec![once.as_secs_f64()] } else { Vec::new() };
-    while seconds.len() < patience.least_runs
-        || (began.elapsed() < patience.per_rung && seconds.len() < patience.most_runs)
+    while seconds.len() < time_limit.min_runs
+        || (began.elapsed() < time_limit.per_sample && seconds.len() < time_limit.max_runs)
     {
         let start = Instant::now();
         for _ in 0..batch {
@@ -67,11 +67,11 @@ pub fn time_again<T>(patience: Patience, mut work: impl FnMut() -> T) -> Timing 
 }
 
 /// The timing that single runs make.
-pub fn of(mut seconds: Vec<f64>) -> Timing {
+pub fn of(mut seconds: Vec<f64>) -> RunTime {
     seconds.sort_by(f64::total_cmp);
     let at = |share: f64| {
         let index = (share * seconds.len().saturating_sub(1) as f64).round() as usize;
         seconds.get(index).copied().unwrap_or_default()
     };
-    Timing { median_s: at(0.5), lower_quartile_s: at(0.25), upper_quartile_s: at(0.75), runs: seconds.len() }
+    RunTime { median_s: at(0.5), lower_quartile_s: at(0.25), upper_quartile_s: at(0.75), runs: seconds.len() }
 }

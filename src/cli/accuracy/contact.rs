@@ -4,34 +4,35 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::clock::{Patience, time};
-use super::ladder::{Ladder, Law, Rung, sizes};
+use super::clock::{TimeLimit, time};
+use super::sweep::{Law, Sweep, SweepSample, sizes};
 use domecast_contact::{Contact, ContactError, ContactState, Indenter, Level, OnPole, Solid};
 use domecast_design::Design;
 use domecast_design::layout::Layout;
+use domecast_fab::numbers::significant;
 use domecast_optics::numeric::Rigid;
 
 /// Elements along the meridian of the reference.
 const FINEST: usize = 512;
 const QUICK_FINEST: usize = 256;
-/// Elements along the meridian of the linear rungs.
+/// Elements along the meridian of the linear samples.
 const ELEMENTS: [u32; 3] = [8, 16, 32];
 const QUICK_ELEMENTS: [u32; 2] = [8, 16];
 /// The ball and how deep it goes, in parts of the dome's radius: a fingertip on a pea.
 const BALL: f64 = 0.5;
 const DEPTH: f64 = 0.05;
 
-/// The ladder of levels.
+/// The sweep of levels.
 ///
 /// # Errors
 /// An elastomer or a dome that no level takes.
-pub fn ladder(
+pub fn sweep(
     design: &Design,
     layout: &Layout,
     asked_mm: Option<f64>,
-    patience: Patience,
+    time_limit: TimeLimit,
     quick: bool,
-) -> Result<Ladder, ContactError> {
+) -> Result<Sweep, ContactError> {
     let elastomer = domecast_sim::elastomer_of(design);
     let radius_mm = elastomer.dome_radius_mm;
     let ball = Indenter { solid: Solid::sphere(BALL * radius_mm)?, young_mpa: None, poisson: 0.3 };
@@ -57,11 +58,11 @@ pub fn ladder(
     let mut levels = vec![(Level::Geometric, "pushed out of the object".to_owned(), 1.0)];
     levels.push((Level::ClosedForm, "Hertz, with the bonded base".to_owned(), 2.0));
     for &count in counts {
-        let size_mm = super::sparse(arc_mm / f64::from(count));
+        let size_mm = significant(arc_mm / f64::from(count));
         levels.push((linear(count), format!("linear elements of {size_mm} mm"), f64::from(count)));
     }
-    let mut rungs = Vec::new();
-    for (level, label, dial) in levels {
+    let mut samples = Vec::new();
+    for (level, label, setting) in levels {
         let began = Instant::now();
         let contact = Contact::new(elastomer, level)?;
         let once_s = began.elapsed().as_secs_f64();
@@ -69,11 +70,11 @@ pub fn ladder(
         let off = moved(&state).into_iter().zip(&truth).map(|(a, b)| a.distance(*b)).collect::<Vec<_>>();
         let (max_error, rms_error, _) = sizes(off.into_iter());
         let timing =
-            time(patience, || contact.solve(&ball, &at, None).map(|s| s.iterations).unwrap_or_default());
-        rungs.push(Rung {
-            way: if matches!(level, Level::Linear { .. }) { "linear" } else { "local" },
+            time(time_limit, || contact.solve(&ball, &at, None).map(|s| s.iterations).unwrap_or_default());
+        samples.push(SweepSample {
+            method: if matches!(level, Level::Linear { .. }) { "linear" } else { "local" },
             label,
-            dial,
+            setting,
             max_error,
             rms_error,
             time: timing,
@@ -85,11 +86,16 @@ pub fn ladder(
             dominated: false,
         });
     }
-    let in_use = rungs.iter().position(|rung| rung.way == "linear" && rung.dial == 32.0);
-    Ok(Ladder {
+    Ok(sweep_of(samples, arc_mm / finest as f64, floor, asked_mm))
+}
+
+/// The sweep of its samples; the reference has elements of `finest_mm`, and its own error is `floor`.
+fn sweep_of(samples: Vec<SweepSample>, finest_mm: f64, floor: f64, asked_mm: Option<f64>) -> Sweep {
+    let in_use = samples.iter().position(|sample| sample.method == "linear" && sample.setting == 32.0);
+    Sweep {
         name: "contact",
         title: "Where a touch moves the dots".into(),
-        dial: "elements along the meridian",
+        setting: "elements along the meridian",
         error: "distance between where a dot goes and where it should, under a ball half as wide as the dome",
         unit: "mm",
         item: "solve",
@@ -97,17 +103,17 @@ pub fn ladder(
         reference: format!(
             "the same ball and dome by linear elements of {} mm, which a load that is the same at every azimuth allows; \
              known to {} mm",
-            super::sparse(arc_mm / finest as f64),
-            super::sparse(floor)
+            significant(finest_mm),
+            significant(floor)
         ),
         floor,
         law: Law::Falls,
         observed: None,
-        rungs,
+        samples,
         in_use,
         asked: asked_mm,
         meets: None,
-        says: "The simulator's plan takes the cheapest level whose bound keeps the scene's tolerance.".into(),
+        conclusion: "The simulator's plan takes the cheapest level whose bound keeps the scene's tolerance.".into(),
     }
-    .finish())
+    .finish()
 }

@@ -3,19 +3,20 @@
 use std::time::Instant;
 
 use super::clock;
-use super::ladder::{Ladder, Law, Rung};
+use super::sweep::{Law, Sweep, SweepSample};
 use domecast_design::Design;
+use domecast_fab::numbers::significant;
 use domecast_sim::Scene;
 use domecast_sim::scene::SceneFile;
 use domecast_sim::{Around, Drawn, Plan, Renderer, Scratch, SimError, Work};
 
-/// Tolerances of the ladder, in parts of the scene's own.
+/// Tolerances of the sweep, in parts of the scene's own.
 const PARTS: [f64; 5] = [64.0, 16.0, 4.0, 1.0, 0.25];
 const QUICK_PARTS: [f64; 2] = [16.0, 1.0];
 /// Frames that are drawn, spread over the scene.
 const FRAMES: u32 = 6;
 const QUICK_FRAMES: u32 = 2;
-/// The share of pixels whose difference is told: above it noise has its say.
+/// The share of pixels whose largest difference counts: the rest is noise.
 const SHARE: f64 = 0.999;
 
 /// The scene with few frames over its whole time, and its tolerances times a factor.
@@ -44,7 +45,7 @@ pub struct Sequence {
 /// Draws all frames in turn, on one thread.
 ///
 /// # Errors
-/// What the simulator says.
+/// Errors of the simulator.
 pub fn draw(scene: &Scene, renderer: &Renderer<'_>, scratch: &mut Scratch) -> Result<Sequence, SimError> {
     let count = scene.frame_count();
     let mut seconds = vec![0.0; count as usize];
@@ -90,21 +91,21 @@ fn difference(one: &Sequence, other: &Sequence) -> (f64, f64) {
     (worst as f64, (squares / total.max(1) as f64).sqrt())
 }
 
-/// The ladder of tolerances of a scene.
+/// The sweep of tolerances of a scene.
 ///
 /// # Errors
-/// What the simulator says of the scene.
-pub fn ladder(scene: &Scene, quick: bool) -> Result<(Ladder, Sequence), SimError> {
+/// Errors of the simulator on the scene.
+pub fn sweep(scene: &Scene, quick: bool) -> Result<(Sweep, Sequence), SimError> {
     let frames = if quick { QUICK_FRAMES } else { FRAMES };
     let own = changed(scene, 1.0, frames)?;
     let count = own.frame_count();
     let everything = Plan::exact(&own)?;
     let mut scratch = Scratch::default();
     let renderer = Renderer::new(&own, &everything)?;
-    // To warm up: the reference is a rung, too.
+    // To warm up: the reference is a sample, too.
     renderer.frame_around(0, None, &mut scratch)?;
     let truth = draw(&own, &renderer, &mut scratch)?;
-    let rung = |label: String, dial: f64, plan: &Plan, sequence: &Sequence| {
+    let sample = |label: String, setting: f64, plan: &Plan, sequence: &Sequence| {
         let (max_error, rms_error) = difference(sequence, &truth);
         // the tables were made with the renderer; what frames differ by is the spread
         let mut time = clock::of(sequence.seconds.clone());
@@ -114,40 +115,49 @@ pub fn ladder(scene: &Scene, quick: bool) -> Result<(Ladder, Sequence), SimError
         }
         let used = plan.entries.iter().filter(|entry| entry.used).count();
         let notes = vec![("effects used".into(), used as f64)];
-        Rung { way: "", label, dial, max_error, rms_error, time, per_item_s, notes, dominated: false }
+        SweepSample {
+            method: "",
+            label,
+            setting,
+            max_error,
+            rms_error,
+            time,
+            per_item_s,
+            notes,
+            dominated: false,
+        }
     };
-    let mut rungs = Vec::new();
+    let mut samples = Vec::new();
     let parts: &[f64] = if quick { &QUICK_PARTS } else { &PARTS };
     for &part in parts {
         let scene = changed(scene, part, frames)?;
         let tolerance = &scene.file().tolerance;
-        let label =
-            format!("{} px, {} grey levels", super::sparse(tolerance.px), super::sparse(tolerance.grey));
+        let label = format!("{} px, {} grey levels", significant(tolerance.px), significant(tolerance.grey));
         let plan = Plan::of(&scene)?;
         let sequence = draw(&scene, &Renderer::new(&scene, &plan)?, &mut scratch)?;
-        rungs.push(rung(label, tolerance.grey, &plan, &sequence));
+        samples.push(sample(label, tolerance.grey, &plan, &sequence));
     }
     // The reference itself, with what it took.
-    rungs.push(rung("every effect".into(), 0.0, &everything, &truth));
+    samples.push(sample("every effect".into(), 0.0, &everything, &truth));
     let tolerance = &own.file().tolerance;
-    let ladder = Ladder {
+    let sweep = Sweep {
         name: "frames",
         title: format!("Frames of the scene {}", scene.name()),
-        dial: "tolerance, grey levels",
+        setting: "tolerance, grey levels",
         error: "difference from the frame with every effect that 999 of 1000 values keep to",
         unit: "grey levels",
         item: "frame",
         items: count as usize,
         reference: "the same frames with every effect that the scene calls for".into(),
-        // a code is rounded: one level tells nothing
+        // a code is rounded: one level means nothing
         floor: 0.01,
         law: Law::Falls,
         observed: None,
-        rungs,
+        samples,
         in_use: parts.iter().position(|part| *part == 1.0),
         asked: Some(tolerance.grey),
         meets: None,
-        says: "An effect that the tolerance spares costs nothing.".into(),
+        conclusion: "An effect that the tolerance spares costs nothing.".into(),
     };
-    Ok((ladder.finish(), truth))
+    Ok((sweep.finish(), truth))
 }

@@ -2,18 +2,18 @@
 
 use glam::{DVec2, DVec3};
 
-use super::clock::{Patience, time};
-use super::ladder::{Ladder, Law, Rung};
+use super::clock::{TimeLimit, time};
+use super::sweep::{Law, Sweep, SweepSample};
 use domecast_design::layout::Layout;
 use domecast_optics::camera::{Lens, LensModel};
 
-/// Newton steps of the ladder.
+/// Newton steps of the sweep.
 const NEWTON_STEPS: [u32; 7] = [0, 1, 2, 3, 4, 5, 6];
-/// Rounds of the fixed point; OpenCV's `undistortPoints` takes five unless told otherwise.
+/// Rounds of the fixed point; OpenCV's `undistortPoints` takes five by default.
 const FIXED_POINT_ROUNDS: [u32; 6] = [2, 5, 10, 20, 40, 80];
 
-/// The ladder for the pixels of the dots; `None` for a lens without distortion, which has nothing to invert.
-pub fn ladder(lens: &Lens, layout: &Layout, asked_px: Option<f64>, patience: Patience) -> Option<Ladder> {
+/// The sweep for the pixels of the dots; `None` for a lens without distortion, which has nothing to invert.
+pub fn sweep(lens: &Lens, layout: &Layout, asked_px: Option<f64>, time_limit: TimeLimit) -> Option<Sweep> {
     if lens.spec().model == LensModel::Pinhole {
         return None;
     }
@@ -22,12 +22,19 @@ pub fn ladder(lens: &Lens, layout: &Layout, asked_px: Option<f64>, patience: Pat
         Some(again) => again.distance(pixel),
         None => f64::NAN,
     };
-    let mut rungs = Vec::new();
-    let mut add = |way: &'static str, label: String, dial: f64, solve: &dyn Fn(DVec2) -> Option<DVec3>| {
-        let errors = pixels.iter().map(|&pixel| error_px(pixel, solve(pixel)));
-        let time = time(patience, || pixels.iter().filter(|pixel| solve(**pixel).is_some()).count());
-        rungs.push(Rung::of((way, label), dial, errors, (time, pixels.len()), "pixels without a ray"));
-    };
+    let mut samples = Vec::new();
+    let mut add =
+        |method: &'static str, label: String, setting: f64, solve: &dyn Fn(DVec2) -> Option<DVec3>| {
+            let errors = pixels.iter().map(|&pixel| error_px(pixel, solve(pixel)));
+            let time = time(time_limit, || pixels.iter().filter(|pixel| solve(**pixel).is_some()).count());
+            samples.push(SweepSample::of(
+                (method, label),
+                setting,
+                errors,
+                (time, pixels.len()),
+                "pixels without a ray",
+            ));
+        };
     for rounds in FIXED_POINT_ROUNDS {
         let label = format!("fixed point, {rounds} rounds");
         add("fixed point", label, f64::from(rounds), &|pixel| fixed_point(lens, pixel, rounds));
@@ -37,13 +44,13 @@ pub fn ladder(lens: &Lens, layout: &Layout, asked_px: Option<f64>, patience: Pat
         add("newton", label, f64::from(steps), &|pixel| newton(lens, pixel, steps));
     }
     add("table", "table and one Newton step".into(), 1.0, &|pixel| lens.unproject(pixel).ok());
-    let in_use = rungs.len() - 1;
+    let in_use = samples.len() - 1;
     let span_px = lens.max_radius_px();
     Some(
-        Ladder {
+        Sweep {
             name: "lens",
             title: "The ray of a pixel".into(),
-            dial: "steps",
+            setting: "steps",
             error: "distance of the ray's own pixel from the one asked for, the worst of the dots",
             unit: "px",
             item: "pixel",
@@ -52,11 +59,11 @@ pub fn ladder(lens: &Lens, layout: &Layout, asked_px: Option<f64>, patience: Pat
             floor: 4.0 * f64::EPSILON * span_px,
             law: Law::Steps { order: 2.0 },
             observed: None,
-            rungs,
+            samples,
             in_use: Some(in_use),
             asked: asked_px,
             meets: None,
-            says: "Exact rays cost less than rough ones: there is nothing to choose.".into(),
+            conclusion: "Exact rays cost less than rough ones: there is nothing to choose.".into(),
         }
         .finish(),
     )

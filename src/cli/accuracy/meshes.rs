@@ -5,33 +5,34 @@ use std::time::Instant;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::clock::{Patience, time_again};
-use super::ladder::{Ladder, Law, Rung};
+use super::clock::{TimeLimit, time_again};
+use super::sweep::{Law, Sweep, SweepSample};
 use domecast_design::parts::Part;
+use domecast_fab::numbers::significant;
 use domecast_mesh::{Chord, Construction, MeshError, TriMesh, inspect};
 
 /// Chord tolerances, mm.
-const RUNGS_MM: [f64; 6] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001];
-const QUICK_MM: [f64; 3] = [0.1, 0.03, 0.01];
+const TOLERANCES_MM: [f64; 6] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001];
+const QUICK_TOLERANCES_MM: [f64; 3] = [0.1, 0.03, 0.01];
 /// Bytes of a binary STL: its head, and each triangle.
 const STL_HEAD: f64 = 84.0;
 const STL_TRIANGLE: f64 = 50.0;
 /// Facets of a part that are held against the exact surface; an even choice where there are more.
-const MOST_FACETS: usize = 4000;
+const MAX_FACETS: usize = 4000;
 
-/// The ladder of chord tolerances over all parts.
+/// The sweep of chord tolerances over all parts.
 ///
 /// # Errors
 /// A mesh that the kernel could not make.
-pub fn ladder(
+pub fn sweep(
     parts: &[Part],
     in_use_mm: f64,
     asked_mm: Option<f64>,
-    patience: Patience,
+    time_limit: TimeLimit,
     quick: bool,
-) -> Result<Ladder, MeshError> {
+) -> Result<Sweep, MeshError> {
     let plain: Vec<Construction> = parts.iter().map(|part| without_own_chords(&part.construction)).collect();
-    let mut tolerances = if quick { QUICK_MM.to_vec() } else { RUNGS_MM.to_vec() };
+    let mut tolerances = if quick { QUICK_TOLERANCES_MM.to_vec() } else { TOLERANCES_MM.to_vec() };
     if !tolerances.contains(&in_use_mm) {
         tolerances.push(in_use_mm);
     }
@@ -39,12 +40,12 @@ pub fn ladder(
     let make = |chord: Chord| -> Result<Vec<TriMesh>, MeshError> {
         plain.iter().map(|part| Ok(part.solid(chord)?.to_mesh().welded_f32())).collect()
     };
-    // the volume's error falls with the tolerance, so two rungs give the limit
+    // the volume's error falls with the tolerance, so two samples give the limit
     let (finest, finer) = (tolerances[tolerances.len() - 1], 0.5 * tolerances[tolerances.len() - 1]);
     let volumes = |meshes: &[TriMesh]| meshes.iter().map(TriMesh::volume_mm3).collect::<Vec<f64>>();
     let (coarse, fine) = (volumes(&make(Chord::new(finest)?)?), volumes(&make(Chord::new(finer)?)?));
     let limit: Vec<f64> = coarse.iter().zip(&fine).map(|(a, b)| 2.0 * b - a).collect();
-    let mut rungs = Vec::new();
+    let mut samples = Vec::new();
     for &tolerance_mm in &tolerances {
         let chord = Chord::new(tolerance_mm)?;
         let meshes = make(chord)?;
@@ -63,11 +64,11 @@ pub fn ladder(
         let by_volume =
             meshes.iter().zip(&limit).map(|(mesh, limit)| (mesh.volume_mm3() / limit - 1.0).abs());
         let check = once(|| meshes.iter().filter(|mesh| inspect(mesh).is_one_solid()).count());
-        let time = time_again(patience, || make(chord).map(|meshes| meshes.len()).unwrap_or_default());
-        rungs.push(Rung {
-            way: "",
-            label: format!("chord tolerance {} mm", super::sparse(tolerance_mm)),
-            dial: tolerance_mm,
+        let time = time_again(time_limit, || make(chord).map(|meshes| meshes.len()).unwrap_or_default());
+        samples.push(SweepSample {
+            method: "",
+            label: format!("chord tolerance {} mm", significant(tolerance_mm)),
+            setting: tolerance_mm,
             max_error,
             rms_error: (squares / count.max(1) as f64).sqrt(),
             time,
@@ -81,12 +82,17 @@ pub fn ladder(
             dominated: false,
         });
     }
-    let in_use = rungs.iter().position(|rung| rung.dial == in_use_mm);
+    Ok(sweep_of(samples, parts, in_use_mm, asked_mm))
+}
+
+/// The sweep of its samples.
+fn sweep_of(samples: Vec<SweepSample>, parts: &[Part], in_use_mm: f64, asked_mm: Option<f64>) -> Sweep {
+    let in_use = samples.iter().position(|sample| sample.setting == in_use_mm);
     let size_mm = parts.iter().map(|part| part.bounds.size_mm().max_element()).fold(0.0, f64::max);
-    Ok(Ladder {
+    Sweep {
         name: "mesh",
         title: "The parts as meshes".into(),
-        dial: "chord tolerance, mm",
+        setting: "chord tolerance, mm",
         error: "distance of facets' corners, edges and middles from the exact surfaces",
         unit: "mm",
         item: "part",
@@ -96,13 +102,13 @@ pub fn ladder(
         floor: 0.01 * f64::from(f32::EPSILON) * size_mm,
         law: Law::Power { exponent: 1.0 },
         observed: None,
-        rungs,
+        samples,
         in_use,
         asked: asked_mm,
         meets: None,
-        says: "Ten times the exactness costs about three times the triangles.".into(),
+        conclusion: "Ten times the exactness costs about three times the triangles.".into(),
     }
-    .finish())
+    .finish()
 }
 
 /// The construction with one chord tolerance for all of its pieces.
@@ -116,7 +122,7 @@ fn without_own_chords(construction: &Construction) -> Construction {
 
 /// How far points of the facets are from the nearest of the exact surfaces, mm.
 pub(super) fn deviations<'a>(mesh: &'a TriMesh, part: &'a Construction) -> impl Iterator<Item = f64> + 'a {
-    let step = mesh.triangles.len().div_ceil(MOST_FACETS).max(1);
+    let step = mesh.triangles.len().div_ceil(MAX_FACETS).max(1);
     mesh.iter_mm()
         .step_by(step)
         .flat_map(|[a, b, c]| [a, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a), (a + b + c) / 3.0])

@@ -3,21 +3,21 @@
 use glam::{DVec2, DVec3};
 use nalgebra::{Matrix2, Vector2};
 
-use super::clock::{Patience, time};
-use super::ladder::{Ladder, Law, Rung};
+use super::clock::{TimeLimit, time};
+use super::sweep::{Law, Sweep, SweepSample};
 use domecast_design::layout::Layout;
 use domecast_optics::{ColorChannel, SensorOptics};
 
 /// Newton steps of the reference: it starts within a pixel and ends at rounding after three.
 const REFERENCE_STEPS: u32 = 6;
 
-/// The ladder of models; `None` where the optics cannot be taken apart.
-pub fn ladder(
+/// The sweep of models; `None` where the optics cannot be taken apart.
+pub fn sweep(
     optics: &SensorOptics,
     layout: &Layout,
     asked_mm: Option<f64>,
-    patience: Patience,
-) -> Option<Ladder> {
+    time_limit: TimeLimit,
+) -> Option<Sweep> {
     let mut spec = optics.spec();
     let channels = ColorChannel::ALL.map(|channel| optics.for_channel(channel));
     for layer in &mut spec.layers {
@@ -40,22 +40,22 @@ pub fn ladder(
         ("with the layers' refraction", &|pixel| trace(optics, pixel)),
         ("mean of the three channels", &mean_trace),
     ];
-    let mut rungs = Vec::new();
+    let mut samples = Vec::new();
     for (index, (label, place)) in places.iter().enumerate() {
         let off = pixels.iter().zip(&truth).map(|(&pixel, truth)| match (place(pixel), truth) {
             (Some(at), Some(truth)) => at.distance(*truth),
             _ => f64::NAN,
         });
-        let time = time(patience, || pixels.iter().filter(|pixel| place(**pixel).is_some()).count());
-        let (name, dial) = (("", (*label).to_owned()), index as f64 + 1.0);
-        rungs.push(Rung::of(name, dial, off, (time, pixels.len()), "dots off the dome"));
+        let time = time(time_limit, || pixels.iter().filter(|pixel| place(**pixel).is_some()).count());
+        let (name, setting) = (("", (*label).to_owned()), index as f64 + 1.0);
+        samples.push(SweepSample::of(name, setting, off, (time, pixels.len()), "dots off the dome"));
     }
-    let saved = rungs[0].rms_error / rungs[1].rms_error.max(f64::MIN_POSITIVE);
+    let saved = samples[0].rms_error / samples[1].rms_error.max(f64::MIN_POSITIVE);
     Some(
-        Ladder {
+        Sweep {
             name: "placement",
             title: "A dot's place on the dome".into(),
-            dial: "model",
+            setting: "model",
             error: "distance from the place whose three images, red, green and blue, lie about the pixel",
             unit: "mm",
             item: "dot",
@@ -64,11 +64,11 @@ pub fn ladder(
             floor: 1e-14 * optics.dome_radius_mm(),
             law: Law::Falls,
             observed: None,
-            rungs,
+            samples,
             in_use: Some(1),
             asked: asked_mm,
             meets: None,
-            says: format!(
+            conclusion: format!(
                 "Leaving refraction out costs {saved:.0} times the error; what the colours still disagree by is \
                  below any print's scatter."
             ),

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::clock::{Patience, time};
-use super::ladder::{Ladder, Law, Rung};
+use super::clock::{TimeLimit, time};
+use super::sweep::{Law, Sweep, SweepSample};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::{Rigid, rotation_from_vector};
 use domecast_optics::pose::{Marker, PoseOptions, PoseSolver, Sighting};
@@ -20,8 +20,8 @@ struct Seen {
     raw: Vec<Sighting>,
 }
 
-/// The ladder of solvers; `None` where the constants hold no springs or a marker is never seen.
-pub fn ladder(constants: &Constants, asked_n: Option<f64>, patience: Patience) -> Option<Ladder> {
+/// The sweep of solvers; `None` where the constants hold no springs or a marker is never seen.
+pub fn sweep(constants: &Constants, asked_n: Option<f64>, time_limit: TimeLimit) -> Option<Sweep> {
     let optics = constants.sensor().ok()?;
     let markers = constants.markers();
     let springs = constants.springs.as_ref()?;
@@ -54,17 +54,23 @@ pub fn ladder(constants: &Constants, asked_n: Option<f64>, patience: Patience) -
         let off = stiffness * (d(found) - d(truth));
         (0..3).map(|axis| off[axis].abs()).fold(0.0, f64::max)
     };
-    let mut rungs = Vec::new();
-    let mut add = |way: &'static str, label: &str, solve: &dyn Fn(&Seen) -> Option<Rigid>| {
+    let mut samples = Vec::new();
+    let mut add = |method: &'static str, label: &str, solve: &dyn Fn(&Seen) -> Option<Rigid>| {
         let off = seen.iter().map(|one| solve(one).map_or(f64::NAN, |pose| force_off(&pose, &one.pose)));
-        let time = time(patience, || seen.iter().filter(|one| solve(one).is_some()).count());
-        rungs.push(Rung::of((way, label.to_owned()), 0.0, off, (time, seen.len()), "poses not found"));
+        let time = time(time_limit, || seen.iter().filter(|one| solve(one).is_some()).count());
+        samples.push(SweepSample::of(
+            (method, label.to_owned()),
+            0.0,
+            off,
+            (time, seen.len()),
+            "poses not found",
+        ));
     };
-    let mut plain = |way: &'static str, label: &str, positions: &[DVec3]| -> Option<()> {
+    let mut plain = |method: &'static str, label: &str, positions: &[DVec3]| -> Option<()> {
         let solver = PlainRuntimeSolver::new(&input, positions).ok()?;
         let undistort = |one: &Seen| solver.undistorted(&optics, &one.raw);
         let from_rest = solver.pose(&undistort(&rest)?).ok()?.inverse();
-        add(way, label, &|one| Some(from_rest.compose(&solver.pose(&undistort(one)?).ok()?)));
+        add(method, label, &|one| Some(from_rest.compose(&solver.pose(&undistort(one)?).ok()?)));
         Some(())
     };
     plain("painted", "undistort and solvePnP, markers as painted", &painted)?;
@@ -74,33 +80,37 @@ pub fn ladder(constants: &Constants, asked_n: Option<f64>, patience: Patience) -
     let solver = PoseSolver::new(&optics, &markers, PoseOptions::new(1e-3, REACH_MM)).ok()?;
     add("closed form", "closed form, refraction on the axis only", &|one| solver.start(&one.raw).ok());
     add("refined", "refined with refraction and discs", &|one| Some(solver.solve(&one.raw).ok()?.pose));
-    for (index, rung) in rungs.iter_mut().enumerate() {
-        rung.dial = index as f64 + 1.0;
+    for (index, sample) in samples.iter_mut().enumerate() {
+        sample.setting = index as f64 + 1.0;
     }
-    let in_use = rungs.len() - 1;
-    Some(
-        Ladder {
-            name: "pose",
-            title: "Pose and force from the white markers".into(),
-            dial: "solver",
-            error: "largest error on an axis of force by the nominal 6x6, centroids without noise",
-            unit: "N",
-            item: "pose",
-            items: seen.len(),
-            reference: "the poses that the centroids were made from".into(),
-            floor: 1e-12,
-            law: Law::Falls,
-            observed: None,
-            rungs,
-            in_use: Some(in_use),
-            asked: asked_n,
-            meets: None,
-            says: "Refraction costs microseconds; leaving it out costs what no calibration of the 6x6 brings back \
+    Some(sweep_of(samples, seen.len(), asked_n))
+}
+
+/// The sweep of its samples.
+fn sweep_of(samples: Vec<SweepSample>, items: usize, asked_n: Option<f64>) -> Sweep {
+    let in_use = samples.len() - 1;
+    Sweep {
+        name: "pose",
+        title: "Pose and force from the white markers".into(),
+        setting: "solver",
+        error: "largest error on an axis of force by the nominal 6x6, centroids without noise",
+        unit: "N",
+        item: "pose",
+        items,
+        reference: "the poses that the centroids were made from".into(),
+        floor: 1e-12,
+        law: Law::Falls,
+        observed: None,
+        samples,
+        in_use: Some(in_use),
+        asked: asked_n,
+        meets: None,
+        conclusion:
+            "Refraction costs microseconds; leaving it out costs what no calibration of the 6x6 brings back \
                    entirely."
                 .into(),
-        }
-        .finish(),
-    )
+    }
+    .finish()
 }
 
 /// Poses spread evenly over what a loaded sensor does: a low-discrepancy sequence (Roberts' R6).

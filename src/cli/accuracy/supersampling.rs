@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 
-use super::clock::{Patience, time};
-use super::ladder::{Ladder, Law, Rung};
+use super::clock::{TimeLimit, time};
+use super::sweep::{Law, Sweep, SweepSample};
 use domecast_design::layout::Layout;
 use domecast_sim::edges::{Coverage, EDGE_GREY, RIM_POINTS, RimFit};
 
@@ -29,7 +29,7 @@ impl Raster {
         let (low, high) = outline
             .iter()
             .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
-        let clamp = |v: f64, most: usize| v.clamp(0.0, most as f64) as i64;
+        let clamp = |v: f64, max: usize| v.clamp(0.0, max as f64) as i64;
         let (left, top) = (clamp(low.x.floor() - 1.0, width), clamp(low.y.floor() - 1.0, height));
         let (right, bottom) = (clamp(high.x.ceil() + 2.0, width), clamp(high.y.ceil() + 2.0, height));
         let width = (right - left) as usize;
@@ -85,14 +85,14 @@ impl Raster {
     }
 }
 
-/// The ladder of points in a pixel; `None` where the pattern has no dots.
-pub fn ladder(
+/// The sweep of points in a pixel; `None` where the pattern has no dots.
+pub fn sweep(
     layout: &Layout,
     size: (usize, usize),
     asked_grey: Option<f64>,
-    patience: Patience,
+    time_limit: TimeLimit,
     quick: bool,
-) -> Option<Ladder> {
+) -> Option<Sweep> {
     let widths = layout.dots.iter().map(|dot| 0.5 * dot.image_outline.widths().1);
     let radius_px = widths.fold(1.0, f64::max);
     let fit = RimFit::new(radius_px, EDGE_GREY / WHITE);
@@ -129,16 +129,16 @@ pub fn ladder(
     };
     let items = polygons.len();
     let mut crossings = Vec::new();
-    let mut rungs = Vec::new();
+    let mut samples = Vec::new();
     for &count in if quick { &QUICK_POINTS[..] } else { &POINTS } {
         let mut draw = || {
             for (raster, polygon) in rasters.iter_mut().zip(&polygons) {
                 raster.fill_by_points(polygon, count, &mut crossings);
             }
         };
-        let timing = time(patience, &mut draw);
+        let timing = time(time_limit, &mut draw);
         let label = format!("{count} x {count} points");
-        rungs.push(Rung::of(
+        samples.push(SweepSample::of(
             ("points", label),
             f64::from(count),
             errors(&rasters).into_iter(),
@@ -151,15 +151,25 @@ pub fn ladder(
             raster.fill_by_area(&mut coverage, polygon, size);
         }
     };
-    let timing = time(patience, &mut draw);
+    let timing = time(time_limit, &mut draw);
     let corners = polygons.first().map_or(0, Vec::len);
     let label = format!("areas of polygons of {corners} corners");
-    rungs.push(Rung::of(("areas", label), 1.0, errors(&rasters).into_iter(), (timing, items), ""));
-    Some(
-        Ladder {
+    samples.push(SweepSample::of(("areas", label), 1.0, errors(&rasters).into_iter(), (timing, items), ""));
+    Some(sweep_of(samples, items, fine_corners, sag_px, asked_grey))
+}
+
+/// The sweep of its samples; a chord of the reference lacks `sag_px` of a pixel along it.
+fn sweep_of(
+    samples: Vec<SweepSample>,
+    items: usize,
+    fine_corners: usize,
+    sag_px: f64,
+    asked_grey: Option<f64>,
+) -> Sweep {
+    Sweep {
             name: "supersampling",
             title: "Edges of dots in a drawn frame".into(),
-            dial: "points along a pixel's side",
+            setting: "points along a pixel's side",
             error: "difference of an edge pixel of a black dot on white",
             unit: "grey levels",
             item: "dot",
@@ -170,14 +180,13 @@ pub fn ladder(
             // Each line of points misses its edge by up to one of them, evenly, and the lines are independent: n^-1 n^-1/2.
             law: Law::Power { exponent: -1.5 },
             observed: None,
-            in_use: Some(rungs.len() - 1),
-            rungs,
+            in_use: Some(samples.len() - 1),
+            samples,
             asked: asked_grey,
             meets: None,
-            says: "The simulator draws areas: what is left is how finely a polygon's corners follow the outline, and points \
+            conclusion: "The simulator draws areas: what is left is how finely a polygon's corners follow the outline, and points \
                    in a pixel buy nothing."
                 .into(),
         }
-        .finish(),
-    )
+        .finish()
 }

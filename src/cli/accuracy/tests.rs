@@ -1,26 +1,32 @@
 #[path = "../../design/parts/tests/random_designs.rs"]
 mod random_designs;
 
-use super::ladder::sizes;
-use super::*;
 use std::str::FromStr;
+
+use super::clock::{RunTime, TimeLimit};
+use super::files::{accuracy_files, csv};
+use super::measure::{STEPS, measure};
+use super::sweep::{Law, Sweep, SweepSample, sizes};
+use super::{meshes, outline, placement};
+use domecast_design::layout::{Layout, LayoutSpec};
+use domecast_design::{Design, DesignError, parts};
 
 fn design_from(change: impl FnOnce(&mut serde_json::Value)) -> Result<Design, DesignError> {
     let mut value: serde_json::Value =
         serde_json::from_str(include_str!("../../../designs/thumb24.json")).unwrap();
     change(&mut value);
-    domecast_design::Design::from_str(&value.to_string())
+    Design::from_str(&value.to_string())
 }
 
-fn timing(median_s: f64) -> Timing {
-    Timing { median_s, lower_quartile_s: median_s, upper_quartile_s: median_s, runs: 1 }
+fn timing(median_s: f64) -> RunTime {
+    RunTime { median_s, lower_quartile_s: median_s, upper_quartile_s: median_s, runs: 1 }
 }
 
-fn ladder(law: Law, rungs: &[(&'static str, f64, f64, f64)]) -> Ladder {
-    let rung = |&(way, dial, error, seconds): &(&'static str, f64, f64, f64)| Rung {
-        way,
-        label: format!("{dial}"),
-        dial,
+fn sweep(law: Law, samples: &[(&'static str, f64, f64, f64)]) -> Sweep {
+    let sample = |&(method, setting, error, seconds): &(&'static str, f64, f64, f64)| SweepSample {
+        method,
+        label: format!("{setting}"),
+        setting,
         max_error: error,
         rms_error: error,
         time: timing(seconds),
@@ -28,10 +34,10 @@ fn ladder(law: Law, rungs: &[(&'static str, f64, f64, f64)]) -> Ladder {
         notes: Vec::new(),
         dominated: false,
     };
-    Ladder {
+    Sweep {
         name: "made",
         title: "Made up".into(),
-        dial: "dial",
+        setting: "setting",
         error: "error",
         unit: "mm",
         item: "thing",
@@ -40,19 +46,19 @@ fn ladder(law: Law, rungs: &[(&'static str, f64, f64, f64)]) -> Ladder {
         floor: 1e-18,
         law,
         observed: None,
-        rungs: rungs.iter().map(rung).collect(),
+        samples: samples.iter().map(sample).collect(),
         in_use: Some(0),
         asked: Some(0.02),
         meets: None,
-        says: String::new(),
+        conclusion: String::new(),
     }
     .finish()
 }
 
 #[test]
-fn orders_fronts_and_choices_follow_from_the_rungs() {
-    // error ~ dial^3, and one rung that is slower and worse than its neighbour
-    let cubic = ladder(
+fn orders_fronts_and_choices_follow_from_the_samples() {
+    // error ~ setting^3, and one sample that is slower and worse than its neighbour
+    let cubic = sweep(
         Law::Power { exponent: 3.0 },
         &[
             ("", 1.0, 1.0, 1.0),
@@ -62,10 +68,10 @@ fn orders_fronts_and_choices_follow_from_the_rungs() {
         ],
     );
     assert!((cubic.observed.unwrap() - 3.0).abs() < 1e-3);
-    assert_eq!(cubic.rungs.iter().map(|r| r.dominated).collect::<Vec<_>>(), [false, true, false, false]);
+    assert_eq!(cubic.samples.iter().map(|r| r.dominated).collect::<Vec<_>>(), [false, true, false, false]);
     assert_eq!(cubic.meets, Some(2));
-    // Newton: each error is the square of the one before; the rounding at the end tells nothing
-    let newton = ladder(
+    // Newton: each error is the square of the one before; the rounding at the end means nothing
+    let newton = sweep(
         Law::Steps { order: 2.0 },
         &[
             ("n", 0.0, 0.1, 1.0),
@@ -85,31 +91,34 @@ fn orders_fronts_and_choices_follow_from_the_rungs() {
     assert!((rms - 12.5_f64.sqrt()).abs() < 1e-12);
 }
 
-/// What is wrong with a ladder that should fall from rung to rung of one way, but for rounding, by the order that
+/// What is wrong with a sweep that should fall from sample to sample of one method, but for rounding, by the order that
 /// theory gives.
-fn faults_of(ladder: &Ladder) -> Vec<String> {
+fn faults_of(sweep: &Sweep) -> Vec<String> {
     let mut faults = Vec::new();
-    let blind = ladder.blind_below();
-    let name = ladder.name;
-    for two in ladder.rungs.windows(2).filter(|two| two[0].way == two[1].way) {
+    let noise_floor = sweep.noise_floor();
+    let name = sweep.name;
+    for two in sweep.samples.windows(2).filter(|two| two[0].method == two[1].method) {
         let scatter = if name == "chance" { 1.25 } else { 1.0 + 1e-9 };
-        if two[1].rms_error > two[0].rms_error * scatter + blind {
-            let told = two.iter().map(|rung| format!("{} leaves {:e}", rung.label, rung.rms_error));
-            faults.push(format!("{name}: {}", told.collect::<Vec<_>>().join(", ")));
+        if two[1].rms_error > two[0].rms_error * scatter + noise_floor {
+            let errors = two.iter().map(|sample| format!("{} leaves {:e}", sample.label, sample.rms_error));
+            faults.push(format!("{name}: {}", errors.collect::<Vec<_>>().join(", ")));
         }
     }
-    let (theory, slack) = match ladder.law {
+    let (theory, slack) = match sweep.law {
         Law::Power { exponent } => (exponent, 0.25 * exponent.abs().max(0.6)),
         Law::Steps { order } => (order, 0.5),
         Law::Within => {
-            let passed = |rung: &&Rung| rung.max_error > rung.dial * (1.0 + 1e-6) + blind;
-            let passed = ladder.rungs.iter().filter(passed);
-            faults.extend(passed.map(|rung| format!("{name}: {} leaves {:e}", rung.label, rung.max_error)));
+            let passed =
+                |sample: &&SweepSample| sample.max_error > sample.setting * (1.0 + 1e-6) + noise_floor;
+            let passed = sweep.samples.iter().filter(passed);
+            faults.extend(
+                passed.map(|sample| format!("{name}: {} leaves {:e}", sample.label, sample.max_error)),
+            );
             return faults;
         }
         Law::Falls => return faults,
     };
-    match ladder.observed {
+    match sweep.observed {
         Some(seen) if (seen - theory).abs() <= slack => {}
         seen => faults.push(format!("{name}: order {seen:?}, by theory {theory}")),
     }
@@ -117,40 +126,40 @@ fn faults_of(ladder: &Ladder) -> Vec<String> {
 }
 
 #[test]
-fn ladders_fall_at_their_orders() {
-    ladders_of("thumb24", include_str!("../../../designs/thumb24.json"), 0);
+fn sweeps_fall_at_their_orders() {
+    sweeps_of("thumb24", include_str!("../../../designs/thumb24.json"), 0);
 }
 
 #[test]
-fn long_ladders_of_the_twins_fall_at_their_orders() {
-    ladders_of("thumb24-pinhole", include_str!("../../../designs/thumb24-pinhole.json"), 1);
-    ladders_of("thumb24-fisheye", include_str!("../../../designs/thumb24-fisheye.json"), 0);
+fn long_sweeps_of_the_twins_fall_at_their_orders() {
+    sweeps_of("thumb24-pinhole", include_str!("../../../designs/thumb24-pinhole.json"), 1);
+    sweeps_of("thumb24-fisheye", include_str!("../../../designs/thumb24-fisheye.json"), 0);
 }
 
-/// `left_out` dials are not of this design.
-fn ladders_of(name: &str, text: &str, left_out: usize) {
-    let design = domecast_design::Design::from_str(text).unwrap();
+/// `left_out` settings are not of this design.
+fn sweeps_of(name: &str, text: &str, left_out: usize) {
+    let design = Design::from_str(text).unwrap();
     let mut steps = Vec::new();
     let measured = measure(&design, None, true, &mut |done, _| steps.push(done)).unwrap();
     assert_eq!(steps, (0..STEPS).collect::<Vec<_>>(), "{name}");
     let mut faults = Vec::new();
-    for ladder in &measured.ladders {
-        faults.extend(faults_of(ladder));
+    for sweep in &measured.sweeps {
+        faults.extend(faults_of(sweep));
         // a quick look at contact stops short of the elements that the simulator starts from
-        assert!(ladder.in_use.is_some() || ladder.name == "contact", "{name}: {}", ladder.name);
-        for rung in &ladder.rungs {
-            assert!(rung.time.median_s > 0.0 && rung.max_error.is_finite(), "{}", rung.label);
+        assert!(sweep.in_use.is_some() || sweep.name == "contact", "{name}: {}", sweep.name);
+        for sample in &sweep.samples {
+            assert!(sample.time.median_s > 0.0 && sample.max_error.is_finite(), "{}", sample.label);
         }
-        if let (Some(asked), Some(index)) = (ladder.asked, ladder.meets) {
-            assert!(ladder.rungs[index].max_error <= asked);
+        if let (Some(asked), Some(index)) = (sweep.asked, sweep.meets) {
+            assert!(sweep.samples[index].max_error <= asked);
         }
     }
     assert!(faults.is_empty(), "{name}: {faults:#?}");
     // without noise the refracting solver is exact, and the runtime that knows no layers is not
-    let pose = measured.ladders.iter().find(|ladder| ladder.name == "pose").unwrap();
-    let refined = pose.rungs.last().unwrap();
+    let pose = measured.sweeps.iter().find(|sweep| sweep.name == "pose").unwrap();
+    let refined = pose.samples.last().unwrap();
     assert!(refined.max_error < 1e-6, "{:e} N", refined.max_error);
-    assert!(pose.rungs.iter().all(|rung| rung.max_error >= refined.max_error));
+    assert!(pose.samples.iter().all(|sample| sample.max_error >= refined.max_error));
     assert_eq!(measured.left_out.len(), left_out, "{:?}", measured.left_out);
     assert_eq!(measured.budgets.len(), 2);
     for budget in &measured.budgets {
@@ -159,17 +168,20 @@ fn ladders_of(name: &str, text: &str, left_out: usize) {
         // what is computed is not what a sensor suffers from
         assert!(budget.computed < 0.5 * budget.total, "{}", budget.title);
     }
-    let files = measured.files();
-    let file = |name: &str| &files.iter().find(|f| f.name == name).unwrap_or_else(|| panic!("{name}")).bytes;
+    let files = accuracy_files(&measured);
+    let file = |name: &str| {
+        let found = files.iter().find(|(path, _)| path == name);
+        &found.unwrap_or_else(|| panic!("{name}")).1
+    };
     assert_eq!(
-        measured.csv().lines().count(),
-        1 + measured.ladders.iter().map(|l| l.rungs.len()).sum::<usize>()
+        csv(&measured).lines().count(),
+        1 + measured.sweeps.iter().map(|l| l.samples.len()).sum::<usize>()
     );
     let json: serde_json::Value = serde_json::from_slice(file("accuracy.json")).unwrap();
     assert_eq!(json["design"], name);
-    for ladder in &measured.ladders {
-        assert!(file(&format!("{}.svg", ladder.name)).starts_with(b"<svg"));
-        let png = domecast_runtime::frames::Gray::from_png(file(&format!("{}.png", ladder.name))).unwrap();
+    for sweep in &measured.sweeps {
+        assert!(file(&format!("{}.svg", sweep.name)).starts_with(b"<svg"));
+        let png = domecast_runtime::frames::Gray::from_png(file(&format!("{}.png", sweep.name))).unwrap();
         assert_eq!((png.width(), png.height()), (1280, 860));
     }
     assert!(String::from_utf8_lossy(file("index.html")).contains("What accuracy costs"));
@@ -180,9 +192,9 @@ fn refraction_is_what_placement_is_about() {
     let design = design_from(|_| ()).unwrap();
     let spec = LayoutSpec::of_design(&design).unwrap();
     let layout = Layout::new(&spec).unwrap();
-    let ladder = placement::ladder(design.optics(), &layout, Some(0.01), Patience::QUICK).unwrap();
-    let [pinhole, refraction, dispersion] = [0, 1, 2].map(|i| ladder.rungs[i].max_error);
-    // as the layout's own report says, by another way
+    let sweep = placement::sweep(design.optics(), &layout, Some(0.01), TimeLimit::QUICK).unwrap();
+    let [pinhole, refraction, dispersion] = [0, 1, 2].map(|i| sweep.samples[i].max_error);
+    // as the layout's own report computes it, by another route
     let report = domecast_design::layout::evenness::by_pinhole(&spec, &layout).unwrap();
     assert!((pinhole - report.max_shift_mm).abs() < 0.02, "{pinhole} {}", report.max_shift_mm);
     assert!(refraction < 0.01 && dispersion < 0.1 * refraction, "{refraction} {dispersion}");
@@ -273,7 +285,7 @@ fn long_chosen_settings_keep_what_is_asked_over_the_sweep_of_the_parts() {
         }
         d["pattern"]["unseen"] = "drop".into();
         d["pattern"]["unprintable"] = "drop".into();
-        let Ok(design) = domecast_design::Design::from_str(&d.to_string()) else { continue };
+        let Ok(design) = Design::from_str(&d.to_string()) else { continue };
         done += usize::from(keeps_what_is_asked(&design, asked, 32));
         // not of those that a real printer's limits mostly refuse
         if index % 6 != 1 {
@@ -297,11 +309,11 @@ fn keeps_what_is_asked(design: &Design, asked: [f64; 3], most: usize) -> bool {
     let Ok(layout) = Layout::new(&spec) else { return false };
     let settings = design.settings();
     let in_use_mm = settings.outline_tolerance_mm.value;
-    let Some(outlines) = outline::ladder(&spec, &layout, in_use_mm, Some(asked[0]), Patience::QUICK) else {
+    let Some(outlines) = outline::sweep(&spec, &layout, in_use_mm, Some(asked[0]), TimeLimit::QUICK) else {
         return false;
     };
-    let rung = &outlines.rungs[outlines.in_use.unwrap()];
-    assert!(rung.max_error <= asked[0], "{} of {}", rung.max_error, asked[0]);
+    let sample = &outlines.samples[outlines.in_use.unwrap()];
+    assert!(sample.max_error <= asked[0], "{} of {}", sample.max_error, asked[0]);
     // a dome that is too large or too small by the chord: dots stay within what is asked
     let chord_mm = settings.optical_chord_tolerance_mm.value;
     assert!(chord_mm <= asked[2] && settings.chord_tolerance_mm.value <= asked[2]);

@@ -1,18 +1,18 @@
 //! The runtime: what its options cost in time and give in exactness, on the scene's frames.
 
-use super::clock::{Patience, time_again};
+use super::clock::{TimeLimit, time_again};
 use super::frames::Sequence;
-use super::ladder::{Ladder, Law, Rung, sizes};
+use super::sweep::{Law, Sweep, SweepSample, sizes};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
     CameraFrame, Channel, FollowMethod, MarkState, Steps, Thresholds, TrackOptions, Tracker,
 };
 
-/// The ladder of options; `None` where the frames have no pictures or the constants fit no tracker.
-pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> Option<Ladder> {
+/// The sweep of options; `None` where the frames have no pictures or the constants fit no tracker.
+pub fn sweep(constants: &Constants, frames: &Sequence, time_limit: TimeLimit) -> Option<Sweep> {
     let plain = TrackOptions::default();
     let flow = |pyramid_levels| TrackOptions { motion: FollowMethod::LucasKanade, pyramid_levels, ..plain };
-    let ways: [(&str, TrackOptions); 8] = [
+    let options: [(&str, TrackOptions); 8] = [
         (
             "the paper's steps on every frame as a whole",
             TrackOptions {
@@ -33,8 +33,8 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
         ("as it runs", plain),
     ];
     let half_way_px = half_way_px(frames)?;
-    let mut rungs = Vec::new();
-    for (index, (label, options)) in ways.into_iter().enumerate() {
+    let mut samples = Vec::new();
+    for (index, (label, options)) in options.into_iter().enumerate() {
         let mut tracker = Tracker::new(constants, options).ok()?;
         let (mut errors, mut seen, mut missed) = (Vec::new(), 0_usize, 0_usize);
         for (number, drawn) in (0_u64..).zip(&frames.drawn) {
@@ -56,7 +56,7 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
             }
         }
         let (max_error, rms_error, _) = sizes(errors.into_iter());
-        let timing = time_again(patience, || {
+        let timing = time_again(time_limit, || {
             tracker.restart();
             for (number, drawn) in (0_u64..).zip(&frames.drawn) {
                 if let Some(image) = &drawn.image
@@ -67,10 +67,10 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
                 }
             }
         });
-        rungs.push(Rung {
-            way: ["paper", "whole", "flow 1", "flow 2", "flow 3", "green", "points", "default"][index],
+        samples.push(SweepSample {
+            method: ["paper", "whole", "flow 1", "flow 2", "flow 3", "green", "points", "default"][index],
             label: label.to_owned(),
-            dial: index as f64 + 1.0,
+            setting: index as f64 + 1.0,
             max_error,
             rms_error,
             time: timing,
@@ -79,36 +79,39 @@ pub fn ladder(constants: &Constants, frames: &Sequence, patience: Patience) -> O
             dominated: false,
         });
     }
-    let in_use = rungs.len() - 1;
-    Some(
-        Ladder {
+    Some(sweep_of(samples, frames.drawn.len()))
+}
+
+/// The sweep of its samples.
+fn sweep_of(samples: Vec<SweepSample>, items: usize) -> Sweep {
+    let in_use = samples.len() - 1;
+    Sweep {
             name: "tracker",
             title: "Dots in the runtime".into(),
-            dial: "options",
+            setting: "options",
             error: "distance of a dot's centroid from the truth; half way to the nearest dot for one that is not found",
             unit: "px",
             item: "frame",
-            items: frames.drawn.len(),
+            items,
             reference: "the simulator's own centroids".into(),
             floor: 1e-6,
             law: Law::Falls,
             observed: None,
-            rungs,
+            samples,
             in_use: Some(in_use),
             asked: None,
             meets: None,
-            says: "Searching the frame as a whole costs most and gives nothing while no dot is lost.".into(),
+            conclusion: "Searching the frame as a whole costs most and gives nothing while no dot is lost.".into(),
         }
-        .finish(),
-    )
+        .finish()
 }
 
-/// Half of the least distance between two dots of the first frame, px.
+/// Half of the smallest distance between two dots of the first frame, px.
 fn half_way_px(frames: &Sequence) -> Option<f64> {
     let dots = &frames.drawn.first()?.truth.black_dots;
     let places: Vec<glam::DVec2> =
         dots.iter().filter_map(|dot| dot.centroid_px.map(glam::DVec2::from_array)).collect();
     let apart = |i: usize| places[..i].iter().map(move |other| (i, other));
-    let least = (0..places.len()).flat_map(apart).map(|(i, other)| places[i].distance(*other));
-    least.reduce(f64::min).map(|least| 0.5 * least)
+    let distances = (0..places.len()).flat_map(apart).map(|(i, other)| places[i].distance(*other));
+    distances.reduce(f64::min).map(|min| 0.5 * min)
 }

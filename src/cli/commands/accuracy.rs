@@ -7,9 +7,10 @@ use serde_json::json;
 
 use super::output::{Failure, Output};
 use crate::accuracy;
-use crate::accuracy::AccuracyError;
+use crate::accuracy::{Accuracy, AccuracyError};
 use domecast_design::DesignError;
 use domecast_fab::build::{DESIGN_NAME, DesignRecord, MANIFEST_NAME, Manifest, Tree, sha256_hex};
+use domecast_fab::numbers::significant;
 use domecast_sim::{Scene, SimError};
 
 /// Measures, then writes the result whole.
@@ -43,8 +44,8 @@ pub fn run(
             AccuracyError::Part(error) => Failure::from(DesignError::from(error).in_file(design_file)),
         })?;
     let mut tree = Tree::default();
-    for file in measured.files() {
-        tree.add(file.name, file.bytes);
+    for (name, bytes) in accuracy::accuracy_files(&measured) {
+        tree.add(name, bytes);
     }
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
     let record =
@@ -60,37 +61,7 @@ pub fn run(
     output.step("writing");
     tree.write(&out)?;
     output.steps_done();
-    for ladder in &measured.ladders {
-        let rung = |index: Option<usize>| index.and_then(|index| ladder.rungs.get(index));
-        let used = rung(ladder.in_use).map_or_else(String::new, |rung| {
-            format!(
-                "{} leaves {} {} at {:.3e} s a {}",
-                rung.label,
-                domecast_fab::numbers::significant(rung.max_error),
-                ladder.unit,
-                rung.per_item_s,
-                ladder.item
-            )
-        });
-        output.say(&format!("{}: {used}", ladder.title))?;
-        if let (Some(asked), Some(enough)) = (ladder.asked, rung(ladder.meets)) {
-            output.say(&format!(
-                "  {} {} asked: {} is enough",
-                domecast_fab::numbers::significant(asked),
-                ladder.unit,
-                enough.label
-            ))?;
-        }
-    }
-    for budget in &measured.budgets {
-        output.say(&format!(
-            "{}: {} {} ({} worked out)",
-            budget.title,
-            domecast_fab::numbers::significant(budget.total),
-            budget.unit,
-            domecast_fab::numbers::significant(budget.computed)
-        ))?;
-    }
+    summarize(output, &measured)?;
     output.say(&format!(
         "{:.1} s; look at {}",
         began.elapsed().as_secs_f64(),
@@ -102,4 +73,40 @@ pub fn run(
         out.display()
     ))?;
     output.result(&json!({ "ok": true, "out": out.display().to_string(), "accuracy": measured }))
+}
+
+/// For each sweep what is in use and what is enough, then the error budgets.
+fn summarize(output: &Output, measured: &Accuracy) -> Result<(), Failure> {
+    for sweep in &measured.sweeps {
+        let sample = |index: Option<usize>| index.and_then(|index| sweep.samples.get(index));
+        let used = sample(sweep.in_use).map_or_else(String::new, |sample| {
+            format!(
+                "{}: error {} {}, {:.3e} s per {}",
+                sample.label,
+                significant(sample.max_error),
+                sweep.unit,
+                sample.per_item_s,
+                sweep.item
+            )
+        });
+        output.say(&format!("{}: {used}", sweep.title))?;
+        if let (Some(asked), Some(enough)) = (sweep.asked, sample(sweep.meets)) {
+            output.say(&format!(
+                "  {} {} asked: {} is enough",
+                significant(asked),
+                sweep.unit,
+                enough.label
+            ))?;
+        }
+    }
+    for budget in &measured.budgets {
+        output.say(&format!(
+            "{}: {} {} ({} from computing)",
+            budget.title,
+            significant(budget.total),
+            budget.unit,
+            significant(budget.computed)
+        ))?;
+    }
+    Ok(())
 }

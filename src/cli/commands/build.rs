@@ -40,7 +40,7 @@ pub fn run(output: &Output, design_file: &Path, folders: &Folders<'_>, watch: bo
     }
 }
 
-/// What tells one state of a file from the next; `None` while an editor has it away.
+/// What distinguishes one state of a file from the next; `None` while an editor has it away.
 fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
     let about = std::fs::metadata(path).ok()?;
     Some((about.modified().ok()?, about.len()))
@@ -77,7 +77,7 @@ fn once(output: &Output, design_file: &Path, folders: &Folders<'_>, watched: boo
     output.step("writing");
     result.tree.write(&out)?;
     output.steps_done();
-    tell(output, &result, &out, began.elapsed())?;
+    summarize(output, &result, &out, began.elapsed())?;
     if design.settings().any_chosen() {
         output.say("exactness, as chosen from `accuracy`:")?;
         for line in design.settings().lines() {
@@ -91,7 +91,7 @@ fn once(output: &Output, design_file: &Path, folders: &Folders<'_>, watched: boo
     Ok(())
 }
 
-fn tell(output: &Output, result: &Build, out: &Path, took: Duration) -> Result<(), Failure> {
+fn summarize(output: &Output, result: &Build, out: &Path, took: Duration) -> Result<(), Failure> {
     for warning in &result.manifest.warnings {
         output.warn(&format!("{}: {}", warning.field, warning.message));
     }

@@ -15,7 +15,7 @@ use domecast_runtime::calibrate::force::{Pair, fit};
 use domecast_runtime::constants::{Constants, POSE_AXES, StiffnessAt, WRENCH_AXES, matrix_of, rows};
 use domecast_springs::Displacement;
 
-/// Ranges (mm, rad) above which an axis counts as moved: some times what one frame can tell.
+/// Ranges (mm, rad) above which an axis counts as moved: some times what one frame resolves.
 const MOVED: [f64; 6] = [0.02, 0.02, 0.02, 0.002, 0.002, 0.002];
 /// Noise that a marker's centroid in a measured table may have, px.
 const CENTROID_NOISE_PX: f64 = 0.5;

@@ -27,7 +27,7 @@ const BEYOND_RAD: f64 = 0.07;
 /// Rejected points that are named one by one.
 const NAMED: usize = 12;
 
-/// Fits the map, writes the new design, and says how well it fits.
+/// Fits the map, writes the new design, and prints how well it fits.
 pub fn run(
     output: &Output,
     measured: &Path,
@@ -53,7 +53,7 @@ pub fn run(
     if let Err(error) = LayoutSpec::of_design(&new_design).and_then(|spec| Layout::new(&spec)) {
         output.warn(&format!("the new map does not print the design's pattern: {error}"));
     }
-    tell(output, &found, &out)?;
+    summarize(output, &found, &out)?;
     output.result(&report(&found, &out))
 }
 
@@ -101,7 +101,7 @@ fn beside(design_file: &Path) -> PathBuf {
     design_file.with_file_name(format!("{stem}-measured.json"))
 }
 
-fn tell(output: &Output, found: &Calibration, out: &Path) -> Result<(), Failure> {
+fn summarize(output: &Output, found: &Calibration, out: &Path) -> Result<(), Failure> {
     let fit = &found.fit;
     let used = found.table.rows.len() - fit.rejected.len();
     output.say(&format!("{}: a measured map on top of the {} one", out.display(), fit.nominal.as_str()))?;
@@ -124,7 +124,7 @@ fn tell(output: &Output, found: &Calibration, out: &Path) -> Result<(), Failure>
     }
     if fit.correction.max_polar_rad > fit.measured_to_rad + BEYOND_RAD {
         output.warn(&format!(
-            "the marks landed up to {:.1} deg from the pole; from there to {:.1} deg the map is carried on by its \
+            "the marks landed up to {:.1} deg from the pole; from there to {:.1} deg the map is extrapolated by its \
              formula: print the target once more with the new design to measure that part",
             fit.measured_to_rad.to_degrees(),
             fit.correction.max_polar_rad.to_degrees()

@@ -7,7 +7,7 @@ use serde_json::json;
 use super::output::{Failure, Output};
 use domecast_fab::build::check;
 
-/// Reads a build again and tells what holds and what does not.
+/// Reads a build again and prints what holds and what does not.
 pub fn run(output: &Output, dir: &Path) -> Result<(), Failure> {
     let report = check::check(dir, &mut |doing| output.step(doing))?;
     output.steps_done();

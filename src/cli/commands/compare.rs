@@ -6,18 +6,18 @@ use serde_json::json;
 
 use super::output::{Failure, Output};
 use domecast_fab::build::BuildError;
-use domecast_fab::compare::{Side, compare};
+use domecast_fab::compare::{CompareSide, compare};
 
-/// Opens both sides, then tells what differs.
+/// Opens both sides, then prints what differs.
 pub fn run(output: &Output, a: &Path, b: &Path) -> Result<(), Failure> {
     let open = |path: &Path| {
         output.step(&format!("reading {}", path.display()));
-        Side::open(path, &mut |doing| output.step(&format!("{}: {doing}", path.display()))).map_err(|error| {
-            match error {
+        CompareSide::open(path, &mut |doing| output.step(&format!("{}: {doing}", path.display()))).map_err(
+            |error| match error {
                 BuildError::Design(error) => Failure::from(*error),
                 BuildError::Ours(what) => Failure::Internal(what),
-            }
-        })
+            },
+        )
     };
     let (a, b) = (open(a)?, open(b)?);
     output.steps_done();

@@ -9,7 +9,7 @@ use super::output::{Failure, Output};
 /// The design whose values and reasons are shown where none is named.
 const EXAMPLE: &str = include_str!("../../../designs/thumb24.json");
 
-/// Tells what a field means, what may stand there, and what a design says there and why.
+/// Prints what a field means, its allowed values, and its value and reason in a design.
 pub fn run(output: &Output, field: &str, design: Option<&Path>) -> Result<(), Failure> {
     let (name, value): (String, Value) = match design {
         Some(path) => {

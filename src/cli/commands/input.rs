@@ -18,7 +18,7 @@ pub fn read_constants(path: &Path) -> Result<Constants, Failure> {
         .map_err(|error: ConstantsError| input_fault(path, error.problem, "a constants.json of this release"))
 }
 
-/// Where measured constants go when nobody says: beside the nominal ones.
+/// Where measured constants go by default: beside the nominal ones.
 pub fn measured_beside(constants: &Path) -> PathBuf {
     constants.with_file_name("constants.measured.json")
 }

@@ -33,7 +33,7 @@ struct Arguments {
     /// Print the result as JSON, for programs.
     #[arg(long, global = true)]
     json: bool,
-    /// No progress and no summary; errors are still told.
+    /// No progress and no summary; errors are still printed.
     #[arg(long, short, global = true)]
     quiet: bool,
 }
@@ -54,7 +54,7 @@ enum Command {
         #[arg(long)]
         watch: bool,
     },
-    /// Show what accuracy costs in time: every dial of the design, measured on this machine.
+    /// Show what accuracy costs in time: every setting of the design, measured on this machine.
     Accuracy {
         /// The design file.
         design: PathBuf,
@@ -64,7 +64,7 @@ enum Command {
         /// The scene that frames and runtime are measured on [default: a ball pressed onto the dome].
         #[arg(long)]
         scene: Option<PathBuf>,
-        /// A first look in a few seconds: fewer runs, no rungs that take long.
+        /// A first look in a few seconds: fewer runs, no samples that take long.
         #[arg(long)]
         quick: bool,
     },
@@ -79,7 +79,7 @@ enum Command {
         #[arg(long)]
         out: Option<PathBuf>,
     },
-    /// Tell what a field of the design file means, what may stand there, and why thumb24 has what it has.
+    /// Describe a field of the design file: meaning, allowed values, and the value and reason in thumb24.
     Explain {
         /// The field, as in messages: `springs.wire_diameter_mm`; empty for the list of sections.
         #[arg(default_value = "")]
@@ -198,7 +198,7 @@ pub fn run() -> ExitCode {
         Err(error) => {
             // help and version are asked for, not errors
             let code = u8::from(error.use_stderr()) * 2;
-            // nothing is left to tell if even this cannot be printed
+            // nothing is left to do if even this cannot be printed
             let _ = error.print();
             return ExitCode::from(code);
         }

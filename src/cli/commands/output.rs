@@ -14,7 +14,7 @@ pub enum Failure {
     Input(Box<DesignError>),
     /// The result could not be written.
     Write(WriteError),
-    /// The command ran and its answer is "no" (a check that failed); its result is already told.
+    /// The command ran and its answer is "no" (a check that failed); its result is already printed.
     Negative,
     /// Standard output could not be written.
     Print(io::Error),
@@ -133,7 +133,7 @@ impl Output {
         Ok(())
     }
 
-    /// Tells a failure: on standard error for people, on standard output for programs.
+    /// Reports a failure: on standard error for people, on standard output for programs.
     pub fn failure(&self, failure: &Failure) {
         self.steps_done();
         let Some(message) = failure.message() else { return };

@@ -22,7 +22,7 @@ pub fn trace(output: &Output, design: &Path, pixels: &Path, pose: Option<&Path>)
     let (width, height) = (spec.width, spec.height);
     answer(output, pixels, ["u", "v"], |[u, v]| {
         let pixel = DVec2::new(u, v);
-        let in_image = on_raster(pixel, width, height);
+        let in_image = in_image_bounds(pixel, width, height);
         match optics.trace(pixel) {
             Ok(hit) => json!({
                 "pixel": [u, v], "status": "ok",
@@ -45,7 +45,7 @@ pub fn project(output: &Output, design: &Path, points: &Path, pose: Option<&Path
     answer(output, points, ["x", "y", "z"], |point| match optics.project(DVec3::from_array(point)) {
         Ok(pixel) => json!({
             "point_mm": point, "status": "ok", "image_px": pixel.to_array(),
-            "in_image": on_raster(pixel, width, height),
+            "in_image": in_image_bounds(pixel, width, height),
         }),
         Err(limit) => json!({
             "point_mm": finite(point), "status": limit.as_str(), "image_px": null, "in_image": null,
@@ -53,8 +53,8 @@ pub fn project(output: &Output, design: &Path, points: &Path, pose: Option<&Path
     })
 }
 
-/// Pixel centres are whole numbers, so the raster reaches half a pixel beyond the first and the last.
-fn on_raster(pixel: DVec2, width: u32, height: u32) -> bool {
+/// Pixel centres are whole numbers, so the image reaches half a pixel beyond the first and the last.
+fn in_image_bounds(pixel: DVec2, width: u32, height: u32) -> bool {
     let within = |value: f64, count: u32| value >= -0.5 && value < f64::from(count) - 0.5;
     within(pixel.x, width) && within(pixel.y, height)
 }

@@ -12,7 +12,7 @@ use domecast_sim::run;
 use domecast_sim::run::{ContactFault, RunError};
 use domecast_sim::{Plan, Scene, SimError};
 
-/// What the command line says besides the scene.
+/// Options besides the scene.
 #[derive(Debug, clap::Args)]
 pub struct SimulateOptions {
     /// Where to write [default: output/<scene name>].
@@ -35,7 +35,7 @@ pub struct SimulateOptions {
     seed: Option<u64>,
 }
 
-/// Plans, draws, and tells what was left out.
+/// Plans, renders, and prints what was left out.
 pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<(), Failure> {
     let began = Instant::now();
     output.step("reading the scene");

@@ -185,6 +185,6 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &PrintPass) -> Result<Blueprint
     }
     // The block of a tilted hit may hang over a hole, which then goes through it once more: whether it does
     // is a question of angles, and the mesh answers it.
-    b.genus_is_least = hit.tilt_rad != 0.0;
+    b.genus_is_min = hit.tilt_rad != 0.0;
     Ok(b)
 }

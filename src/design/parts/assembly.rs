@@ -21,7 +21,7 @@ pub enum Body {
 
 /// One thing in the assembly.
 #[derive(Debug, Clone)]
-pub struct Item {
+pub struct AssemblyItem {
     /// Name: that of the part, or of the stand-in.
     pub name: String,
     /// Red, green, blue, opacity, 0 to 1.
@@ -38,7 +38,7 @@ pub struct Item {
 #[derive(Debug, Clone)]
 pub struct Assembly {
     /// The items, in a fixed order.
-    pub items: Vec<Item>,
+    pub items: Vec<AssemblyItem>,
 }
 
 const CLEAR: [f32; 4] = [0.80, 0.87, 0.92, 0.85];
@@ -94,11 +94,17 @@ impl Assembly {
     }
 
     fn push(&mut self, name: &str, color: [f32; 4], body: Body, mesh: TriMesh, up_mm: f64) {
-        self.items.push(Item { name: name.to_owned(), color, body, mesh, explode_mm: DVec3::Z * up_mm });
+        self.items.push(AssemblyItem {
+            name: name.to_owned(),
+            color,
+            body,
+            mesh,
+            explode_mm: DVec3::Z * up_mm,
+        });
     }
 }
 
-impl Item {
+impl AssemblyItem {
     /// The item as a solid at rest; springs as the tubes that they fill.
     ///
     /// # Errors

@@ -10,13 +10,45 @@ use crate::spec::sections::LedColor;
 /// What to print, cut, cast and buy, with tolerances and where each comes from,
 /// as CSV: one line per item.
 pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
-    let sections = design.sections();
-    let mut out =
-        String::from("item,quantity,unit,description,size_mm,tolerance_mm,made_of,source,design_field\n");
-    let mut row = |cells: [&str; 9]| {
+    let mut table = Table(String::from(
+        "item,quantity,unit,description,size_mm,tolerance_mm,made_of,source,design_field\n",
+    ));
+    made(design, m, parts, &mut table);
+    purchased(design, m, &mut table);
+    leds(m, &mut table);
+    let clamps = m.platforms.lower.clamp.azimuth_deg.len();
+    if clamps > 0 {
+        let size = format!("for a tapping hole of {}", m.platforms.lower.clamp.hole_diameter_mm);
+        let clamps = clamps.to_string();
+        let what = "holds the camera";
+        table.row([
+            "set screw",
+            &clamps,
+            "piece",
+            what,
+            &size,
+            "",
+            "steel",
+            "bought",
+            "platforms.lower.clamp",
+        ]);
+    }
+    table.0
+}
+
+/// The table as text.
+struct Table(String);
+
+impl Table {
+    fn row(&mut self, cells: [&str; 9]) {
         let line: Vec<String> = cells.iter().map(|c| quoted(c)).collect();
-        let _ = writeln!(out, "{}", line.join(","));
-    };
+        let _ = writeln!(self.0, "{}", line.join(","));
+    }
+}
+
+/// What is printed, cut, cast and sprayed.
+fn made(design: &Design, m: &Measures, parts: &[Part], table: &mut Table) {
+    let sections = design.sections();
     let process = &m.process;
     let printed_tolerance = format!("+-{}", process.tolerance_mm);
     for part in parts.iter().filter(|p| p.name != "acrylic_sheet") {
@@ -26,7 +58,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
         let tool = !part.name.ends_with("platform");
         let description = format!("{}{}, {grams:.1} g", part.summary, if tool { " (tool)" } else { "" });
         let file = format!("parts/{}.stl", part.name);
-        row([
+        table.row([
             &part.name,
             "1",
             "piece",
@@ -41,7 +73,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
     let sheet = format!("{} x {} x {}", m.sheet_size_mm.x, m.sheet_size_mm.y, m.sheet_thickness_mm);
     let sheet_material = sections.optics.layers.first().map_or("clear sheet", |layer| layer.name.as_str());
     let slack = format!("outline +0/-{}", m.sheet.clearance_mm);
-    row([
+    table.row([
         "acrylic_sheet",
         "1",
         "piece",
@@ -56,7 +88,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
     let elastomer = &sections.elastomer.material;
     let dome = format!("radius {}", m.dome_radius_mm);
     let amount = format!("{volume_ml:.1}");
-    row([
+    table.row([
         "dome",
         &amount,
         "ml",
@@ -68,7 +100,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
         "elastomer",
     ]);
     let membrane = format!("{}", m.membrane_mm);
-    row([
+    table.row([
         "membrane",
         "1",
         "coat",
@@ -79,7 +111,11 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
         "sprayed or dipped",
         "elastomer.membrane_thickness_mm",
     ]);
+}
 
+/// Camera, springs and magnets.
+fn purchased(design: &Design, m: &Measures, table: &mut Table) {
+    let sections = design.sections();
     let body = &m.camera_body;
     let camera = format!("diameter {} x {}", body.diameter_mm, body.length_mm);
     let lens = format!(
@@ -87,7 +123,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
         sections.camera.width, sections.camera.height, sections.camera.field_of_view_deg
     );
     let bore = format!("diameter +{}/-any", 2.0 * body.bore_clearance_mm);
-    row(["camera", "1", "piece", &lens, &camera, &bore, "", "bought", "camera_body"]);
+    table.row(["camera", "1", "piece", &lens, &camera, &bore, "", "bought", "camera_body"]);
     let count = m.spring_axes_mm.len().to_string();
     let springs = &sections.springs;
     let size = format!(
@@ -98,7 +134,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
         "wire {}, outer {}",
         sections.tolerances.wire_diameter_mm, sections.tolerances.spring_diameter_mm
     );
-    row([
+    table.row([
         "spring",
         &count,
         "piece",
@@ -112,7 +148,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
     let count = (2 * m.spring_axes_mm.len()).to_string();
     let size = format!("diameter {} x {}", m.magnets.diameter_mm, m.magnets.thickness_mm);
     let pocket = format!("diameter +{}/-any", m.pockets.diameter_clearance_mm);
-    row([
+    table.row([
         "magnet",
         &count,
         "piece",
@@ -123,6 +159,10 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
         "bought",
         "magnets",
     ]);
+}
+
+/// LEDs, their boards and diffusers.
+fn leds(m: &Measures, table: &mut Table) {
     for (color, name) in [
         (LedColor::Red, "red"),
         (LedColor::Green, "green"),
@@ -134,7 +174,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
             let size =
                 format!("{} x {} x {}", m.leds.package_mm[0], m.leds.package_mm[1], m.leds.package_height_mm);
             let item = format!("LED {name}");
-            row([
+            table.row([
                 &item,
                 &n.to_string(),
                 "piece",
@@ -151,7 +191,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
         let n = m.leds.list.len().to_string();
         let size = format!("{} x {} x {}", m.leds.board_mm[0], m.leds.board_mm[1], m.leds.board_thickness_mm);
         let slack = format!("+-{}", m.leds.clearance_mm);
-        row([
+        table.row([
             "LED board",
             &n,
             "piece",
@@ -164,7 +204,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
         ]);
         if m.leds.diffuser_thickness_mm > 0.0 {
             let t = m.leds.diffuser_thickness_mm.to_string();
-            row([
+            table.row([
                 "diffuser",
                 &n,
                 "piece",
@@ -177,22 +217,6 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
             ]);
         }
     }
-    let clamps = m.platforms.lower.clamp.azimuth_deg.len();
-    if clamps > 0 {
-        let size = format!("for a tapping hole of {}", m.platforms.lower.clamp.hole_diameter_mm);
-        row([
-            "set screw",
-            &clamps.to_string(),
-            "piece",
-            "holds the camera",
-            &size,
-            "",
-            "steel",
-            "bought",
-            "platforms.lower.clamp",
-        ]);
-    }
-    out
 }
 
 /// A CSV cell, quoted where it must be (RFC 4180).

@@ -9,6 +9,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::assembly::{Body, affine};
+use super::error::infeasible;
 use super::measures::Measures;
 use super::view::sight_lines;
 use super::{Assembly, Part, PartError, Pose, process, purchased, undercut};
@@ -48,10 +49,6 @@ pub fn check_assembly(m: &Measures, parts: &[Part], assembly: &Assembly) -> Resu
 
 fn mesh_error(part: &str, error: MeshError) -> PartError {
     PartError::Mesh { part: part.to_owned(), error }
-}
-
-pub(super) fn infeasible(part: &str, place: String, value_mm: f64, limit_mm: f64, field: &str) -> PartError {
-    PartError::Infeasible { part: part.to_owned(), place, value_mm, limit_mm, field: field.to_owned() }
 }
 
 /// The design field that moves an item.

@@ -53,6 +53,11 @@ pub enum PartError {
     },
 }
 
+/// [`PartError::Infeasible`] from borrowed names.
+pub(super) fn infeasible(part: &str, place: String, value_mm: f64, limit_mm: f64, field: &str) -> PartError {
+    PartError::Infeasible { part: part.to_owned(), place, value_mm, limit_mm, field: field.to_owned() }
+}
+
 impl fmt::Display for PartError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -104,4 +109,9 @@ impl From<PartError> for DesignError {
             ),
         }
     }
+}
+
+/// A dimension that the process or the assembly does not allow.
+pub(super) fn infeasible(part: &str, place: String, value_mm: f64, limit_mm: f64, field: &str) -> PartError {
+    PartError::Infeasible { part: part.to_owned(), place, value_mm, limit_mm, field: field.to_owned() }
 }

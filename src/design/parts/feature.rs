@@ -58,7 +58,7 @@ pub(crate) struct Blueprint {
     /// Handles, by the count of holes.
     pub genus: i64,
     /// Whether there may be more holes through the part than that, which the mesh then tells.
-    pub genus_is_least: bool,
+    pub genus_is_min: bool,
     /// Tolerance of ordinary faces.
     pub chord: Chord,
     /// Whether it is printed, so that the process limits hold for it.
@@ -74,7 +74,7 @@ impl Blueprint {
             cut: Vec::new(),
             may_meet: &[],
             genus: 0,
-            genus_is_least: false,
+            genus_is_min: false,
             chord,
             printed: true,
         }

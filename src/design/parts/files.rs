@@ -4,7 +4,7 @@ use std::io;
 
 use rayon::prelude::*;
 
-use super::assembly::{Assembly, Item};
+use super::assembly::{Assembly, AssemblyItem};
 use super::measures::Measures;
 use super::{Part, PartError, bom, drawing};
 use crate::spec::Design;
@@ -76,7 +76,7 @@ pub fn files(
     out.push(PartFile { path: "parts/acrylic_sheet.svg".into(), bytes: drawing::svg(m).into_bytes() });
     out.push(written("parts/assembly.glb".into(), &|w| glb(assembly, w))?);
     out.push(PartFile { path: "parts/bom.csv".into(), bytes: bom::bom(design, m, parts).into_bytes() });
-    let item = |item: &Item| {
+    let item = |item: &AssemblyItem| {
         let [r, g, b, _] = item.color;
         [r, g, b]
     };

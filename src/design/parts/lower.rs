@@ -56,7 +56,26 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
 
     m.cut_magnet_pockets(&mut b, top, bottom - over);
 
-    let mounting = &lower.mounting;
+    mounting_holes(m, &mut b)?;
+    if lower.wire_hole_diameter_mm > 0.0 {
+        for (i, led) in m.leds.list.iter().enumerate() {
+            let at = polar(lower.wire_hole_ring_radius_mm, led.azimuth_deg);
+            let hole =
+                Shape::cylinder(0.5 * lower.wire_hole_diameter_mm, bottom - over, top + over, Fit::Area);
+            let feature = Feature::new("wire hole", "platforms.lower.wire_hole_ring_radius_mm", hole);
+            b.cut.push(feature.numbered(i).at(at.x, at.y));
+            b.genus += 1;
+        }
+    }
+
+    cable_exit(m, reach, &mut b)?;
+    Ok(b)
+}
+
+/// Cuts the mounting holes with their counterbores.
+fn mounting_holes(m: &Measures, b: &mut Blueprint) -> Result<(), PartError> {
+    let (top, bottom, over) = (m.lower_top_z_mm, m.platforms.lower.underside_z_mm, m.overcut_mm);
+    let mounting = &m.platforms.lower.mounting;
     for (i, at) in mounting.at_mm.iter().enumerate() {
         let (hole, head) = (0.5 * mounting.hole_diameter_mm, 0.5 * mounting.counterbore_diameter_mm);
         let profile = if head > hole && mounting.counterbore_depth_mm > 0.0 {
@@ -78,19 +97,13 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
         b.cut.push(feature.numbered(i).at(at[0], at[1]));
         b.genus += 1;
     }
+    Ok(())
+}
 
-    if lower.wire_hole_diameter_mm > 0.0 {
-        for (i, led) in m.leds.list.iter().enumerate() {
-            let at = polar(lower.wire_hole_ring_radius_mm, led.azimuth_deg);
-            let hole =
-                Shape::cylinder(0.5 * lower.wire_hole_diameter_mm, bottom - over, top + over, Fit::Area);
-            let feature = Feature::new("wire hole", "platforms.lower.wire_hole_ring_radius_mm", hole);
-            b.cut.push(feature.numbered(i).at(at.x, at.y));
-            b.genus += 1;
-        }
-    }
-
-    let exit = &lower.cable_exit;
+/// Cuts the channel of the cable, from the bore to beyond the block (`reach` mm).
+fn cable_exit(m: &Measures, reach: f64, b: &mut Blueprint) -> Result<(), PartError> {
+    let (top, bottom, over) = (m.lower_top_z_mm, m.platforms.lower.underside_z_mm, m.overcut_mm);
+    let exit = &m.platforms.lower.cable_exit;
     if exit.width_mm > 0.0 && exit.height_mm > 0.0 {
         let roof = top - bottom - exit.height_mm;
         if roof <= 0.0 || roof < m.process.min_wall_mm {
@@ -105,5 +118,5 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
             * DAffine3::from_rotation_z(exit.azimuth_deg.to_radians());
         b.cut.push(Feature::new("cable exit", "platforms.lower.cable_exit", channel).placed(turn));
     }
-    Ok(b)
+    Ok(())
 }

@@ -1,10 +1,10 @@
 //! The dimensions that the parts are made from, taken from the design once.
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::poses::{Pose, poses};
 use super::view::ViewCone;
-use super::{Blueprint, Feature, PartError, upper};
+use super::{Blueprint, Feature, PartError};
 use crate::spec::Design;
 use crate::spec::sections::{
     CameraBodySection, CouponSection, JigSection, LedsSection, MagnetPocketsSection, MagnetsSection,
@@ -86,9 +86,35 @@ pub struct Measures {
     pub overcut_mm: f64,
 }
 
+/// Pose of LED `i`: origin at the centre of its emitting face, x across the
+/// board, y up the board, z out of the emitting face.
+pub(super) fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
+    let azimuth_deg = leds.list.get(i).map_or(0.0, |led| led.azimuth_deg);
+    let (sin, cos) = leds.tilt_deg.to_radians().sin_cos();
+    let outward = polar(1.0, azimuth_deg).extend(0.0);
+    // The board leans outwards with its top, so that the face looks up.
+    let y = DVec3::Z * sin + outward * cos;
+    let z = -outward * sin + DVec3::Z * cos;
+    let center = (outward * leds.center_radius_mm).with_z(leds.center_z_mm);
+    DAffine3 { matrix3: DMat3::from_cols(y.cross(z), y, z), translation: center }
+}
+
 /// A point in the plane from radius and azimuth.
 pub(super) fn polar(radius_mm: f64, azimuth_deg: f64) -> DVec2 {
     radius_mm * DVec2::from_angle(azimuth_deg.to_radians())
+}
+
+/// Pose of LED `i`: origin at the centre of its emitting face, x across the
+/// board, y up the board, z out of the emitting face.
+pub(super) fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
+    let azimuth_deg = leds.list.get(i).map_or(0.0, |led| led.azimuth_deg);
+    let (sin, cos) = leds.tilt_deg.to_radians().sin_cos();
+    let outward = polar(1.0, azimuth_deg).extend(0.0);
+    // The board leans outwards with its top, so that the face looks up.
+    let y = DVec3::Z * sin + outward * cos;
+    let z = -outward * sin + DVec3::Z * cos;
+    let center = (outward * leds.center_radius_mm).with_z(leds.center_z_mm);
+    DAffine3 { matrix3: DMat3::from_cols(y.cross(z), y, z), translation: center }
 }
 
 impl Measures {
@@ -198,7 +224,7 @@ impl Measures {
     /// Pose of LED `i`: origin at the centre of its emitting face, x across
     /// the board, y up the board, z out of the emitting face.
     pub fn platform_from_led(&self, i: usize) -> DAffine3 {
-        upper::platform_from_led(&self.leds, i)
+        platform_from_led(&self.leds, i)
     }
 
     /// Cuts a pocket for a magnet at every spring into the face at

@@ -38,7 +38,7 @@ use std::io::{self, Write};
 use glam::DAffine3;
 use rayon::prelude::*;
 
-pub use assembly::{Assembly, Item};
+pub use assembly::{Assembly, AssemblyItem};
 pub use checks::check_assembly;
 pub use error::PartError;
 use feature::{Blueprint, Feature};
@@ -90,7 +90,7 @@ impl Blueprint {
         let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
         let genus = match inspect(&mesh).genus() {
-            Some(found) if self.genus_is_least => found.max(self.genus),
+            Some(found) if self.genus_is_min => found.max(self.genus),
             _ => self.genus,
         };
         let part = Part {
@@ -162,7 +162,7 @@ pub fn upper_platform(measures: &Measures) -> Result<Construction, PartError> {
 /// Pose of LED `i`: origin at the centre of its emitting face, x across the board, y up the board, z out of the
 /// emitting face; sensor frame.
 pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
-    upper::platform_from_led(leds, i)
+    measures::platform_from_led(leds, i)
 }
 
 /// Makes all parts, in a fixed order, and checks each against the process. One

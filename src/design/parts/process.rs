@@ -1,11 +1,31 @@
 //! Lengths that the process limits: holes, pins, gaps, and the printer's room.
 
-use super::checks::infeasible;
+use super::error::infeasible;
 use super::measures::Measures;
 use super::{Part, PartError};
 
 /// Lengths that the process limits, and the printer's room.
 pub(super) fn check(m: &Measures, parts: &[Part]) -> Result<(), PartError> {
+    holes(m)?;
+    gaps(m)?;
+    for part in parts {
+        // A part may lie on any of its sides in the printer.
+        let mut size = part.bounds.size_mm().to_array();
+        let mut room = m.process.build_volume_mm;
+        size.sort_by(f64::total_cmp);
+        room.sort_by(f64::total_cmp);
+        for (length, limit) in size.into_iter().zip(room) {
+            if length > limit {
+                let place = "side length, at most the printer's".to_owned();
+                return Err(infeasible(&part.name, place, length, limit, "process.build_volume_mm"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Smallest diameters of holes and of pins.
+fn holes(m: &Measures) -> Result<(), PartError> {
     let p = &m.process;
     let holes = [
         (
@@ -60,8 +80,14 @@ pub(super) fn check(m: &Measures, parts: &[Part]) -> Result<(), PartError> {
             "mould.pins.diameter_mm",
         ));
     }
+    Ok(())
+}
+
+/// Smallest gaps between parts that move into each other.
+fn gaps(m: &Measures) -> Result<(), PartError> {
+    let limit = m.process.min_gap_mm;
     let gaps = [
-        ("mould_base", "gap round the register pins", pins.clearance_mm, "mould.pins.clearance_mm"),
+        ("mould_base", "gap round the register pins", m.mould.pins.clearance_mm, "mould.pins.clearance_mm"),
         (
             "lower_platform",
             "gap round the camera",
@@ -79,21 +105,8 @@ pub(super) fn check(m: &Measures, parts: &[Part]) -> Result<(), PartError> {
         ),
     ];
     for (part, place, gap, field) in gaps {
-        if gap < p.min_gap_mm * (1.0 - 1e-9) {
-            return Err(infeasible(part, place.to_owned(), gap, p.min_gap_mm, field));
-        }
-    }
-    for part in parts {
-        // A part may lie on any of its sides in the printer.
-        let mut size = part.bounds.size_mm().to_array();
-        let mut room = p.build_volume_mm;
-        size.sort_by(f64::total_cmp);
-        room.sort_by(f64::total_cmp);
-        for (length, limit) in size.into_iter().zip(room) {
-            if length > limit {
-                let place = "side length, at most the printer's".to_owned();
-                return Err(infeasible(&part.name, place, length, limit, "process.build_volume_mm"));
-            }
+        if gap < limit * (1.0 - 1e-9) {
+            return Err(infeasible(part, place.to_owned(), gap, limit, field));
         }
     }
     Ok(())

@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::checks::infeasible;
+use super::error::infeasible;
 use super::measures::Measures;
 use super::{Part, PartError};
 use domecast_mesh::{RayTarget, TriMesh};

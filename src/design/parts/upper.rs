@@ -1,15 +1,38 @@
 //! The upper platform: it carries sheet, dome and LEDs, and moves with them.
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DVec3};
 
-use super::measures::{Measures, polar};
+use super::measures::Measures;
 use super::{Blueprint, Feature, PartError};
-use crate::spec::sections::LedsSection;
 use domecast_mesh::{Fit, Profile, Shape};
 
 /// The light channel is wider than the pit by this share on each side: their
 /// side faces are then clearly apart, not almost in one plane.
 const CHANNEL_STEP: f64 = 0.04;
+
+/// Cuts that may run into each other.
+const OPEN_TO_EACH_OTHER: [(&str, &str); 20] = [
+    ("sheet recess", "window"),
+    ("sheet recess", "push-out hole"),
+    ("sheet recess", "LED pit"),
+    ("sheet recess", "light channel"),
+    ("sheet recess", "rim notch"),
+    ("sheet recess", "marker window"),
+    ("window", "marker window"),
+    ("marker window", "marker window"),
+    ("marker window", "push-out hole"),
+    ("marker window", "LED pit"),
+    ("marker window", "light channel"),
+    ("window", "push-out hole"),
+    ("window", "LED pit"),
+    ("window", "light channel"),
+    ("window", "rim notch"),
+    ("LED pit", "light channel"),
+    ("LED pit", "rim notch"),
+    ("LED pit", "LED wire hole"),
+    ("light channel", "rim notch"),
+    ("light channel", "light channel"),
+];
 
 pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     let upper = &m.platforms.upper;
@@ -22,28 +45,7 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     );
     // All of it is open to the recess above; pockets and wire holes must keep
     // their distance. Lip and rim are left to the check of wall thickness.
-    b.may_meet = &[
-        ("sheet recess", "window"),
-        ("sheet recess", "push-out hole"),
-        ("sheet recess", "LED pit"),
-        ("sheet recess", "light channel"),
-        ("sheet recess", "rim notch"),
-        ("sheet recess", "marker window"),
-        ("window", "marker window"),
-        ("marker window", "marker window"),
-        ("marker window", "push-out hole"),
-        ("marker window", "LED pit"),
-        ("marker window", "light channel"),
-        ("window", "push-out hole"),
-        ("window", "LED pit"),
-        ("window", "light channel"),
-        ("window", "rim notch"),
-        ("LED pit", "light channel"),
-        ("LED pit", "rim notch"),
-        ("LED pit", "LED wire hole"),
-        ("light channel", "rim notch"),
-        ("light channel", "light channel"),
-    ];
+    b.may_meet = &OPEN_TO_EACH_OTHER;
     if bottom >= seat {
         let field = "platforms.upper.underside_z_mm";
         return Err(b.infeasible(
@@ -185,17 +187,4 @@ fn rim_notch(
     );
     let turn = DAffine3::from_rotation_z(m.leds.list.get(i)?.azimuth_deg.to_radians());
     Some(Feature::new("rim notch", "leds.center_radius_mm", box_out).numbered(i).placed(turn))
-}
-
-/// Pose of LED `i`: origin at the centre of its emitting face, x across the
-/// board, y up the board, z out of the emitting face.
-pub(super) fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
-    let azimuth_deg = leds.list.get(i).map_or(0.0, |led| led.azimuth_deg);
-    let (sin, cos) = leds.tilt_deg.to_radians().sin_cos();
-    let outward = polar(1.0, azimuth_deg).extend(0.0);
-    // The board leans outwards with its top, so that the face looks up.
-    let y = DVec3::Z * sin + outward * cos;
-    let z = -outward * sin + DVec3::Z * cos;
-    let center = (outward * leds.center_radius_mm).with_z(leds.center_z_mm);
-    DAffine3 { matrix3: DMat3::from_cols(y.cross(z), y, z), translation: center }
 }

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 use tiny_skia::Pixmap;
 
-use super::RenderError;
 use super::canvas::{color, fill, fill_outline, stroke};
+use super::error::RenderError;
 use domecast_design::layout::frame::EvenFrame;
 use domecast_design::layout::{Layout, LayoutSpec, region};
 use domecast_design::sections::EvenIn;

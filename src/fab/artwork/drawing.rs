@@ -37,14 +37,14 @@ pub struct Layer {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
     /// A path.
-    Shape(Shape),
+    Path(InkedPath),
     /// A line of text.
     Text(Text),
 }
 
 /// A path with its ink.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shape {
+pub struct InkedPath {
     /// Name of the shape, unique in the drawing; empty for none.
     pub id: String,
     /// Facts for programs: (name, value).
@@ -52,12 +52,12 @@ pub struct Shape {
     /// The path, mm.
     pub path: Path,
     /// Filled, or drawn along.
-    pub ink: Ink,
+    pub ink: PathInk,
 }
 
 /// How a path is inked.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Ink {
+pub enum PathInk {
     /// The inside.
     Fill,
     /// A line of this width along the path, mm.
@@ -227,8 +227,8 @@ impl Layer {
     }
 
     /// Adds a path without a name.
-    pub fn draw(&mut self, path: Path, ink: Ink) {
-        self.items.push(Item::Shape(Shape { id: String::new(), facts: Vec::new(), path, ink }));
+    pub fn draw(&mut self, path: Path, ink: PathInk) {
+        self.items.push(Item::Path(InkedPath { id: String::new(), facts: Vec::new(), path, ink }));
     }
 
     /// Adds a line of text.

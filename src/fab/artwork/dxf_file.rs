@@ -5,7 +5,7 @@
 
 use domecast_mesh::{DxfFile, DxfText, DxfVertex};
 
-use super::drawing::{Anchor, Drawing, Ink, Item};
+use super::drawing::{Anchor, Drawing, Item, PathInk};
 
 /// Black on white.
 const COLOR: u8 = 7;
@@ -17,10 +17,10 @@ pub fn to_dxf(drawing: &Drawing, tolerance_mm: f64) -> Vec<u8> {
     for layer in &drawing.layers {
         for item in &layer.items {
             match item {
-                Item::Shape(shape) => {
+                Item::Path(shape) => {
                     let width_mm = match shape.ink {
-                        Ink::Fill => 0.0,
-                        Ink::Line(width_mm) => width_mm,
+                        PathInk::Fill => 0.0,
+                        PathInk::Line(width_mm) => width_mm,
                     };
                     let corners = shape.path.polygon(tolerance_mm);
                     let vertices: Vec<DxfVertex> =

@@ -5,7 +5,7 @@
 
 use glam::DVec2;
 
-use super::drawing::{Anchor, Drawing, Ink, Item, Layer, NotFinite, Path, Shape};
+use super::drawing::{Anchor, Drawing, InkedPath, Item, Layer, NotFinite, Path, PathInk};
 use domecast_design::layout::Layout;
 use domecast_design::layout::outline::Outline;
 use domecast_design::layout::target::TargetMark;
@@ -140,7 +140,7 @@ impl Film<'_> {
     ) -> Result<Drawing, NotFinite> {
         let mut layer = Layer::new("dots");
         for mark in &self.marks {
-            layer.items.push(Item::Shape(Shape {
+            layer.items.push(Item::Path(InkedPath {
                 id: format!("{}-{}", self.shape, mark.id),
                 facts: vec![
                     ("id".into(), mark.id.to_string()),
@@ -148,7 +148,7 @@ impl Film<'_> {
                     ("y-mm".into(), mark.plate_mm.y.to_string()),
                 ],
                 path: Path::of_outline(mark.outline)?,
-                ink: Ink::Fill,
+                ink: PathInk::Fill,
             }));
         }
         let footprint_mm = pad_over_image * picture_radius_mm(self.marks.iter().map(|mark| mark.outline));
@@ -250,7 +250,7 @@ impl Sheet {
             let at = DVec2::new(x, y) * self.cross_mm;
             for arm in [DVec2::X, DVec2::Y] {
                 let line = [at - arm * CROSS_ARM_MM, at + arm * CROSS_ARM_MM];
-                layer.draw(Path::polyline(&line, false)?, Ink::Line(LINE_MM));
+                layer.draw(Path::polyline(&line, false)?, PathInk::Line(LINE_MM));
             }
         }
         let base = DVec2::new(-0.5 * NOTES_WIDTH_MM + MARGIN_MM, self.notes_top_mm() - CHIRAL_MM);
@@ -259,7 +259,7 @@ impl Sheet {
             (DVec2::new(0.0, -0.75), DVec2::new(0.0, 0.75)),
             (DVec2::new(SCALE_BAR_MM, -0.75), DVec2::new(SCALE_BAR_MM, 0.75)),
         ] {
-            layer.draw(Path::polyline(&[base + from, base + to], false)?, Ink::Line(LINE_MM));
+            layer.draw(Path::polyline(&[base + from, base + to], false)?, PathInk::Line(LINE_MM));
         }
         let mark = DVec2::new(0.5 * NOTES_WIDTH_MM - MARGIN_MM - 0.6 * CHIRAL_MM, base.y);
         // The letter F, in units of its height: no turn or mirror image of it looks the same.
@@ -276,7 +276,7 @@ impl Sheet {
             (0.0, 1.0),
         ]
         .map(|(x, y)| mark + DVec2::new(x, y) * CHIRAL_MM);
-        layer.draw(Path::polyline(&letter, true)?, Ink::Fill);
+        layer.draw(Path::polyline(&letter, true)?, PathInk::Fill);
         debug_assert!(self.cross_mm.hypot(self.cross_mm - CROSS_ARM_MM) >= self.footprint_mm);
         Ok(layer)
     }

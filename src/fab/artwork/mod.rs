@@ -7,6 +7,7 @@ mod camera_view;
 pub mod canvas;
 pub mod drawing;
 mod dxf_file;
+mod error;
 mod film;
 mod outside_view;
 mod pdf_file;
@@ -16,11 +17,10 @@ mod svg_file;
 mod tests;
 mod tiff_file;
 
-use std::fmt;
-
 pub use camera_view::camera_view;
 pub use drawing::Drawing;
 pub use dxf_file::to_dxf;
+pub use error::RenderError;
 pub use film::{FilmLabel, film, target_film};
 pub use outside_view::outside_view;
 pub use pdf_file::to_pdf;
@@ -37,35 +37,6 @@ pub struct ArtworkFile {
     pub path: String,
     /// Content.
     pub bytes: Vec<u8>,
-}
-
-/// Artwork that could not be drawn. None of these follows from a resolved design.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum RenderError {
-    /// A coordinate is not a finite number.
-    NotFinite,
-    /// A picture has no size that can be drawn.
-    Size,
-    /// A library could not write the picture.
-    Encode(String),
-}
-
-impl fmt::Display for RenderError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotFinite => write!(f, "a coordinate of the drawing is not a finite number"),
-            Self::Size => write!(f, "the picture has no size that can be drawn"),
-            Self::Encode(what) => write!(f, "the picture could not be written: {what}"),
-        }
-    }
-}
-
-impl std::error::Error for RenderError {}
-
-impl From<drawing::NotFinite> for RenderError {
-    fn from(_: drawing::NotFinite) -> Self {
-        Self::NotFinite
-    }
 }
 
 /// Path of the film of a hit in a build, for a kind of file (`svg`): `artwork/dots.svg` for the first hit,

@@ -6,7 +6,8 @@ use glam::DVec2;
 use tiny_skia::Pixmap;
 
 use super::canvas::{color, fill, stroke};
-use super::{RenderError, strokes};
+use super::error::RenderError;
+use super::strokes;
 use domecast_design::layout::Layout;
 
 /// Side of the picture, px.

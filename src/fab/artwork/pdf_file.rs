@@ -11,8 +11,8 @@ use glam::DVec2;
 use pdf_writer::types::TextRenderingMode;
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 
-use super::RenderError;
-use super::drawing::{Drawing, Ink, Item, Path, Segment, Text};
+use super::drawing::{Drawing, Item, Path, PathInk, Segment, Text};
+use super::error::RenderError;
 use super::strokes;
 
 /// PDF's unit is a point, 1/72 inch.
@@ -84,11 +84,11 @@ fn content(drawing: &Drawing) -> Content {
         content.begin_marked_content_with_properties(Name(b"OC")).properties_named(Name(&layer_name(i)));
         for item in &layer.items {
             match item {
-                Item::Shape(shape) => {
+                Item::Path(shape) => {
                     trace(&mut content, &shape.path);
                     match shape.ink {
-                        Ink::Fill => content.fill_nonzero(),
-                        Ink::Line(width_mm) => content.set_line_width(width_mm as f32).stroke(),
+                        PathInk::Fill => content.fill_nonzero(),
+                        PathInk::Line(width_mm) => content.set_line_width(width_mm as f32).stroke(),
                     };
                 }
                 Item::Text(text) => write(&mut content, text),

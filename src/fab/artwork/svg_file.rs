@@ -13,7 +13,7 @@ use svg::Document;
 use svg::node::element::{Description, Group, Path as SvgPath, Title};
 use svg::node::{Node, Value};
 
-use super::drawing::{Drawing, Ink, Item, Layer, Path, Segment, Shape, Text};
+use super::drawing::{Drawing, InkedPath, Item, Layer, Path, PathInk, Segment, Text};
 use super::strokes;
 use domecast_mesh::number::rounded;
 
@@ -56,14 +56,14 @@ fn group(layer: &Layer) -> Group {
         .set("inkscape:label", layer.name.as_str());
     for item in &layer.items {
         match item {
-            Item::Shape(shape) => group.append(path(shape)),
+            Item::Path(shape) => group.append(path(shape)),
             Item::Text(line) => group.append(text(line)),
         }
     }
     group
 }
 
-fn path(shape: &Shape) -> SvgPath {
+fn path(shape: &InkedPath) -> SvgPath {
     let mut path = SvgPath::new().set("d", path_data(&shape.path));
     if !shape.id.is_empty() {
         path.assign("id", shape.id.as_str());
@@ -72,8 +72,8 @@ fn path(shape: &Shape) -> SvgPath {
         path.assign(format!("data-{name}"), value.as_str());
     }
     match shape.ink {
-        Ink::Fill => path.assign("fill", "#000000"),
-        Ink::Line(width_mm) => {
+        PathInk::Fill => path.assign("fill", "#000000"),
+        PathInk::Line(width_mm) => {
             path.assign("fill", "none");
             path.assign("stroke", "#000000");
             path.assign("stroke-width", number(width_mm));

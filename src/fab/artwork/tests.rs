@@ -67,7 +67,7 @@ fn registration_stays_off_the_pad() {
     for layer in &drawing.layers[1..] {
         for item in &layer.items {
             match item {
-                drawing::Item::Shape(shape) => {
+                drawing::Item::Path(shape) => {
                     let mut corners = vec![shape.path.start()];
                     for segment in shape.path.segments() {
                         match segment {

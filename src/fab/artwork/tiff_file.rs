@@ -11,8 +11,9 @@ use tiff::encoder::{Rational, TiffEncoder};
 use tiff::tags::{CompressionMethod, PhotometricInterpretation, ResolutionUnit, Tag};
 use tiny_skia::{FillRule, Mask, PathBuilder, Stroke, Transform};
 
-use super::drawing::{Drawing, Ink, Item, Path, Segment, Shape};
-use super::{RenderError, strokes};
+use super::drawing::{Drawing, InkedPath, Item, Path, PathInk, Segment};
+use super::error::RenderError;
+use super::strokes;
 
 /// Rows of a band: also the rows of a strip.
 const BAND_ROWS: u32 = 256;
@@ -123,8 +124,8 @@ fn ink(drawing: &Drawing, per_mm: f64, to_px: &impl Fn(DVec2) -> DVec2) -> Vec<I
     };
     for item in drawing.layers.iter().flat_map(|layer| &layer.items) {
         match item {
-            Item::Shape(Shape { path, ink: Ink::Fill, .. }) => add(pixels(path, to_px)),
-            Item::Shape(Shape { path, ink: Ink::Line(width_mm), .. }) => {
+            Item::Path(InkedPath { path, ink: PathInk::Fill, .. }) => add(pixels(path, to_px)),
+            Item::Path(InkedPath { path, ink: PathInk::Line(width_mm), .. }) => {
                 add(pixels(path, to_px).and_then(|path| stroked(&path, width_mm * per_mm)));
             }
             Item::Text(text) => {

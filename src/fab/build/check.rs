@@ -1,4 +1,12 @@
 //! A build, read again from the disk: do its files still say one and the same thing?
+//!
+//! ```
+//! use domecast_fab::build::check::check;
+//! use std::path::Path;
+//!
+//! let fault = check(Path::new("no/such/folder"), &mut |_| ()).unwrap_err();
+//! assert!(fault.to_string().contains("manifest.json"));
+//! ```
 
 use std::fs;
 use std::path::Path;
@@ -51,7 +59,7 @@ impl CheckReport {
     }
 }
 
-/// Reads the build in `dir` and verifies it; `step` is told what is being looked at.
+/// Reads the build in `dir` and verifies it; `step` gets what is being checked.
 ///
 /// # Errors
 /// Only where there is no build to look at: no folder, or no manifest that can be read. Everything else
@@ -146,8 +154,8 @@ fn check_constants(report: &mut CheckReport, dir: &Path, design: &Design, consta
     report.add("constants: dots on the dome", dots_on_dome(design, constants));
     report.add("constants: dots and markers in the image", dots_in_image(design, constants));
     report.add("constants: neighbours", neighbors(constants));
-    // one film for each hit of the pad; together they hold every dot once
-    let films = (0..layout.passes.len()).map(|hit| read(dir, &artwork::film_path(hit, "svg")));
+    // one film for each print pass; together they hold every dot once
+    let films = (0..layout.passes.len()).map(|pass| read(dir, &artwork::film_path(pass, "svg")));
     let films: Result<Vec<String>, String> = films.collect();
     report.add("artwork: films", films.and_then(|texts| check_svg(&texts.join("\n"), &layout, constants)));
 }
@@ -232,10 +240,10 @@ fn check_svg(text: &str, layout: &Layout, constants: &Constants) -> Result<Strin
         }
         let on_pass = layout.transfer.dome_from_plate(DVec2::new(x_mm, y_mm));
         let on_pass = on_pass.map_err(|limit| format!("dot {id} lies outside the transfer map ({limit})"))?;
-        let Some(hit) = layout.passes.get(laid_out.pass) else {
-            return Err(format!("dot {id} belongs to no hit"));
+        let Some(pass) = layout.passes.get(laid_out.pass) else {
+            return Err(format!("dot {id} belongs to no print pass"));
         };
-        let surface = hit.pass_from_sensor.transpose() * on_pass;
+        let surface = pass.pass_from_sensor.transpose() * on_pass;
         let off_mm = surface.distance(DVec3::from_array(dot.surface_mm));
         if off_mm.is_nan() || off_mm > ARTWORK_TOLERANCE_MM {
             return Err(format!("dot {id} lands {off_mm:.3e} mm beside its surface_mm"));

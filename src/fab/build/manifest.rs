@@ -54,7 +54,7 @@ pub struct PartRecord {
     pub file: String,
     /// Volume of the mesh, mm^3.
     pub volume_mm3: f64,
-    /// Number of handles of the surface.
+    /// Genus of the surface: the number of holes through the part.
     pub genus: i64,
     /// Lowest and highest corner, mm, in the part's own frame.
     pub bbox_mm: [[f64; 3]; 2],

@@ -3,6 +3,17 @@
 //! [`build`] makes all files in memory, [`Tree::write`] puts them in place whole, and [`check::check`]
 //! reads them again. The only things shared between artwork, parts and constants are the resolved design
 //! and its layout; that is why they agree.
+//!
+//! ```no_run
+//! use domecast_fab::build::build;
+//! use std::path::Path;
+//!
+//! let design = domecast_design::Design::load(Path::new("designs/thumb24.json"))?;
+//! let made = build(&design, &mut |doing| eprintln!("{doing}"))?;
+//! made.tree.write(Path::new("output/thumb24"))?;
+//! println!("{} dots, {} files", made.dot_count, made.manifest.files.len());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod check;
 mod manifest;
@@ -116,7 +127,7 @@ impl Build {
     }
 }
 
-/// Makes everything; `step` is told what is being made. Nothing is written to the disk.
+/// Makes everything; `step` gets what is being made. Nothing is written to the disk.
 ///
 /// # Errors
 /// The first fault of the design that only shows when it is laid out, loaded or made.
@@ -148,11 +159,6 @@ fn make(
     for (path, bytes) in measured.map_or(&[][..], Measured::files) {
         tree.add(path.as_str(), bytes.clone());
     }
-    let mut warnings: Vec<Warning> = design
-        .warnings()
-        .iter()
-        .map(|warning| Warning { field: warning.field.clone(), message: warning.message.clone() })
-        .collect();
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
     let sha256 = sha256_hex(design.text().as_bytes());
 
@@ -167,20 +173,12 @@ fn make(
     // four pieces of work that share nothing but what they read, on as many threads as there are
     step("drawing the artwork, making the parts, driving the loads to their limits");
     let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
-    let ((films, judged), (parts, forces)) = rayon::join(
-        || {
-            rayon::join(
-                || artwork::files(&spec, &layout, &label),
-                || LayoutReport::new(design, &spec, &layout),
-            )
-        },
-        || {
-            rayon::join(
-                || make_parts(design, &layout, &springs),
-                || constants::force_report(design, &springs),
-            )
-        },
-    );
+    let draw = || artwork::files(&spec, &layout, &label);
+    let judge = || LayoutReport::new(design, &spec, &layout);
+    let make_parts = || make_parts(design, &layout, &springs);
+    let load = || constants::force_report(design, &springs);
+    let ((films, judged), (parts, forces)) =
+        rayon::join(|| rayon::join(draw, judge), || rayon::join(make_parts, load));
     for file in films? {
         tree.add(file.path, file.bytes);
     }
@@ -189,16 +187,6 @@ fn make(
     for file in files {
         tree.add(file.path, file.bytes);
     }
-    let records = made
-        .iter()
-        .map(|part| PartRecord {
-            name: part.name.clone(),
-            file: format!("parts/{}.stl", part.name),
-            volume_mm3: part.volume_mm3,
-            genus: part.genus,
-            bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
-        })
-        .collect();
     let forces = forces?;
     for (path, text) in forces.files() {
         tree.add(path, text.into_bytes());
@@ -212,13 +200,10 @@ fn make(
     for (path, text) in forms.files {
         tree.add(path, text.into_bytes());
     }
-    warnings.extend(forms.left_out.into_iter().map(|message| Warning { field: "constants".into(), message }));
-    warnings.extend(
-        judged.warnings.iter().map(|message| Warning { field: "pattern".into(), message: message.clone() }),
-    );
+    let warnings = warnings(design, &judged, forms.left_out);
 
     step("writing the page");
-    let told: Vec<(String, String)> =
+    let shown: Vec<(String, String)> =
         warnings.iter().map(|warning| (warning.field.clone(), warning.message.clone())).collect();
     let page = report::page(&report::ReportSubject {
         design,
@@ -228,24 +213,48 @@ fn make(
         forces: &forces,
         parts: &made,
         poses: &poses,
-        warnings: &told,
+        warnings: &shown,
         hash: &sha256,
         files: &tree.files().collect::<Vec<_>>(),
     });
     tree.add("report/index.html", page.into_bytes());
 
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
-    let manifest = Manifest::new(record, records, warnings, tree.files());
+    let manifest = Manifest::new(record, made.iter().map(part_record).collect(), warnings, tree.files());
     tree.add(MANIFEST_NAME, pretty(&manifest));
     let mut headlines = judged.headlines();
-    if let (Some(asked), Some(frames)) = (&design.sections().accuracy, forces.frames_to_average) {
-        headlines.push(format!(
-            "accuracy.force_n = {}: average {frames} frame{}, which keeps it {SAFETY} times over as far as noise goes",
-            asked.force_n,
-            if frames == 1 { "" } else { "s" }
-        ));
-    }
+    headlines.extend(averaging(design, &forces));
     Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines })
+}
+
+/// The design's own warnings, then those of the constants' formats and of the pattern.
+fn warnings(design: &Design, judged: &LayoutReport, formats_left_out: Vec<String>) -> Vec<Warning> {
+    let warning = |field: &str, message: String| Warning { field: field.into(), message };
+    let own = design.warnings().iter().map(|own| warning(&own.field, own.message.clone()));
+    let formats = formats_left_out.into_iter().map(|message| warning("constants", message));
+    let pattern = judged.warnings.iter().map(|message| warning("pattern", message.clone()));
+    own.chain(formats).chain(pattern).collect()
+}
+
+/// What a checker should find in a part's mesh.
+fn part_record(part: &parts::Part) -> PartRecord {
+    PartRecord {
+        name: part.name.clone(),
+        file: format!("parts/{}.stl", part.name),
+        volume_mm3: part.volume_mm3,
+        genus: part.genus,
+        bbox_mm: [part.bounds.min_mm.to_array(), part.bounds.max_mm.to_array()],
+    }
+}
+
+/// How many frames to average for the design's `accuracy.force_n`, where it gives one.
+fn averaging(design: &Design, forces: &constants::ForceReport) -> Option<String> {
+    let (asked, frames) = (design.sections().accuracy.as_ref()?, forces.frames_to_average?);
+    Some(format!(
+        "accuracy.force_n = {}: average {frames} frame{}, which keeps it with a safety factor of {SAFETY} as far as noise goes",
+        asked.force_n,
+        if frames == 1 { "" } else { "s" }
+    ))
 }
 
 /// A file for programs.
@@ -278,7 +287,8 @@ fn make_parts(
     Ok(MadeParts { made, files, poses })
 }
 
-/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay in sight; gives back who watches them.
+/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay visible. Returns the
+/// check of the markers.
 fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
     let sight = constants::MarkerSight::of(design);
     sight.require(design, &Rigid::identity(), "at rest")?;

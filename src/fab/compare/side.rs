@@ -13,7 +13,7 @@ const FORCES: &str = "report/force.json";
 
 /// What is compared of a design or a build.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Side {
+pub struct CompareSide {
     /// The design as written.
     pub design: Value,
     /// `constants.json`.
@@ -24,7 +24,7 @@ pub struct Side {
     pub forces: Value,
 }
 
-impl Side {
+impl CompareSide {
     /// Reads the folder of a build, or builds a design file in memory.
     ///
     /// # Errors
@@ -70,4 +70,11 @@ impl Side {
     pub fn name(&self) -> String {
         self.design.get("name").and_then(Value::as_str).unwrap_or("(without a name)").to_owned()
     }
+}
+
+/// A list of N numbers in a JSON object.
+pub(super) fn numbers<const N: usize>(value: &Value, key: &str) -> Option<[f64; N]> {
+    let list = value.get(key)?.as_array()?;
+    let numbers: Vec<f64> = list.iter().filter_map(Value::as_f64).collect();
+    numbers.try_into().ok()
 }

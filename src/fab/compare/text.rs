@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Changed, Comparison};
+use super::difference::{Comparison, Difference};
 
 fn shown<T: fmt::Display>(value: Option<&T>) -> String {
     value.map_or_else(|| "(not there)".to_owned(), T::to_string)
@@ -11,7 +11,7 @@ fn shown<T: fmt::Display>(value: Option<&T>) -> String {
 fn list<T>(
     f: &mut fmt::Formatter<'_>,
     head: &str,
-    rows: &[Changed<T>],
+    rows: &[Difference<T>],
     show: impl Fn(&T) -> String,
 ) -> fmt::Result {
     if rows.is_empty() {

@@ -13,7 +13,8 @@ use domecast_design::{Design, DesignError};
 use domecast_design::{limits_of, suspension_of};
 use domecast_optics::numeric::Rigid;
 use domecast_springs::{
-    Check, Direction, Limit, Reach, Wrench, choices, push_press_border, reach, standard_directions, try_all,
+    Check, Choice, Direction, Limit, Limits, MoreChecks, Reach, Suspension, Wrench, choices,
+    push_press_border, reach, standard_directions, try_all,
 };
 
 /// Directions around the axis that the table has.
@@ -73,6 +74,60 @@ fn check_json(check: &Check) -> serde_json::Value {
     })
 }
 
+/// The claimed loads on the springs.
+struct Claims {
+    json: Vec<serde_json::Value>,
+    /// Where they put the platform, those that the springs carry.
+    poses: Vec<Rigid>,
+    /// The one that presses hardest.
+    hardest: Option<Wrench>,
+}
+
+fn claims(design: &Design, suspension: &Suspension, limits: &Limits, more: MoreChecks<'_>) -> Claims {
+    let mut found = Claims { json: Vec::new(), poses: Vec::new(), hardest: None };
+    for claim in &design.sections().loads.claims {
+        let [force, moment, point] = [claim.force_n, claim.moment_nmm, claim.point_mm].map(DVec3::from_array);
+        let wrench = Wrench::of_load(force, moment, point, suspension.at_mm());
+        let case = try_all(suspension, limits, more, &wrench);
+        let held = case.equilibrium.as_ref().ok();
+        found.poses.extend(held.map(|e| e.pose));
+        let reached = reach(suspension, limits, more, &Direction { name: claim.name.clone(), wrench });
+        if found.hardest.is_none_or(|h| wrench.force_n.z < h.force_n.z) {
+            found.hardest = Some(wrench);
+        }
+        found.json.push(json!({
+            "name": claim.name,
+            "wrench": wrench.to_array(),
+            "held": case.passed().next().is_none() && held.is_some(),
+            "pose": held.map(|e| e.pose.to_rows_4x4()),
+            "displacement": held.map(|e| e.displacement.to_array()),
+            "checks": case.checks.iter().map(check_json).collect::<Vec<_>>(),
+            "factor_to_first_limit": reached.factor,
+            "first_limit": reached.ended_by.as_ref().map(check_json),
+        }));
+    }
+    found
+}
+
+/// Other springs of the same outer size under the hardest press.
+fn spring_choices(
+    suspension: &Suspension,
+    limits: &Limits,
+    more: MoreChecks<'_>,
+    press: &Wrench,
+) -> Vec<serde_json::Value> {
+    let json = |choice: &Choice| {
+        json!({
+            "wire_diameter_mm": choice.spring.wire_diameter_mm,
+            "active_coils": choice.spring.active_coils,
+            "axial_n_per_mm": choice.axial_n_per_mm,
+            "held": !choice.worst.is_passed(),
+            "worst": check_json(&choice.worst),
+        })
+    };
+    choices(suspension.spec(), limits, more, press).iter().map(json).collect()
+}
+
 /// Computes the report of a design; `springs` is what went into its constants.
 ///
 /// # Errors
@@ -88,29 +143,7 @@ pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceRep
         directions.par_iter().map(|d| line(&reach(&suspension, &limits, &more, d))).collect();
     let border = push_press_border(&suspension, &limits, &more, radius_mm, 0.0, BORDER_POINTS);
 
-    let (mut claims, mut poses) = (Vec::new(), Vec::new());
-    let mut hardest: Option<Wrench> = None;
-    for claim in &design.sections().loads.claims {
-        let [force, moment, point] = [claim.force_n, claim.moment_nmm, claim.point_mm].map(DVec3::from_array);
-        let wrench = Wrench::of_load(force, moment, point, suspension.at_mm());
-        let case = try_all(&suspension, &limits, &more, &wrench);
-        poses.extend(case.equilibrium.as_ref().ok().map(|e| e.pose));
-        let direction = Direction { name: claim.name.clone(), wrench };
-        let reached = reach(&suspension, &limits, &more, &direction);
-        if hardest.is_none_or(|h| wrench.force_n.z < h.force_n.z) {
-            hardest = Some(wrench);
-        }
-        claims.push(json!({
-            "name": claim.name,
-            "wrench": wrench.to_array(),
-            "held": case.passed().next().is_none() && case.equilibrium.is_ok(),
-            "pose": case.equilibrium.as_ref().ok().map(|e| e.pose.to_rows_4x4()),
-            "displacement": case.equilibrium.as_ref().ok().map(|e| e.displacement.to_array()),
-            "checks": case.checks.iter().map(check_json).collect::<Vec<_>>(),
-            "factor_to_first_limit": reached.factor,
-            "first_limit": reached.ended_by.as_ref().map(check_json),
-        }));
-    }
+    let Claims { json: claims, poses, hardest } = claims(design, &suspension, &limits, &more);
     // The paper's measured maximum, checked whether or not the design claims it.
     let press = Wrench::of_load(
         DVec3::new(0.0, 0.0, -PAPER_N),
@@ -119,20 +152,8 @@ pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceRep
         suspension.at_mm(),
     );
     let paper = try_all(&suspension, &limits, &more, &press);
-    let tried =
-        choices(suspension.spec(), &limits, &more, &hardest.filter(|h| h.force_n.z < 0.0).unwrap_or(press));
-    let springs_that_hold: Vec<_> = tried
-        .iter()
-        .map(|choice| {
-            json!({
-                "wire_diameter_mm": choice.spring.wire_diameter_mm,
-                "active_coils": choice.spring.active_coils,
-                "axial_n_per_mm": choice.axial_n_per_mm,
-                "held": !choice.worst.is_passed(),
-                "worst": check_json(&choice.worst),
-            })
-        })
-        .collect();
+    let springs_that_hold =
+        spring_choices(&suspension, &limits, &more, &hardest.filter(|h| h.force_n.z < 0.0).unwrap_or(press));
     let markers = markers_of(design);
     let noise_px = design.sections().noise.white_centroid_px;
     let at_rest = resolution_at(design.optics(), &markers, noise_px, &suspension, &Rigid::identity());

@@ -2,6 +2,17 @@
 //!
 //! Everything here comes from the resolved design and its layout, so that a runtime which sees nothing
 //! but the constants works with the same numbers that the artwork and the parts were made from.
+//!
+//! ```
+//! use domecast_fab::constants;
+//! use std::str::FromStr;
+//!
+//! let design = domecast_design::Design::from_str(include_str!("../../../designs/thumb24.json"))?;
+//! let constants = constants::of(&design, &design.layout()?)?;
+//! assert_eq!(constants.white_markers.len(), 4);
+//! assert!(constants.springs.is_some());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod envelope_picture;
 mod force_report;

@@ -13,7 +13,7 @@ use domecast_optics::pose::{Marker, displacement_from_motion};
 use domecast_runtime::constants::WRENCH_AXES;
 use domecast_springs::{Displacement, Suspension};
 
-/// Bounds on what one frame tells (Cramer-Rao: no unbiased reading of the centroids does better).
+/// Bounds on what one frame resolves (Cramer-Rao: no unbiased estimate from the centroids does better).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Resolution {
     /// Standard deviation of the displacement: mm and degrees.
@@ -68,8 +68,8 @@ pub fn resolution_at(
     let sd = |m: &Matrix6<f64>| -> [f64; 6] { std::array::from_fn(|i| m[(i, i)].max(0.0).sqrt()) };
     let wrench_sd = sd(&of_wrench);
     let weakest = |from: usize| {
-        let most = wrench_sd[from..from + 3].iter().copied().fold(0.0, f64::max);
-        (from..from + 3).filter(move |axis| wrench_sd[*axis] >= 0.99 * most).map(|axis| WRENCH_AXES[axis])
+        let max = wrench_sd[from..from + 3].iter().copied().fold(0.0, f64::max);
+        (from..from + 3).filter(move |axis| wrench_sd[*axis] >= 0.99 * max).map(|axis| WRENCH_AXES[axis])
     };
     let pose_sd = sd(&covariance);
     let finite = condition.is_finite() && wrench_sd.iter().all(|v| v.is_finite());
@@ -152,7 +152,7 @@ pub fn design_choices(
     all
 }
 
-/// Frames whose mean tells a force to the design's `accuracy.force_n`, with the settings' safety, at rest and at every
+/// Frames whose mean gives a force to the design's `accuracy.force_n`, with the settings' safety, at rest and at every
 /// pose; `None` where nothing is asked or a marker is not seen.
 ///
 /// The noise of frames is independent: the spread of a mean falls with the root of their number. What the constants

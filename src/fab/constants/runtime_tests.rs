@@ -76,7 +76,7 @@ fn the_bound_names_the_weak_axes() {
     let half = resolution_at(design.optics(), &markers, 0.05, &suspension, &Rigid::identity()).unwrap();
     assert!((half.wrench_sd[2] / found.wrench_sd[2] - 0.5).abs() < 1e-12);
     let choices = design_choices(design.optics(), &markers, 0.1, &suspension);
-    // A longer focal length tells more, markers nearer to the middle less about tilt.
+    // A longer focal length resolves more, markers nearer to the middle resolve tilt less.
     let of =
         |name: &str| choices.iter().find(|c| c.change.contains(name)).unwrap().resolution.clone().unwrap();
     assert!(of("markers at 0.6").wrench_sd[3] > found.wrench_sd[3]);

@@ -57,7 +57,7 @@ impl MarkerSight {
         checks
     }
 
-    /// Whether every marker of the design is in sight at a pose; `when` says which: "at rest", "under the load ..".
+    /// Whether every marker of the design is visible at a pose; `when` names it: "at rest", "under the load ..".
     ///
     /// # Errors
     /// The marker and the limit that it is past.

@@ -62,7 +62,7 @@ pub fn springs_of(design: &Design, sight: MarkerSight) -> Result<DesignSprings, 
     let steps = (room / COMPRESSION_STEP_MM).floor().clamp(0.0, 1000.0) as u32;
     let mut stiffness_at = Vec::new();
     for compression_mm in (0..=steps).map(|i| f64::from(i) * COMPRESSION_STEP_MM) {
-        // Past the point where the law ends there is nothing to tell.
+        // Past the point where the law ends there is no stiffness.
         let Ok(matrix) = suspension.stiffness_at(compression_mm) else { break };
         stiffness_at.push(StiffnessAt { compression_mm, stiffness: rows(&matrix) });
     }
@@ -74,7 +74,7 @@ pub fn springs_of(design: &Design, sight: MarkerSight) -> Result<DesignSprings, 
         stiffness,
         stiffness_at: &stiffness_at,
     };
-    // Without enough loads the plain runtime gets no constants of its own: their absence says so.
+    // Without enough loads the plain runtime gets no constants of its own: the field is left out.
     let plain = PlainFit::over(&input, &claimed_loads(design, &suspension, &sight)).ok();
     let plain_runtime = plain.as_ref().map(PlainFit::constants);
     let constants = SpringConstants {

@@ -197,12 +197,12 @@ fn dots_text(subject: &ReportSubject<'_>) -> Html {
         file("artwork/dots.pdf"),
         typeset(s.print.dpi.into()),
     );
-    for (index, hit) in subject.layout.passes.iter().enumerate().filter(|_| films > 1) {
+    for (index, pass) in subject.layout.passes.iter().enumerate().filter(|_| films > 1) {
         text += html!(
             " Film {}: tilt {}°, towards {}°.",
             index + 1,
-            typeset(hit.tilt_rad.to_degrees()),
-            typeset(hit.azimuth_rad.to_degrees())
+            typeset(pass.tilt_rad.to_degrees()),
+            typeset(pass.azimuth_rad.to_degrees())
         );
     }
     text + html!(

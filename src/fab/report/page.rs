@@ -54,7 +54,7 @@ pub fn page(subject: &ReportSubject<'_>) -> Html {
         env!("CARGO_PKG_VERSION"),
         links.collect::<Html>(),
         warnings(subject),
-        glance(subject),
+        key_figures(subject),
         sections.collect::<Html>(),
         viewer(subject),
     )
@@ -86,7 +86,7 @@ fn warnings(subject: &ReportSubject<'_>) -> Html {
     )
 }
 
-fn glance(subject: &ReportSubject<'_>) -> Html {
+fn key_figures(subject: &ReportSubject<'_>) -> Html {
     let s = subject.design.sections();
     let n = typeset;
     let mut entries = vec![

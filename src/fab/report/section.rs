@@ -1,4 +1,17 @@
 //! The sensor cut along its x axis, with the rays that its camera sees by.
+//!
+//! ```
+//! use domecast_fab::report::section;
+//! use glam::DVec2;
+//! use std::str::FromStr;
+//!
+//! let design = domecast_design::Design::from_str(include_str!("../../../designs/thumb24.json"))?;
+//! let ray = section::ray_points(design.optics(), DVec2::new(400.0, 240.0)).expect("inside the image");
+//! // from the pupil through both faces of the sheet to the dome
+//! assert_eq!(ray.len(), 4);
+//! assert!((ray[3].length() - 10.0).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::fmt::Write as _;
 
@@ -55,8 +68,8 @@ pub fn drawing(design: &Design) -> Html {
     let half = 0.5 * s.envelope.size_mm[0];
     let underside = s.platforms.upper.underside_z_mm;
     let lower_top = design.lower_top_z_mm();
-    let [least, most] = design.bounds_mm();
-    let (top, bottom) = (most.z, least.z);
+    let [low, high] = design.bounds_mm();
+    let (top, bottom) = (high.z, low.z);
     let margin = 0.06 * (top - bottom);
     let sheet_half = 0.5 * s.sheet.size_mm[0];
     let mut art = String::new();

@@ -4,13 +4,13 @@
 //! needs the places of the springs' upper ends and the springs themselves; with them a runtime has the exact law.
 
 use glam::DVec3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use domecast_springs::{EndType, MagnetPair, SpecError, Spring, SpringSpec, Suspension, SuspensionSpec};
 
 /// Springs, magnets and weight of the platform.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SpringLaw {
     /// Upper end of each spring's axis at rest, in the rest frame; the lower ends are straight below.
     pub upper_ends_mm: Vec<[f64; 3]>,
@@ -43,7 +43,8 @@ pub struct SpringLaw {
 }
 
 /// How the ends of the springs are made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum SpringLawEnds {
     /// Cut and left as it is.
@@ -57,7 +58,8 @@ pub enum SpringLawEnds {
 }
 
 /// A pair of equal disc magnets, one at each end of a spring.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MagnetLaw {
     /// Diameter of a disc.
     pub diameter_mm: f64,

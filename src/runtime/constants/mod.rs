@@ -48,6 +48,7 @@ impl Constants {
     }
 
     /// JSON schema of the file, for those who read it with other programs.
+    #[cfg(feature = "schema")]
     pub fn schema() -> String {
         let schema = schemars::schema_for!(Constants);
         let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();

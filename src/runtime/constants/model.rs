@@ -1,6 +1,5 @@
 //! The form of `constants.json`.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::law::SpringLaw;
@@ -16,7 +15,8 @@ pub type Matrix4 = [[f64; 4]; 4];
 /// What a runtime must know of one sensor.
 ///
 /// Lengths mm, angles rad, pixels px (the centre of the top-left pixel is 0, 0).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Constants {
     /// Always `domecast-constants`.
     pub format: String,
@@ -46,7 +46,8 @@ pub struct Constants {
 }
 
 /// Standard deviations of the nominal numbers, and of the centroids.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CalibrationPriors {
     /// Pupil, sensor frame, mm.
     pub pupil_mm: [f64; 3],
@@ -67,7 +68,8 @@ pub struct CalibrationPriors {
 }
 
 /// The camera.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct CameraConstants {
     /// `pinhole`, `brown_conrady` or `kannala_brandt`.
     pub model: String,
@@ -91,7 +93,8 @@ pub struct CameraConstants {
 }
 
 /// The layers and the dome.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct OpticsConstants {
     /// Radius of the dots' surface.
     pub dome_radius_mm: f64,
@@ -100,7 +103,8 @@ pub struct OpticsConstants {
 }
 
 /// One flat layer.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct LayerConstants {
     /// What it is made of.
     pub name: String,
@@ -114,7 +118,8 @@ pub struct LayerConstants {
 }
 
 /// The circular mask of the undistorted frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct MaskConstants {
     /// Its centre.
     pub center_px: [f64; 2],
@@ -123,7 +128,8 @@ pub struct MaskConstants {
 }
 
 /// A white marker.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct WhiteMarker {
     /// Its number.
     pub id: usize,
@@ -139,7 +145,8 @@ pub struct WhiteMarker {
 }
 
 /// A black dot.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BlackDot {
     /// Its number.
     pub id: usize,
@@ -158,7 +165,8 @@ pub struct BlackDot {
 }
 
 /// The springs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct SpringConstants {
     /// From displacement to wrench at `at_mm`, at rest.
     pub stiffness: [[f64; 6]; 6],
@@ -182,7 +190,8 @@ pub struct SpringConstants {
 }
 
 /// The stiffness at one compression.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct StiffnessAt {
     /// How far the platform is pressed down from rest.
     pub compression_mm: f64,
@@ -191,7 +200,8 @@ pub struct StiffnessAt {
 }
 
 /// Constants for plain solvePnP.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct PlainRuntime {
     /// From pose relative to `rest_pose` to the wrench that the springs' `stiffness` means.
     pub stiffness: [[f64; 6]; 6],

@@ -3,9 +3,11 @@
 //! The interpolation is bilinear: every missing colour is the mean of the nearest pixels that have it. Its weights
 //! are positive and add up to 1, so it never amplifies what another effect changed.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::frame::Frame;
-use crate::pipeline::{Pass, PassContext, Stage};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::electronics::pass::{Pass, PassContext, Stage};
+use crate::raster::frame::Frame;
 use crate::scene::electronics::BayerPattern;
 use crate::{Pipeline, Scene, SimError, Work};
 

@@ -6,9 +6,11 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::frame::Image8;
-use crate::pipeline::{CodedPass, PassContext};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::electronics::pass::{CodedPass, PassContext};
+use crate::raster::frame::Image8;
 use crate::scene::electronics::JpegChroma;
 use crate::{Pipeline, Scene, SimError, Work};
 

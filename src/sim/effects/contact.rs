@@ -1,11 +1,14 @@
 //! Objects dent the dome, and press the platform on its springs.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::bound::Bound;
+use crate::contact::level::{level_named, level_of};
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::raster::spots::Points;
 use crate::scene::file::LevelName;
 use crate::scene::object::Hold;
-use crate::spots::Points;
 use crate::{Pipeline, Scene, SimError};
-use domecast_contact::{Level, estimate, most_force_n};
+use domecast_contact::{estimate, most_force_n};
 
 /// See the module.
 pub struct Contact;
@@ -19,21 +22,6 @@ const SOLVES: f64 = 12.0;
 const NEARER: f64 = 1.6;
 /// Directions of the dome at which its depth in an object is looked at.
 const DEPTH_LOOKS: u32 = 2000;
-
-/// A level with the scene's element length.
-pub fn level_named(scene: &Scene, name: LevelName) -> Level {
-    let element_mm = scene.file().contact.element_mm;
-    match name {
-        LevelName::Geometric => Level::Geometric,
-        LevelName::ClosedForm => Level::ClosedForm,
-        LevelName::Linear => Level::Linear { element_mm },
-    }
-}
-
-/// The level that the scene takes for exact.
-pub fn level_of(scene: &Scene) -> Level {
-    level_named(scene, scene.file().contact.level)
-}
 
 /// Predicted work of a level for a frame.
 fn per_frame(scene: &Scene, name: LevelName) -> u64 {

@@ -8,11 +8,13 @@
 
 use glam::DVec2;
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::frame::Frame;
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::electronics::pass::{Pass, PassContext, Stage};
 use crate::light::bounds;
 use crate::light::bounds::LightBounds;
-use crate::pipeline::{Pass, PassContext, Stage};
+use crate::raster::frame::Frame;
 use crate::scene::electronics::FocusSection;
 use crate::{Pipeline, Scene, SimError, Work};
 use domecast_optics::SensorOptics;

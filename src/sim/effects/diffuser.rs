@@ -1,9 +1,11 @@
 //! The tape before the lights: it spreads their lobes and takes its share.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
 use crate::light::bounds;
 use crate::light::bounds::LightBounds;
-use crate::light::{lit_by_leds, shade};
+use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -15,7 +17,7 @@ impl Effect for Diffuser {
     }
 
     fn calls_for(&self, scene: &Scene) -> Option<String> {
-        let tape = scene.design().sections().leds.diffuser.filter(|_| lit_by_leds(scene))?;
+        let tape = scene.design().sections().leds.diffuser.filter(|_| is_lit_by_leds(scene))?;
         Some(format!(
             "tape that lets {} through, {} of it by Lambert's law and the rest in a lobe of {} degrees",
             tape.transmittance, tape.lambert_fraction, tape.lobe_width_deg

@@ -1,7 +1,9 @@
 //! The lights, their colours and lobes, through the sheet.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::light::{lit_by_leds, shade};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -16,7 +18,7 @@ impl Effect for DirectLight {
     }
 
     fn calls_for(&self, scene: &Scene) -> Option<String> {
-        let light = scene.file().light.leds.as_ref().filter(|_| lit_by_leds(scene))?;
+        let light = scene.file().light.leds.as_ref().filter(|_| is_lit_by_leds(scene))?;
         let count = scene.design().sections().leds.list.len();
         Some(format!("{count} lights at {} of their flux instead of an even light", light.power))
     }

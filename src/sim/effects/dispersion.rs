@@ -1,10 +1,12 @@
 //! Each colour is bent by its own index: without it, all by that of green.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::geometry_bound::{called_for, shift_px};
-use crate::instant::units;
-use crate::pipeline::Geometry;
-use crate::spots::Points;
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::effects::geometry_bound::{called_for, shift_px};
+use crate::raster::sensor_state::units;
+use crate::raster::settings::Geometry;
+use crate::raster::spots::Points;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.

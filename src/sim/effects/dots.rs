@@ -1,7 +1,9 @@
 //! The printed dots.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::instant::units;
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::raster::sensor_state::units;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.

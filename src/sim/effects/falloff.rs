@@ -1,9 +1,11 @@
 //! Falloff with distance and the cosine at the membrane: without it every point is lit like the pole.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
 use crate::light::bounds;
 use crate::light::bounds::LightBounds;
-use crate::light::{lit_by_leds, shade};
+use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -17,7 +19,7 @@ impl Effect for Falloff {
     fn calls_for(&self, scene: &Scene) -> Option<String> {
         let radius = scene.optics().dome_radius_mm();
         let distance = scene.design().sections().leds.center_radius_mm;
-        lit_by_leds(scene).then(|| {
+        is_lit_by_leds(scene).then(|| {
             format!("lights {distance} mm from the axis of a dome of radius {radius} mm: near, and aslant")
         })
     }

@@ -1,10 +1,12 @@
 //! Light lost and thrown back at the sheet's faces: on the way in, inside the dome, and on the way to the camera.
 
 use super::direct_light::SAMPLES;
-use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
 use crate::light::bounds;
 use crate::light::bounds::LightBounds;
-use crate::light::{lit_by_leds, shade};
+use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -17,7 +19,7 @@ impl Effect for Fresnel {
 
     fn calls_for(&self, scene: &Scene) -> Option<String> {
         let steps = scene.optics().layers().windows(2).any(|pair| pair[0].index != pair[1].index);
-        (steps && lit_by_leds(scene)).then(|| {
+        (steps && is_lit_by_leds(scene)).then(|| {
             let indices: Vec<String> =
                 scene.optics().layers().iter().map(|layer| layer.index[1].to_string()).collect();
             format!("faces between media of index {}", indices.join(", "))

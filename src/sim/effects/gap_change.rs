@@ -1,11 +1,13 @@
 //! The air gap changes as the platform moves, and the bend with it: without it, the points that a straight ray
 //! shows at rest move rigidly with the platform, and no ray is solved in a frame.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::geometry_bound::{called_for, shift_px};
-use crate::instant::units;
-use crate::pipeline::Geometry;
-use crate::spots::Points;
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::effects::geometry_bound::{called_for, shift_px};
+use crate::raster::sensor_state::units;
+use crate::raster::settings::Geometry;
+use crate::raster::spots::Points;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.

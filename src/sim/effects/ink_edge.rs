@@ -1,8 +1,10 @@
 //! The ink fades out at a dot's edge: evenly, over a width about the outline, as six nested outlines of a sixth of the
 //! ink each.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::instant::units;
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::raster::sensor_state::units;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.

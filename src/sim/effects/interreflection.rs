@@ -1,9 +1,11 @@
 //! The membrane lights itself: straight across the dome, and by way of the sheet's underside.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
 use crate::light::bounds;
 use crate::light::bounds::LightBounds;
-use crate::light::{lit_by_leds, shade};
+use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -16,7 +18,7 @@ impl Effect for Interreflection {
 
     fn calls_for(&self, scene: &Scene) -> Option<String> {
         let largest = largest_reflectance(scene);
-        (lit_by_leds(scene) && largest > 0.0)
+        (is_lit_by_leds(scene) && largest > 0.0)
             .then(|| format!("a membrane that gives back {largest} of the light into the dome"))
     }
 

@@ -2,20 +2,23 @@
 
 mod bayer;
 mod compression;
-pub mod contact;
+pub(crate) mod contact;
 mod defocus;
 mod diffuser;
 mod direct_light;
 mod dispersion;
 mod dots;
+pub(crate) mod effect;
 mod falloff;
 mod fresnel;
 mod gap_change;
+pub(crate) mod geometry_bound;
 mod ink_edge;
 mod interreflection;
 mod lens_distortion;
 mod motion_blur;
 mod noise;
+pub mod pipeline;
 mod platform_shadow;
 mod pupil_shift;
 mod refraction;
@@ -26,7 +29,7 @@ pub mod speed;
 mod tests;
 mod vignetting;
 
-use super::effect::Effect;
+use self::effect::Effect;
 
 /// All effects, in the order of their names.
 pub fn all() -> &'static [&'static dyn Effect] {

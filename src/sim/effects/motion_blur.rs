@@ -4,8 +4,10 @@
 //! one to the next below half a pixel.
 
 use super::speed::fastest_px_per_s;
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::pipeline::Exposure;
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::raster::settings::Exposure;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.

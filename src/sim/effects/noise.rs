@@ -8,10 +8,12 @@
 use domecast_optics::numeric::mix64;
 use rayon::prelude::*;
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::frame::Frame;
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::electronics::pass::{Pass, PassContext, Stage};
 use crate::light::bounds;
-use crate::pipeline::{Pass, PassContext, Stage};
+use crate::raster::frame::Frame;
 use crate::scene::electronics::NoiseSection;
 use crate::{Pipeline, Scene, SimError, Work};
 

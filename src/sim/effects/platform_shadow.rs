@@ -1,9 +1,11 @@
 //! The platform stands in the light's way: the lip before the lights, the pits' walls, the window's edge.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
 use crate::light::bounds;
 use crate::light::bounds::LightBounds;
-use crate::light::{lit_by_leds, shade};
+use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -16,7 +18,7 @@ impl Effect for PlatformShadow {
 
     fn calls_for(&self, scene: &Scene) -> Option<String> {
         let leds = &scene.design().sections().leds;
-        (lit_by_leds(scene) && leds.through_platform < 1.0).then(|| {
+        (is_lit_by_leds(scene) && leds.through_platform < 1.0).then(|| {
             format!(
                 "lights in pits, behind a lip that ends {:.2} mm above their middle",
                 leds.lip_top_z_mm - leds.center_z_mm

@@ -3,11 +3,13 @@
 //! The sensor is worked out at the times of some slices of rows. Each point of a dot or marker is seen where its way in
 //! the image meets the row that is exposed just then, exactly; the brightness of the membrane is that of the slice's
 //! middle row. There are as many slices as keep the motion within one below 0.1 px and below half of the scene's
-//! tolerance, [`MOST_SLICES`] at most.
+//! tolerance, [`MAX_SLICES`] at most.
 
 use super::speed::fastest_px_per_s;
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::pipeline::Rolling;
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::raster::settings::Rolling;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -16,9 +18,9 @@ pub struct RollingShutter;
 /// Largest motion in a slice, px.
 const STEP_PX: f64 = 0.1;
 
-/// Most slices: each holds its own tables of the dented membrane. What moves by more than `MOST_SLICES * STEP_PX`
+/// Most slices: each holds its own tables of the dented membrane. What moves by more than `MAX_SLICES * STEP_PX`
 /// during the readout has its shadows and creases, not its dots, up to half a slice's motion out of place.
-const MOST_SLICES: f64 = 64.0;
+const MAX_SLICES: f64 = 64.0;
 
 /// Work of one more slice: pose and tables.
 const SLICE_UNITS: u64 = 25_000;
@@ -61,5 +63,5 @@ fn roll_px(scene: &Scene) -> f64 {
 fn slices(scene: &Scene) -> u32 {
     let step = STEP_PX.min(0.5 * scene.file().tolerance.px);
     let rows = scene.image_size().1.max(2) as f64;
-    (roll_px(scene) / step).ceil().clamp(2.0, rows.min(MOST_SLICES)) as u32
+    (roll_px(scene) / step).ceil().clamp(2.0, rows.min(MAX_SLICES)) as u32
 }

@@ -1,9 +1,11 @@
 //! The platform moves on its springs: without it, it stays at rest.
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::geometry_bound::{called_for, shift_px};
-use crate::instant::units;
-use crate::pipeline::Geometry;
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::effects::geometry_bound::{called_for, shift_px};
+use crate::raster::sensor_state::units;
+use crate::raster::settings::Geometry;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.

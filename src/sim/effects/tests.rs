@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use crate::effect::{Bound, EffectName};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::output::render::Renderer;
 use crate::plan::Plan;
-use crate::render::Renderer;
 use crate::{Image8, Scene, Work};
 
 const ELECTRONICS: &str = r#", "electronics": { "vignetting_exponent": 0.4,

@@ -2,9 +2,11 @@
 
 use glam::DVec2;
 
-use crate::effect::{Bound, Cost, Effect, EffectName};
-use crate::frame::Frame;
-use crate::pipeline::{Pass, PassContext, Stage};
+use crate::bound::Bound;
+use crate::effect_name::EffectName;
+use crate::effects::effect::{Cost, Effect};
+use crate::electronics::pass::{Pass, PassContext, Stage};
+use crate::raster::frame::Frame;
 use crate::{Pipeline, Scene, SimError, Work};
 use domecast_optics::camera::Lens;
 

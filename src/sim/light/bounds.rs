@@ -6,14 +6,17 @@
 //! membrane's light coming back to it, the membrane's own light is at most `a k / (1 - a k)` of the lights', and what
 //! changes the lights' light changes all of it by at most `1 / (1 - a k)` of that.
 
+use std::sync::OnceLock;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::LightUse;
 use super::direct::EmitterRule;
+use super::parts::LightUse;
 use super::setup::{self, Channels};
 use super::shade::leaves;
-use super::tables::{self, SHELLS, Ways};
+use super::shelf::Shelf;
+use super::tables::{SHELLS, Ways};
 use crate::scene::Scene;
 use crate::{Bound, SimError};
 use domecast_optics::SensorOptics;
@@ -68,12 +71,13 @@ impl LightBounds {
         let ways = ways(scene, false, false)?;
         let moved = !scene.file().objects.is_empty();
         let key = format!("bounds {moved} {}", scene.design().text());
-        let prepared = tables::prepared(&key);
-        let samples = match prepared.samples.get() {
+        static SHELF: Shelf<OnceLock<Samples>> = Shelf::new();
+        let kept = SHELF.get(&key);
+        let samples = match kept.get() {
             Some(samples) => samples,
             None => {
                 let made = Samples::new(scene, moved)?;
-                prepared.samples.get_or_init(|| made)
+                kept.get_or_init(|| made)
             }
         };
         let sections = scene.design().sections();
@@ -157,7 +161,7 @@ struct Sample {
 
 /// Places of the membrane, and the white markers.
 #[derive(Debug)]
-pub(super) struct Samples {
+struct Samples {
     membrane: Vec<Sample>,
     markers: Vec<Sample>,
 }

@@ -2,10 +2,10 @@
 
 use glam::{DVec2, DVec3};
 
-use super::LightUse;
 use super::cavity::Cavities;
 use super::direct::Emitter;
 use super::lobe::{Diffuser, Lobe};
+use super::parts::LightUse;
 use super::tables::{Source, Ways};
 use crate::SimError;
 use crate::scene::Scene;

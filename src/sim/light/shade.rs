@@ -1,14 +1,15 @@
 //! Levels of the membrane and the white markers, from the light on them.
 
-use glam::{DVec3, Vec3A, Vec4};
+use glam::{DVec3, Vec4};
 
 use super::field::{FieldParts, LightField};
 use super::setup::{self, Channels};
-use super::{LightUse, fresnel, tables};
+use super::{fresnel, tables};
 use crate::SimError;
-use crate::effect::EffectName;
+use crate::effect_name::EffectName;
+use crate::light::parts::LightUse;
+use crate::light::shading::{Shading, SurfaceSample};
 use crate::scene::Scene;
-use crate::shading::{Moved, MovedBend, PlainSample, Shading, SurfaceSample, Turned};
 use crate::work::Work;
 use domecast_design::sections::LedColor;
 
@@ -44,9 +45,9 @@ pub fn predicted_evaluations(scene: &Scene) -> u64 {
 }
 
 /// The dome under the design's lights.
-pub struct LitDome {
+pub struct ShadedDome {
     field: LightField,
-    radius_mm: f64,
+    per_mm: f32,
     /// Level for each mW/mm^2.
     gain: Vec4,
     stray: f32,
@@ -55,10 +56,9 @@ pub struct LitDome {
     /// Places of that table for a squared sine of 1.
     leaving_scale: f32,
     markers: Vec<(DVec3, [f32; 3])>,
-    steepest_per_mm: f64,
 }
 
-impl LitDome {
+impl ShadedDome {
     /// Works out the light of a scene.
     ///
     /// # Errors
@@ -129,10 +129,8 @@ impl LitDome {
             // What comes after the last counts nothing.
             (0..=LEAVING + 1).map(at).collect()
         });
-        let brightest_gain = gain.iter().copied().fold(0.0, f64::max);
         Ok(Some(Self {
-            steepest_per_mm: 1.5 * field.steepest_per_mm() * brightest_gain,
-            radius_mm: scene.optics().dome_radius_mm(),
+            per_mm: (1.0 / scene.optics().dome_radius_mm()) as f32,
             field,
             gain: wide(gain),
             stray: light.stray_level as f32,
@@ -157,12 +155,6 @@ impl LitDome {
         let Some([low, high]) = table.get(i as usize..i as usize + 2) else { return Vec4::ZERO };
         *low + (*high - *low) * (at - i as f32)
     }
-
-    /// What a surface of some light shows.
-    #[inline]
-    fn level(&self, light: Vec4, change: Vec4, cosine: f32) -> Vec4 {
-        (self.gain * light + change).max(Vec4::ZERO) * self.passed(cosine) + Vec4::splat(self.stray)
-    }
 }
 
 /// Share of the light that leaves through the sheet into the air of the camera.
@@ -173,52 +165,21 @@ pub(super) fn leaves(optics: &domecast_optics::SensorOptics, momentum: f64, besi
     fresnel::through(&indices, momentum.min(1.0))
 }
 
-impl Shading for LitDome {
-    fn levels(&self, samples: &[SurfaceSample], levels: &mut Vec<Vec4>, work: &mut Work) {
-        let per_mm = 1.0 / self.radius_mm as f32;
-        let mut moved = 0_u64;
-        levels.extend(samples.iter().map(|sample| {
-            let (light, change) = match sample.moved {
-                Moved::Not => (self.field.still(sample.point_mm * per_mm), Vec4::ZERO),
-                Moved::Little(change) => {
-                    (self.field.still(sample.point_mm.normalize_or(Vec3A::Z)), change.extend(0.0))
-                }
-                Moved::Far => {
-                    moved += 1;
-                    (self.field.moved(sample.point_mm, sample.normal), Vec4::ZERO)
-                }
-            };
-            self.level(light, change, sample.to_camera.z)
-        }));
-        let still = samples.len() as u64 - moved;
+impl Shading for ShadedDome {
+    fn level(&self, sample: &SurfaceSample) -> Vec4 {
+        let light = if sample.is_moved {
+            self.field.moved(sample.point_mm, sample.normal)
+        } else {
+            self.field.still(sample.point_mm * self.per_mm)
+        };
+        self.gain * light * self.passed(sample.to_camera.z) + Vec4::splat(self.stray)
+    }
+
+    fn count(&self, still: u64, moved: u64, work: &mut Work) {
         work.add(EffectName::DirectLight, STILL_UNITS * still + MOVED_UNITS * moved);
         if self.leaving.is_some() {
-            work.add(EffectName::Fresnel, LEAVING_UNITS * samples.len() as u64);
+            work.add(EffectName::Fresnel, LEAVING_UNITS * (still + moved));
         }
-    }
-
-    fn plain_levels(&self, samples: &[PlainSample], levels: &mut Vec<Vec4>, work: &mut Work) {
-        levels.extend(samples.iter().map(|sample| {
-            self.level(self.field.still(sample.direction), sample.change.extend(0.0), sample.cosine)
-        }));
-        work.add(EffectName::DirectLight, STILL_UNITS * samples.len() as u64);
-        if self.leaving.is_some() {
-            work.add(EffectName::Fresnel, LEAVING_UNITS * samples.len() as u64);
-        }
-    }
-
-    fn change(&self, point_mm: Vec3A, normal: Vec3A) -> Vec3A {
-        Vec3A::from_vec4(self.gain) * self.field.change(point_mm, normal)
-    }
-
-    fn bend(&self, directions: &[Vec3A]) -> f32 {
-        self.gain.max_element() * self.field.bend(directions)
-    }
-
-    fn moved_bend(&self, directions: &[Vec3A], turned: Turned) -> MovedBend {
-        let gain = self.gain.max_element();
-        let bend = self.field.moved_bend(directions, turned);
-        MovedBend { table: gain * bend.table, tilt: gain * bend.tilt }
     }
 
     fn marker_level(&self, _scene: &Scene, position_mm: DVec3) -> [f32; 3] {
@@ -228,8 +189,19 @@ impl Shading for LitDome {
             .min_by(|a, b| a.0.distance_squared(position_mm).total_cmp(&b.0.distance_squared(position_mm)));
         nearest.map_or([0.0; 3], |(_, level)| *level)
     }
+}
 
-    fn steepest_per_mm(&self) -> f64 {
-        self.steepest_per_mm
+/// The shading of a scene, `None` where the membrane is evenly lit.
+///
+/// # Errors
+/// Lights that cannot be computed.
+pub fn shading_of(
+    scene: &Scene,
+    used: &LightUse,
+    work: &mut Work,
+) -> Result<Option<Box<dyn Shading>>, SimError> {
+    if !used.direct {
+        return Ok(None);
     }
+    Ok(ShadedDome::new(scene, used, work)?.map(|dome| Box::new(dome) as Box<dyn Shading>))
 }

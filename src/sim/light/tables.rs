@@ -1,16 +1,16 @@
 //! Each light's own tables over the dome, for a flux of one: worked out once for a design, whatever its lights are
 //! driven with, and kept for the next scene of the same design.
 
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::bounds::Samples;
 use super::cavity::Cavities;
 use super::direct::{DirectLight, Emitter, EmitterRule};
 use super::dome_map::{DomeGrid, bicubic};
 use super::radiosity::{DomeRoom, Rings, Underside};
+use super::shelf::Shelf;
 use domecast_optics::SensorOptics;
 
 /// Cells across the table on the dome, and across those on the shells inside it, where light is smoother.
@@ -105,7 +105,6 @@ pub struct Prepared {
     dome: OnceLock<Tables>,
     shells: OnceLock<Vec<Tables>>,
     rooms: OnceLock<Vec<DomeRoom>>,
-    pub(super) samples: OnceLock<Samples>,
 }
 
 impl Prepared {
@@ -129,24 +128,10 @@ impl Prepared {
     }
 }
 
-/// Designs and choices whose tables are kept; the oldest goes first.
-const KEPT: usize = 24;
-
-/// The tables for a key: text of the design and flags of the effects. What is kept never changes what comes out,
-/// only when it is worked out.
+/// The tables for a key: text of the design and flags of the effects.
 pub fn prepared(key: &str) -> Arc<Prepared> {
-    static SHELF: Mutex<Vec<(String, Arc<Prepared>)>> = Mutex::new(Vec::new());
-    // A thread that died while it held the shelf left it whole: entries are pushed and removed in one step.
-    let mut shelf = SHELF.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    if let Some((_, found)) = shelf.iter().find(|(kept, _)| kept == key) {
-        return Arc::clone(found);
-    }
-    if shelf.len() >= KEPT {
-        shelf.remove(0);
-    }
-    let new = Arc::new(Prepared::default());
-    shelf.push((key.to_owned(), Arc::clone(&new)));
-    new
+    static SHELF: Shelf<Prepared> = Shelf::new();
+    SHELF.get(key)
 }
 
 fn dome_tables(ways: &Ways) -> Tables {

@@ -13,9 +13,8 @@ use super::lobe::{Diffuser, Lobe};
 use super::quadrature::GaussRule;
 use super::radiosity::{DomeRoom, Rings, Underside};
 use super::setup;
-use super::shade::LitDome;
+use super::shade::ShadedDome;
 use super::tables::{Prepared, Source, Ways};
-use crate::shading::Moved;
 use crate::{EffectName, Shading, SurfaceSample, Work};
 use domecast_optics::camera::{LensModel, LensSpec};
 use domecast_optics::numeric::Rigid;
@@ -429,7 +428,7 @@ fn shadows_only_darken_and_a_clear_platform_throws_none() {
 fn the_sensor_is_lit_from_three_sides() {
     let scene = scene("");
     let mut work = Work::default();
-    let dome = LitDome::new(&scene, &ALL, &mut work).unwrap().unwrap();
+    let dome = ShadedDome::new(&scene, &ALL, &mut work).unwrap().unwrap();
     let field = dome.field();
     assert!(field.error() < 0.02, "{}", field.error());
     assert!(work.of(EffectName::PlatformShadow) > work.of(EffectName::DirectLight));
@@ -445,17 +444,16 @@ fn the_sensor_is_lit_from_three_sides() {
         point_mm: (direction * 10.0).as_vec3a(),
         normal: direction.as_vec3a(),
         to_camera: Vec3A::NEG_Z,
-        moved: if deformed { Moved::Far } else { Moved::Not },
+        is_moved: deformed,
     };
     let moved_scene = self::scene(
         r#", "objects": [ { "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 },
              "path": [ { "time_s": 0, "position_mm": [0, 0, 40] } ] } ]"#,
     );
-    let dome = LitDome::new(&moved_scene, &ALL, &mut work).unwrap().unwrap();
+    let dome = ShadedDome::new(&moved_scene, &ALL, &mut work).unwrap().unwrap();
     let brightest = 450.0 * 0.55 / 2.0 * dome.field().brightest()[1];
     for direction in directions(60).filter(|d| d.z > 0.15) {
-        let mut levels = Vec::new();
-        dome.levels(&[sample(direction, false), sample(direction, true)], &mut levels, &mut work);
+        let levels = [false, true].map(|is_moved| dome.level(&sample(direction, is_moved)));
         for c in 0..3 {
             let off = f64::from(levels[0][c] - levels[1][c]).abs();
             assert!(off < 0.03 * brightest, "{direction}: {levels:?}");
@@ -476,7 +474,7 @@ fn numbers_for_lights_that_are_not_there_are_refused() {
 }
 
 /// Largest difference of two light fields on the resting membrane, and of a moved one's shells.
-fn largest_change(a: &LitDome, b: &LitDome, deformed: bool) -> f64 {
+fn largest_change(a: &ShadedDome, b: &ShadedDome, deformed: bool) -> f64 {
     let mut worst = 0.0_f64;
     for direction in directions(3_000) {
         let part = if deformed { (1.0 - direction.z).max(0.93) } else { 1.0 };
@@ -484,13 +482,9 @@ fn largest_change(a: &LitDome, b: &LitDome, deformed: bool) -> f64 {
             point_mm: (direction * (10.0 * part)).as_vec3a(),
             normal: direction.as_vec3a(),
             to_camera: Vec3A::NEG_Z,
-            moved: if deformed { Moved::Far } else { Moved::Not },
+            is_moved: deformed,
         };
-        let mut levels = [Vec::new(), Vec::new()];
-        for (dome, level) in [a, b].into_iter().zip(&mut levels) {
-            dome.levels(&[sample], level, &mut Work::default());
-        }
-        worst = worst.max(f64::from((levels[0][0] - levels[1][0]).abs().max_element()));
+        worst = worst.max(f64::from((a.level(&sample) - b.level(&sample)).abs().max_element()));
     }
     worst
 }
@@ -502,7 +496,7 @@ fn no_effect_of_light_passes_its_bound() {
     for more in ["", object] {
         let scene = scene(more);
         let bound = bounds::LightBounds::of(&scene).unwrap();
-        let lit = |used: LightUse| LitDome::new(&scene, &used, &mut Work::default()).unwrap().unwrap();
+        let lit = |used: LightUse| ShadedDome::new(&scene, &used, &mut Work::default()).unwrap().unwrap();
         let open = LightUse { platform_shadow: false, ..ALL };
         let contexts = if more.is_empty() {
             vec![ALL, LightUse { diffuser: false, ..open }, LightUse { interreflection: false, ..open }]
@@ -525,7 +519,7 @@ fn no_effect_of_light_passes_its_bound() {
                 largest[k] = largest[k].max(found / bound);
             }
             let dark =
-                LitDome::new(&self::scene_of_power(0.0), &used, &mut Work::default()).unwrap().unwrap();
+                ShadedDome::new(&self::scene_of_power(0.0), &used, &mut Work::default()).unwrap().unwrap();
             let brightest = largest_change(&all, &dark, !more.is_empty());
             assert!(brightest <= bound.brightest, "{used:?}: {brightest} {bound:?}");
             largest[5] = largest[5].max(brightest / bound.brightest);
@@ -581,12 +575,7 @@ fn golden_emitter(golden: &serde_json::Value, side_mm: f64) -> Emitter {
 
 /// Largest difference of a map of irradiance from Mitsuba's, of each bin's value or a tenth of the largest; a bin
 /// that the light reaches at a cosine below the cut is left out.
-fn off_from_mitsuba(
-    golden: &serde_json::Value,
-    map: &str,
-    emitter: &Emitter,
-    least_cos: f64,
-) -> (f64, usize) {
+fn off_from_mitsuba(golden: &serde_json::Value, map: &str, emitter: &Emitter, min_cos: f64) -> (f64, usize) {
     let optics = sensor(&[number(&golden["acrylic_index"])], number(&golden["silicone_index"]));
     let light = DirectLight { fresnel: true, ..light(&optics) };
     let edges: Vec<f64> =
@@ -610,7 +599,7 @@ fn off_from_mitsuba(
                     weights += polar.sin();
                     let pose = &emitter.platform_from_emitter;
                     let tube = optics.light_tube(pose.translation, point, 0.0).unwrap();
-                    seen &= tube.leaving.dot(pose.matrix3.z_axis) > least_cos;
+                    seen &= tube.leaving.dot(pose.matrix3.z_axis) > min_cos;
                 }
             }
             if !seen {

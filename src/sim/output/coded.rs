@@ -4,10 +4,10 @@ use std::io;
 
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 
-use crate::frame::Image8;
-use crate::render::Drawn;
+use crate::output::render::Drawn;
+use crate::output::truth::FrameTruth;
+use crate::raster::frame::Image8;
 use crate::scene::Scene;
-use crate::truth::FrameTruth;
 use crate::work::Work;
 
 /// Quality of the video's JPEGs: the PNG frames are the exact ones.

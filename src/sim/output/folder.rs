@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::error::{RunError, fault};
-use super::{PLAN_NAME, TRUTH_NAME, VIDEO_NAME};
+use super::parts::{PLAN_NAME, TRUTH_NAME, VIDEO_NAME};
 
 /// A folder beside the place of the result.
 pub(super) struct Staging {

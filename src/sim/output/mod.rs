@@ -6,29 +6,32 @@
 mod coded;
 mod error;
 mod folder;
+mod parts;
+pub(crate) mod render;
+pub(crate) mod truth;
 mod video;
 mod writer;
 
 use std::fs;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError, mpsc};
 use std::time::Duration;
 
-use serde::Serialize;
-
 use crate::SimError;
+use crate::contact::between::Around;
+use crate::contact::stepper::Touch;
+use crate::output::render::{Renderer, Scratch};
 use crate::plan::Plan;
-use crate::render::{Around, Renderer, Scratch};
 use crate::scene::Scene;
-use crate::touch::Touch;
-use crate::truth::{ContactTruth, FrameTruth};
 use crate::work::Work;
 
 use coded::CodedFrame;
 pub use error::RunError;
 use error::fault;
 use folder::Staging;
+pub use parts::{ContactFault, PLAN_NAME, Summary, TRUTH_NAME, VIDEO_NAME};
+use parts::{Pending, Sent};
 use writer::Writer;
 
 /// Frames on their way from contact to file, for each thread.
@@ -36,53 +39,6 @@ const AHEAD_PER_THREAD: u32 = 4;
 
 /// How long a thread waits that has nothing to do.
 const PAUSE: Duration = Duration::from_micros(200);
-
-/// Names of the files beside the frames.
-pub const TRUTH_NAME: &str = "truth.jsonl";
-/// The frames as one file.
-pub const VIDEO_NAME: &str = "video.avi";
-/// The plan and what it took.
-pub const PLAN_NAME: &str = "plan.json";
-
-/// What a run made.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Summary {
-    /// Frames written.
-    pub frames: u32,
-    /// What could not be as asked, by frame: the platform is held.
-    pub notes: Vec<(u32, String)>,
-    /// Frames whose contact is not what the level asks for, by its status in the truth.
-    pub contact: Vec<ContactFault>,
-    /// What it took in all.
-    pub work: Work,
-}
-
-/// Frames whose contact ended in the same way, short of what the level asks for.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ContactFault {
-    /// The contact's status in the truth.
-    pub status: &'static str,
-    /// How many frames.
-    pub frames: u32,
-    /// Number of the first one.
-    pub first: u32,
-    /// What the status means in that one.
-    pub note: String,
-}
-
-impl Summary {
-    /// Takes what a frame's truth says that is not as asked.
-    fn note(&mut self, truth: FrameTruth) {
-        if let Some(note) = truth.note {
-            self.notes.push((truth.frame, format!("{}: {note}", truth.status)));
-        }
-        let Some(ContactTruth { status, note: Some(note), .. }) = truth.contact else { return };
-        match self.contact.iter_mut().find(|fault| fault.status == status) {
-            Some(fault) => fault.frames += 1,
-            None => self.contact.push(ContactFault { status, frames: 1, first: truth.frame, note }),
-        }
-    }
-}
 
 /// Draws all frames of a scene with a plan into a folder; `progress` is called as frames are written, with their count.
 ///
@@ -108,7 +64,7 @@ pub fn run(
         let solved = draw_all(scene, &renderer, state, send, progress);
         (solved, written.join())
     });
-    // A thread that panics has told so itself.
+    // A thread that panics has reported so itself.
     let mut summary = written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
     summary.work.merge(&solved?);
     summary.work.merge(renderer.setup());
@@ -119,19 +75,6 @@ pub fn run(
     staging.finish(out)?;
     Ok(summary)
 }
-
-/// Where the frames are between those who solve, draw and write them.
-#[derive(Default)]
-struct Pending {
-    /// Frames that are solved, and those that are written.
-    begun: AtomicU32,
-    written: AtomicU32,
-    /// No further frame is wanted.
-    stopped: AtomicBool,
-}
-
-/// A frame's bytes, or why there are none.
-type Sent = (u32, Result<CodedFrame, SimError>);
 
 /// Solves contact in order and has each frame drawn and coded as soon as it and its neighbours are solved; what contact
 /// took.
@@ -147,12 +90,12 @@ fn draw_all(
     let mut stepper = renderer.stepper()?;
     let rooms: Mutex<Vec<Scratch>> = Mutex::new(Vec::new());
     let most = AHEAD_PER_THREAD * rayon::current_num_threads().max(1) as u32;
-    let mut told = 0;
+    let mut reported = 0;
     let mut wait = |until: u32| {
         loop {
             let written = state.written.load(Ordering::Acquire);
-            if written > told {
-                told = written;
+            if written > reported {
+                reported = written;
                 progress(written);
             }
             if written >= until || state.stopped.load(Ordering::Acquire) {

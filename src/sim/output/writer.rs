@@ -9,8 +9,8 @@ use std::sync::mpsc;
 
 use super::coded::CodedFrame;
 use super::error::{RunError, fault};
+use super::parts::{Pending, Sent, Summary, TRUTH_NAME, VIDEO_NAME};
 use super::video::VideoWriter;
-use super::{Pending, Sent, Summary, TRUTH_NAME, VIDEO_NAME};
 use crate::scene::Scene;
 
 /// Writes frames, video and truth.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::electronics::ElectronicsSection;
 use super::light::LightSection;
 use super::objects::ObjectSection;
-use crate::effect::EffectChoices;
+use crate::effect_name::EffectChoices;
 use domecast_design::sections::Why;
 
 /// What the sensor is made to feel, how it is lit and recorded, and how exact the frames shall be.

@@ -6,9 +6,9 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use super::file::{MotionSection, SceneFile};
+use super::model::{RIM_POINTS, Scene, SceneDot};
 use super::motion::Motion;
 use super::object::SceneObject;
-use super::{RIM_POINTS, Scene, SceneDot};
 use crate::SimError;
 use domecast_design;
 use domecast_design::layout::{Dot, Layout};
@@ -18,7 +18,33 @@ use domecast_optics::SensorOptics;
 use domecast_optics::pose::Marker;
 use domecast_springs::Suspension;
 
-pub(super) fn load(path: &Path) -> Result<Scene, SimError> {
+impl Scene {
+    /// Reads and resolves a scene file, with the design that it names.
+    ///
+    /// # Errors
+    /// The first fault of scene, design or meshes, with its file and field.
+    pub fn load(path: &Path) -> Result<Self, SimError> {
+        load(path)
+    }
+
+    /// Resolves a scene's text; relative paths start at `folder`.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn from_text(text: &str, folder: &Path) -> Result<Self, SimError> {
+        from_text(text, folder)
+    }
+
+    /// Resolves a scene with a design that is there already.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn new(file: SceneFile, folder: &Path, design: Design) -> Result<Self, SimError> {
+        resolve(file, folder, design)
+    }
+}
+
+fn load(path: &Path) -> Result<Scene, SimError> {
     let text = domecast_design::read_text(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     from_text(&text, folder).map_err(|error| match error {
@@ -27,7 +53,7 @@ pub(super) fn load(path: &Path) -> Result<Scene, SimError> {
     })
 }
 
-pub(super) fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
+fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
     let value = domecast_design::parse_json(text)?;
     let file: SceneFile = domecast_design::from_value(&value)?;
     let path = folder.join(&file.design);
@@ -35,7 +61,7 @@ pub(super) fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
     resolve(file, folder, design)
 }
 
-pub(super) fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimError> {
+fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimError> {
     check(&file)?;
     let layout = Layout::of_design(&design)?;
     let suspension = suspension_of(&design)?;

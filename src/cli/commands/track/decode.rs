@@ -4,8 +4,8 @@ use std::io::Read;
 
 use domecast_runtime::track::CameraFrame;
 
-/// Most bytes that a picture may unpack to.
-const MOST_BYTES: usize = 3 << 26;
+/// Bytes at most of an unpacked picture.
+const MAX_BYTES: usize = 3 << 26;
 
 /// A decoded picture: grey or interleaved red, green, blue.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,7 +25,7 @@ impl Picture {
     }
 }
 
-/// A PNG, JPEG or PNM picture, told apart by its first bytes.
+/// A PNG, JPEG or PNM picture, recognized by its first bytes.
 pub fn picture(bytes: &[u8]) -> Result<Picture, String> {
     if bytes.starts_with(b"\x89PNG") {
         png(bytes)
@@ -41,11 +41,11 @@ pub fn picture(bytes: &[u8]) -> Result<Picture, String> {
 
 fn png(bytes: &[u8]) -> Result<Picture, String> {
     let fault = |error: png::DecodingError| format!("is not a whole PNG picture ({error})");
-    let limits = png::Limits { bytes: 2 * MOST_BYTES };
+    let limits = png::Limits { bytes: 2 * MAX_BYTES };
     let mut decoder = png::Decoder::new_with_limits(std::io::Cursor::new(bytes), limits);
     decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
     let mut reader = decoder.read_info().map_err(fault)?;
-    let size = reader.output_buffer_size().filter(|size| *size <= MOST_BYTES / 3 * 4);
+    let size = reader.output_buffer_size().filter(|size| *size <= MAX_BYTES / 3 * 4);
     let Some(size) = size else { return Err("is too large".into()) };
     let mut raw = vec![0; size];
     let info = reader.next_frame(&mut raw).map_err(fault)?;
@@ -121,10 +121,10 @@ pub fn pnm(stream: &mut dyn Read) -> Result<Option<Picture>, String> {
             }
         }
     }
-    let [width, height, most] = numbers;
+    let [width, height, max] = numbers;
     let size = width.checked_mul(height).and_then(|n| n.checked_mul(channels));
-    let Some(size) = size.filter(|size| *size > 0 && *size <= MOST_BYTES && most == 255) else {
-        return Err(format!("the stream's picture is {width} x {height} with values to {most}"));
+    let Some(size) = size.filter(|size| *size > 0 && *size <= MAX_BYTES && max == 255) else {
+        return Err(format!("the stream's picture is {width} x {height} with values to {max}"));
     };
     let mut bytes = Vec::new();
     stream.take(size as u64).read_to_end(&mut bytes).map_err(fault)?;

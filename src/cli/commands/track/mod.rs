@@ -15,11 +15,13 @@ use serde_json::json;
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
 use domecast_files::StagedFile;
+use domecast_optics::SensorOptics;
+use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
     CSV_HEADER, CameraFrame, Channel, DOTS_CSV_HEADER, FollowMethod, Reference, Steps, Thresholds,
     TrackOptions, Tracked, Tracker, Undistorted, overlay_png, write_csv, write_dots_csv, write_json,
 };
-use source::{RawSize, Source};
+use source::{FrameSource, RawSize};
 
 /// What is written for each frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -41,7 +43,7 @@ enum ChannelName {
     Luma,
 }
 
-/// What the command line says.
+/// Arguments of `domecast track`.
 #[derive(Debug, clap::Args)]
 pub struct TrackArguments {
     /// A folder of PNG or JPEG frames, frames, a video (through ffmpeg), a file of raw frames (with --raw), or `-` for
@@ -97,12 +99,12 @@ pub struct TrackArguments {
     #[arg(long, default_value_t = 30)]
     search_every: u32,
     /// Largest rms of the white markers' residuals that is still a pose, px.
-    #[arg(long, default_value_t = 2.0)]
-    most_residual_px: f64,
+    #[arg(long, alias = "most-residual-px", default_value_t = 2.0)]
+    max_residual_px: f64,
     /// Share of the dots' spacing by which three quarters of them may be misplaced before the constants are called
     /// another sensor's.
-    #[arg(long, default_value_t = 0.5)]
-    most_misplaced: f64,
+    #[arg(long, alias = "most-misplaced", default_value_t = 0.5)]
+    max_misplaced: f64,
 }
 
 fn levels(text: &str) -> Result<[u8; 2], String> {
@@ -130,8 +132,8 @@ impl TrackArguments {
             pyramid_levels: self.pyramid_levels,
             reference: self.reference.map_or(Reference::Constants, Reference::Frames),
             search_every: self.search_every,
-            max_residual_px: self.most_residual_px,
-            max_misplaced: self.most_misplaced,
+            max_residual_px: self.max_residual_px,
+            max_misplaced: self.max_misplaced,
         }
     }
 }
@@ -169,21 +171,98 @@ fn unwritable(path: &Path, error: &io::Error) -> Failure {
     input_fault(path, format!("cannot be written ({error})"), "a place that can be written")
 }
 
-/// Tracks every frame that there is; a frame that cannot be had is told and passed over.
+/// Folders that get a picture of each frame.
+struct Pictures<'a> {
+    overlay: Option<&'a Path>,
+    magnify: f64,
+    rest: SensorOptics,
+    undistorted: Option<(&'a Path, Undistorted)>,
+    buffer: Vec<u8>,
+}
+
+impl<'a> Pictures<'a> {
+    fn new(arguments: &'a TrackArguments, constants: &Constants, tracker: &Tracker) -> Result<Self, Failure> {
+        let undistorted = match &arguments.undistorted {
+            Some(folder) => {
+                Some((folder.as_path(), Undistorted::new(constants).map_err(|e| unfit(arguments, &e))?))
+            }
+            None => None,
+        };
+        for folder in [&arguments.overlay, &arguments.undistorted].into_iter().flatten() {
+            fs::create_dir_all(folder).map_err(|e| unwritable(folder, &e))?;
+        }
+        let (overlay, rest) = (arguments.overlay.as_deref(), tracker.optics().clone());
+        Ok(Self { overlay, magnify: arguments.magnify, rest, undistorted, buffer: Vec::new() })
+    }
+
+    fn write(
+        &mut self,
+        output: &Output,
+        number: u64,
+        frame: &Frame<'_>,
+        tracked: &Tracked,
+    ) -> Result<(), Failure> {
+        if let Some(folder) = self.overlay {
+            let path = folder.join(format!("overlay_{number:04}.png"));
+            match overlay_png(frame, tracked, &self.rest, self.magnify) {
+                Ok(png) => fs::write(&path, png).map_err(|e| unwritable(&path, &e))?,
+                Err(error) => output.warn(&format!("{}: {error}", path.display())),
+            }
+        }
+        if let Some((folder, map)) = &self.undistorted
+            && let Some(bytes) = map.of(frame, &mut self.buffer)
+        {
+            let path = folder.join(format!("undistorted_{number:04}.png"));
+            let png = decode::png_of(frame.width(), frame.height(), frame.channels(), bytes);
+            fs::write(&path, png.map_err(Failure::Internal)?).map_err(|e| unwritable(&path, &e))?;
+        }
+        Ok(())
+    }
+}
+
+/// What happened to the frames.
+#[derive(Default)]
+struct Tally {
+    counts: BTreeMap<&'static str, u64>,
+    times: Vec<Duration>,
+}
+
+impl Tally {
+    /// The time, ms, that a share of the frames took at most.
+    fn quantile_ms(&self, share: f64) -> f64 {
+        let index = ((self.times.len() as f64 * share) as usize).min(self.times.len().saturating_sub(1));
+        self.times.get(index).map_or(0.0, |t| 1e3 * t.as_secs_f64())
+    }
+
+    fn summarize(&mut self, output: &Output, out: Option<&Path>) -> Result<(), Failure> {
+        let Some(path) = out else { return Ok(()) };
+        self.times.sort_unstable();
+        let (median, p99) = (self.quantile_ms(0.5), self.quantile_ms(0.99));
+        let frames: u64 = self.counts.values().sum();
+        let statuses: Vec<String> = self.counts.iter().map(|(status, n)| format!("{n} {status}")).collect();
+        output.say(&format!("{}: {frames} frames, {}", path.display(), statuses.join(", ")))?;
+        output.say(&format!("{median:.2} ms a frame (median), {p99:.2} ms (99 of 100)"))?;
+        output.result(&json!({
+            "ok": true,
+            "out": path.display().to_string(),
+            "frames": frames,
+            "status": self.counts,
+            "median_ms": median,
+            "p99_ms": p99,
+        }))
+    }
+}
+
+fn unfit(arguments: &TrackArguments, error: &domecast_runtime::track::TrackError) -> Failure {
+    input_fault(&arguments.constants, error.to_string(), "constants of a sensor")
+}
+
+/// Tracks every frame that there is; a frame that cannot be read is reported and skipped.
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     let constants = read_constants(&arguments.constants)?;
-    let fault = |error: domecast_runtime::track::TrackError| {
-        input_fault(&arguments.constants, error.to_string(), "constants of a sensor")
-    };
-    let mut tracker = Tracker::new(&constants, arguments.options()).map_err(fault)?;
-    let undistorted = match &arguments.undistorted {
-        Some(_) => Some(Undistorted::new(&constants).map_err(fault)?),
-        None => None,
-    };
-    for folder in [&arguments.overlay, &arguments.undistorted].into_iter().flatten() {
-        fs::create_dir_all(folder).map_err(|e| unwritable(folder, &e))?;
-    }
-    let mut source = Source::open(&arguments.frames, arguments.raw)?;
+    let mut tracker = Tracker::new(&constants, arguments.options()).map_err(|e| unfit(arguments, &e))?;
+    let mut pictures = Pictures::new(arguments, &constants, &tracker)?;
+    let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
     let mut sink = Sink::new(arguments.out.as_deref())?;
     let mut line = Vec::new();
     match arguments.format {
@@ -192,10 +271,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         Format::DotsCsv => sink.put(format!("{DOTS_CSV_HEADER}\n").as_bytes())?,
     }
     let at_mm = tracker.springs().map_or(DVec3::ZERO, domecast_runtime::track::Springs::at_mm);
-    let rest = tracker.optics().clone();
-    let mut counts: BTreeMap<&'static str, u64> = BTreeMap::new();
-    let mut times: Vec<Duration> = Vec::new();
-    let mut spare = Vec::new();
+    let mut tally = Tally::default();
     while let Some(next) = source.next_frame() {
         output.step(&format!("frame {}", next.number));
         let picture = match &next.picture {
@@ -212,9 +288,9 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             }
         };
         if picture.is_ok() {
-            times.push(began.elapsed());
+            tally.times.push(began.elapsed());
         }
-        *counts.entry(tracked.status()).or_default() += 1;
+        *tally.counts.entry(tracked.status()).or_default() += 1;
         line.clear();
         match arguments.format {
             Format::Jsonl => write_json(&mut line, tracked)?,
@@ -222,50 +298,18 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             Format::DotsCsv => write_dots_csv(&mut line, tracked)?,
         }
         sink.put(&line)?;
-        if let (Some(folder), Ok(frame)) = (&arguments.overlay, &picture) {
-            let path = folder.join(format!("overlay_{:04}.png", next.number));
-            match overlay_png(frame, tracked, &rest, arguments.magnify) {
-                Ok(png) => fs::write(&path, png).map_err(|e| unwritable(&path, &e))?,
-                Err(error) => output.warn(&format!("{}: {error}", path.display())),
-            }
-        }
-        if let (Some(folder), Some(map), Ok(frame)) = (&arguments.undistorted, &undistorted, &picture) {
-            let path = folder.join(format!("undistorted_{:04}.png", next.number));
-            if let Some(bytes) = map.of(frame, &mut spare) {
-                let png = decode::png_of(frame.width(), frame.height(), frame.channels(), bytes);
-                let png = png.map_err(Failure::Internal)?;
-                fs::write(&path, png).map_err(|e| unwritable(&path, &e))?;
-            }
+        if let Ok(frame) = &picture {
+            pictures.write(output, next.number, frame, tracked)?;
         }
     }
     output.steps_done();
     sink.end()?;
     source.end()?;
-    let frames: u64 = counts.values().sum();
-    if frames == 0 {
-        return Err(input_fault(
-            &arguments.frames[0],
-            "holds no frame",
-            "PNG or JPEG frames, a video, or raw",
-        ));
+    if tally.counts.is_empty() {
+        let allowed = "PNG or JPEG frames, a video, or raw";
+        return Err(input_fault(&arguments.frames[0], "holds no frame", allowed));
     }
-    times.sort_unstable();
-    let at = |part: f64| {
-        let index = ((times.len() as f64 * part) as usize).min(times.len().saturating_sub(1));
-        times.get(index).map_or(0.0, |t| 1e3 * t.as_secs_f64())
-    };
-    if let Some(path) = &arguments.out {
-        let told: Vec<String> = counts.iter().map(|(status, n)| format!("{n} {status}")).collect();
-        output.say(&format!("{}: {frames} frames, {}", path.display(), told.join(", ")))?;
-        output.say(&format!("{:.2} ms a frame (median), {:.2} ms (99 of 100)", at(0.5), at(0.99)))?;
-        output.result(&json!({
-            "ok": true,
-            "out": path.display().to_string(),
-            "frames": frames,
-            "status": counts,
-            "median_ms": at(0.5),
-            "p99_ms": at(0.99),
-        }))?;
-    }
-    if counts.keys().all(|status| *status == "unreadable") { Err(Failure::Negative) } else { Ok(()) }
+    tally.summarize(output, arguments.out.as_deref())?;
+    let nothing_read = tally.counts.keys().all(|status| *status == "unreadable");
+    if nothing_read { Err(Failure::Negative) } else { Ok(()) }
 }

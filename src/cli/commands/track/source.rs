@@ -10,8 +10,8 @@ use super::super::input::input_fault;
 use super::super::output::Failure;
 use super::decode::{self, Picture};
 
-/// Most bytes of a picture's file.
-const MOST_FILE_BYTES: u64 = 1 << 28;
+/// Bytes at most of a picture's file.
+const MAX_FILE_BYTES: u64 = 1 << 28;
 const PICTURES: [&str; 5] = ["png", "jpg", "jpeg", "pgm", "ppm"];
 const VIDEOS: [&str; 8] = ["avi", "mp4", "mkv", "mov", "webm", "m4v", "mjpeg", "mpg"];
 const ALLOWED: &str = "a folder of PNG or JPEG frames, frames, one video, or - for a stream";
@@ -43,7 +43,7 @@ impl FromStr for RawSize {
 }
 
 /// A frame, or why there is none.
-pub struct Next {
+pub struct NextFrame {
     pub number: u64,
     pub picture: Result<Picture, String>,
 }
@@ -55,14 +55,14 @@ enum Kind {
 }
 
 /// Frames, one after the other.
-pub struct Source {
+pub struct FrameSource {
     kind: Kind,
     next: u64,
     done: bool,
     video: Option<(Child, PathBuf)>,
 }
 
-impl Source {
+impl FrameSource {
     /// Opens what the command line names.
     pub fn open(paths: &[PathBuf], raw: Option<RawSize>) -> Result<Self, Failure> {
         let of = |kind: Kind| Self { kind, next: 0, done: false, video: None };
@@ -93,7 +93,7 @@ impl Source {
 
     fn video(path: &Path) -> Result<Self, Failure> {
         File::open(path).map_err(|e| unreadable(path, &e))?;
-        // Pictures with a head each: their size is told, not guessed.
+        // Pictures with a head each: their size is known, not guessed.
         let child = Command::new("ffmpeg")
             .args(["-nostdin", "-v", "error", "-i"])
             .arg(path)
@@ -114,7 +114,7 @@ impl Source {
     }
 
     /// The next frame; `None` at the end. After a stream that broke off there is nothing more.
-    pub fn next_frame(&mut self) -> Option<Next> {
+    pub fn next_frame(&mut self) -> Option<NextFrame> {
         if self.done {
             return None;
         }
@@ -124,7 +124,7 @@ impl Source {
             Kind::Files(files) => {
                 let (number, path) = files.next()?;
                 let picture = read_whole(&path).and_then(|bytes| decode::picture(&bytes));
-                Some(Next { number, picture: picture.map_err(|e| format!("{}: {e}", path.display())) })
+                Some(NextFrame { number, picture: picture.map_err(|e| format!("{}: {e}", path.display())) })
             }
             Kind::Raw(stream, size) => {
                 let wanted = size.width * size.height * size.channels;
@@ -139,17 +139,17 @@ impl Source {
                     Err(error) => Err(format!("the stream broke off ({error})")),
                 };
                 self.done = picture.is_err();
-                Some(Next { number, picture })
+                Some(NextFrame { number, picture })
             }
             Kind::Pnm(stream) => {
                 let picture = decode::pnm(stream).transpose()?;
                 self.done = picture.is_err();
-                Some(Next { number, picture })
+                Some(NextFrame { number, picture })
             }
         }
     }
 
-    /// What is left to be said at the end: a video that could not be read.
+    /// The fault that shows only at the end: a video that could not be read.
     pub fn end(&mut self) -> Result<(), Failure> {
         let Some((mut child, path)) = self.video.take() else { return Ok(()) };
         match child.wait() {
@@ -176,7 +176,7 @@ fn read_whole(path: &Path) -> Result<Vec<u8>, String> {
     let fault = |error: io::Error| format!("cannot be read ({error})");
     let file = File::open(path).map_err(fault)?;
     let mut bytes = Vec::new();
-    file.take(MOST_FILE_BYTES).read_to_end(&mut bytes).map_err(fault)?;
+    file.take(MAX_FILE_BYTES).read_to_end(&mut bytes).map_err(fault)?;
     Ok(bytes)
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::*;
 use domecast_mesh::{Chord, Construction, TriMesh, write_step};
 
-const LADDER: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
+const SWEEP_MM: [f64; 5] = [0.1, 0.03, 0.01, 0.003, 0.001];
 
 /// Distance from the surface of united material less united tools, near it.
 fn distance_mm(c: &Construction, p: DVec3) -> f64 {
@@ -98,8 +98,8 @@ fn meshes_stay_within_the_tolerance_of_the_exact_shapes() {
 
 #[test]
 fn long_every_part_is_sound_at_every_tolerance() {
-    let finest = at_tolerance(LADDER[4]);
-    for tolerance in LADDER {
+    let finest = at_tolerance(SWEEP_MM[4]);
+    for tolerance in SWEEP_MM {
         for (part, reference) in at_tolerance(tolerance).iter().zip(&finest) {
             // `build` has looked at the welded mesh; the volume belongs to it.
             let found = part.inspect();
@@ -146,8 +146,11 @@ fn exact_volumes_by_opencascade(parts: &[Part]) -> Option<Vec<f64>> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("constructions.json");
     std::fs::write(&path, serde_json::to_vec(&all).unwrap()).unwrap();
-    let said =
-        std::process::Command::new(python).arg("scripts/exact_volumes.py").arg(&path).output().unwrap();
+    let said = std::process::Command::new(python)
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/exact_volumes.py"))
+        .arg(&path)
+        .output()
+        .unwrap();
     if said.status.code() == Some(3) {
         println!("skipped: OpenCASCADE (cadquery-ocp) is not installed");
         return None;
@@ -156,17 +159,17 @@ fn exact_volumes_by_opencascade(parts: &[Part]) -> Option<Vec<f64>> {
     Some(serde_json::from_slice(&said.stdout).unwrap())
 }
 
-/// Every part's volume goes to that of the exact solid, at least as fast as the tolerance: no step of the ladder
+/// Every part's volume goes to that of the exact solid, at least as fast as the tolerance: no step of the sweep
 /// is worse, for its tolerance, than the coarse ones.
 #[test]
 fn long_every_volume_converges_to_the_exact_solid() {
-    let Some(exact) = exact_volumes_by_opencascade(&at_tolerance(LADDER[0])) else { return };
+    let Some(exact) = exact_volumes_by_opencascade(&at_tolerance(SWEEP_MM[0])) else { return };
     let m = Measures::of(&thumb24()).unwrap();
     for (i, closed_form) in [(2, exact_volumes(&m)[0]), (3, exact_volumes(&m)[1])] {
         assert!((exact[i] / closed_form - 1.0).abs() < 1e-9, "{}: {} {closed_form}", i, exact[i]);
     }
     let mut off = vec![Vec::new(); exact.len()];
-    for tolerance in LADDER {
+    for tolerance in SWEEP_MM {
         for ((part, volume), list) in at_tolerance(tolerance).iter().zip(&exact).zip(&mut off) {
             let error = (part.volume_mm3 - volume).abs();
             assert!(error <= tolerance * part.area_mm2, "{} at {tolerance}: {error}", part.name);
@@ -180,7 +183,7 @@ fn long_every_volume_converges_to_the_exact_solid() {
         let floor = 1e-8 * volume;
         let worst = |part: &[(String, f64, f64)]| part.iter().map(|(_, t, e)| e / t).fold(0.0, f64::max);
         let (coarse, fine) = (worst(&steps[..3]), worst(&steps[3..]));
-        let allowed = coarse * 1.5 + floor / LADDER[4];
+        let allowed = coarse * 1.5 + floor / SWEEP_MM[4];
         assert!(
             fine <= allowed,
             "{i} {}: {fine} mm2 of error by tolerance, coarse ones {coarse}",
@@ -235,18 +238,6 @@ fn step_keeps_exact_faces_where_it_can() {
     assert_eq!(exact, ["mould_cavity", "mould_base", "acrylic_sheet", "marker_stencil", "fit_coupon"]);
     // Block: 6 faces; cavity: the thirds of a half sphere and of a cylinder; three blind holes of three thirds of a
     // cylinder and a floor.
-    // TEMP
-    for part in &parts {
-        let (t, solid) = (std::time::Instant::now(), part.exact_solid());
-        let built = t.elapsed();
-        let text = match &solid {
-            Some(s) => write_step(s, &part.name),
-            None => write_step(&part.mesh.faceted_solid(), &format!("{}_faceted", part.name)),
-        }
-        .unwrap();
-        println!("{} {:?} {:?} {} bytes {} mm3", part.name, built, t.elapsed(), text.len(), part.volume_mm3);
-        std::fs::write(format!("/tmp/deps-step/{}.step", part.name), text).unwrap();
-    }
     let cavity = parts[2].exact_solid().unwrap();
     assert_eq!(cavity.face_iter().count(), 6 + 6 + 3 * 4);
     let step = write_step(&cavity, "mould_cavity").unwrap();

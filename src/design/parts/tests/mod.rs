@@ -28,7 +28,7 @@ fn solid(part: &Part) -> Solid {
 
 #[test]
 fn every_design_gives_sound_parts() {
-    for entry in std::fs::read_dir("designs").unwrap() {
+    for entry in std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "json") {
             let parts = build(&Measures::of(&Design::load(&path).unwrap()).unwrap(), &hits()).unwrap();

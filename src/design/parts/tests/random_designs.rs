@@ -50,15 +50,15 @@ fn random_design(rng: &mut TestRng, index: usize) -> Value {
     d["springs"]["places"]["ring"]["first_azimuth_deg"] = json!(first);
     let gaps: Vec<f64> = (0..n).map(|k| (first + step * (f64::from(k) + 0.5)) % 360.0).collect();
     // LEDs where there is room behind them, clamps and cable in other gaps.
-    let (mut lit, mut free): (Vec<f64>, Vec<f64>) = gaps.iter().partition(|gap| {
+    let (mut used, mut free): (Vec<f64>, Vec<f64>) = gaps.iter().partition(|gap| {
         n <= 6 && [0.0, 90.0, 120.0, 180.0, 240.0, 270.0].iter().any(|good| (*gap - good).abs() < 1e-9)
     });
-    while lit.len() > rng.random_range(0..5_usize) {
-        free.extend(lit.pop());
+    while used.len() > rng.random_range(0..5_usize) {
+        free.extend(used.pop());
     }
     let colors = ["red", "green", "blue", "white"];
     d["leds"]["list"] =
-        lit.iter().enumerate().map(|(k, gap)| json!({"color": colors[k % 4], "azimuth_deg": gap})).collect();
+        used.iter().enumerate().map(|(k, gap)| json!({"color": colors[k % 4], "azimuth_deg": gap})).collect();
     d["leds"]["tilt_deg"] = json!(rng.random_range(84.0..88.0_f64));
     let lower = &mut d["platforms"]["lower"];
     match free.pop() {

@@ -2,9 +2,12 @@
 
 use glam::DVec3;
 
-use super::{
-    BodyPart, MassProperties, Robot, camera_info_yaml, kalibr_yaml, mass_of_mesh, mjcf, opencv_yaml, urdf,
-};
+use super::kalibr::kalibr_yaml;
+use super::mass::{MassProperties, mass_of_mesh};
+use super::mjcf::mjcf;
+use super::opencv::opencv_yaml;
+use super::robot::{BodyPart, Robot, urdf};
+use super::ros::camera_info_yaml;
 use domecast_design::Design;
 use domecast_design::parts::Part;
 use domecast_runtime::constants::Constants;
@@ -14,11 +17,11 @@ use domecast_runtime::constants::Constants;
 pub struct FormatFiles {
     /// Path in the build's tree, and content.
     pub files: Vec<(String, String)>,
-    /// What could not be said, and why: one sentence a file.
+    /// What could not be written, and why: one sentence a file.
     pub left_out: Vec<String>,
 }
 
-/// Writes every form that can say this sensor. The robot forms need the two platforms among `parts`.
+/// Writes every form that can describe this sensor. The robot forms need the two platforms among `parts`.
 pub fn format_files(design: &Design, constants: &Constants, parts: &[Part]) -> FormatFiles {
     let mut made = FormatFiles::default();
     let mut add = |name: &str, text: String| made.files.push((format!("constants/{name}"), text));

@@ -1,6 +1,6 @@
 //! Kalibr's camchain.
 
-use super::list;
+use super::number::list;
 use domecast_runtime::constants::Constants;
 
 /// `kalibr.yaml` with one camera.

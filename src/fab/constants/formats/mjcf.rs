@@ -3,7 +3,7 @@
 use glam::DVec3;
 use nalgebra::Matrix6;
 
-use super::number;
+use super::number::number;
 use super::robot::{BodyPart, Robot, triple};
 use domecast_runtime::constants::{Constants, matrix_of};
 
@@ -63,25 +63,7 @@ pub fn mjcf(constants: &Constants, robot: &Robot) -> String {
             number(damping),
         );
     }
-    let mut tendons = String::new();
-    if let Springs::Tendons(columns) = &springs {
-        tendons += "  <tendon>\n";
-        for (index, (stiffness, coefficients)) in columns.iter().enumerate() {
-            tendons += &format!(
-                "    <fixed name=\"spring_{}\" stiffness=\"{}\" springlength=\"0\">\n",
-                JOINTS[index],
-                number(*stiffness)
-            );
-            for (joint, coefficient) in JOINTS.iter().zip(coefficients) {
-                if *coefficient != 0.0 {
-                    tendons +=
-                        &format!("      <joint joint=\"{joint}\" coef=\"{}\"/>\n", number(*coefficient));
-                }
-            }
-            tendons += "    </fixed>\n";
-        }
-        tendons += "  </tendon>\n";
-    }
+    let tendons = tendons(&springs);
     format!(
         "<mujoco model=\"{name}\">\n  <!-- {note} -->\n  <compiler angle=\"radian\" meshdir=\".\"/>\n  <option \
          timestep=\"0.0001\" integrator=\"implicitfast\"/>\n  <asset>\n    <mesh name=\"lower\" \
@@ -105,7 +87,31 @@ pub fn mjcf(constants: &Constants, robot: &Robot) -> String {
     )
 }
 
-/// How MuJoCo is told the stiffness.
+/// The fixed tendons that carry the 6x6.
+fn tendons(springs: &Springs) -> String {
+    let mut tendons = String::new();
+    if let Springs::Tendons(columns) = springs {
+        tendons += "  <tendon>\n";
+        for (index, (stiffness, coefficients)) in columns.iter().enumerate() {
+            tendons += &format!(
+                "    <fixed name=\"spring_{}\" stiffness=\"{}\" springlength=\"0\">\n",
+                JOINTS[index],
+                number(*stiffness)
+            );
+            for (joint, coefficient) in JOINTS.iter().zip(coefficients) {
+                if *coefficient != 0.0 {
+                    tendons +=
+                        &format!("      <joint joint=\"{joint}\" coef=\"{}\"/>\n", number(*coefficient));
+                }
+            }
+            tendons += "    </fixed>\n";
+        }
+        tendons += "  </tendon>\n";
+    }
+    tendons
+}
+
+/// How MuJoCo gets the stiffness.
 enum Springs {
     /// By each joint: there is nothing beside the diagonal.
     Joints([f64; 6]),

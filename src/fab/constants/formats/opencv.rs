@@ -1,6 +1,6 @@
 //! OpenCV's FileStorage YAML: everything that the paper's pipeline needs, as matrices.
 
-use super::number;
+use super::number::number;
 use domecast_runtime::constants::Constants;
 
 /// A matrix node; OpenCV reads the rows one after the other.

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::mass::MassProperties;
-use super::number;
+use super::number::number;
 use domecast_runtime::constants::Constants;
 
 /// A body's mesh file, as seen from the folder of the constants, in the sensor frame at rest, mm.

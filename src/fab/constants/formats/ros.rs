@@ -1,6 +1,6 @@
 //! ROS camera_info, as `camera_calibration_parsers` reads it.
 
-use super::list;
+use super::number::list;
 use domecast_runtime::constants::Constants;
 
 /// `camera_info.yaml`: `plumb_bob` for up to five Brown-Conrady coefficients, `rational_polynomial` for eight,

@@ -4,7 +4,6 @@
 //! one table of it serves every frame. Where an object has moved the membrane, its place and its normal differ;
 //! what that changes of their light is looked up beside it (`field::shells`).
 
-mod bend;
 mod own;
 mod places;
 mod shells;
@@ -13,15 +12,12 @@ use glam::{DVec2, DVec3, Vec2, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use self::own::OwnLight;
-use self::places::{Scale, disc_of, split};
+use self::places::{Scale, continued, disc_of, split};
 use self::shells::Shells;
 use super::direct::EmitterRule;
 use super::dome_map::{DomeGrid, bicubic, direction_from_disc};
 use super::tables::{Prepared, Tables, Ways};
 use crate::splines::{Degree, cubics, to_coefficients};
-
-/// Places in a cell, each way, at which the undeformed membrane's brightest and steepest light is looked for.
-const LOOKS: usize = 6;
 
 /// Which parts of the light a field has.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,15 +33,11 @@ pub struct FieldParts {
 /// Light on the membrane for the three channels of the camera, mW/mm^2 weighted by their responses.
 #[derive(Debug, Clone)]
 pub struct LightField {
-    radius_mm: f64,
     scale: Scale,
     /// Coefficients of a cubic spline.
     still: Vec<Vec4>,
-    /// Bounds on its third derivative by cell.
-    third: Vec<f32>,
     shells: Option<Shells>,
     brightest: [f64; 3],
-    steepest_per_mm: f64,
     error: f64,
     evaluations: u64,
     own: Option<OwnLight>,
@@ -55,13 +47,10 @@ impl LightField {
     /// Puts the tables of all lights together.
     pub fn new(ways: &Ways, prepared: &Prepared, parts: &FieldParts) -> Self {
         let mut field = Self {
-            radius_mm: ways.radius_mm(),
             scale: Scale::of(&DomeGrid::with_cells(8)),
             still: Vec::new(),
-            third: Vec::new(),
             shells: None,
             brightest: [0.0; 3],
-            steepest_per_mm: 0.0,
             error: 0.0,
             evaluations: 0,
             own: None,
@@ -119,36 +108,14 @@ impl LightField {
         self.still = (0..grid.nodes * grid.nodes).into_par_iter().map(node).collect();
         to_coefficients(&mut self.still, grid.nodes, Degree::Cubic);
         self.scale = Scale::of(grid);
-        self.third = bend::thirds(&self.still, grid.nodes);
-        self.look_over();
+        self.brightest = self.brightest_node(grid);
     }
 
-    /// The brightest and the steepest light of the undeformed membrane.
-    fn look_over(&mut self) {
-        let fine = DomeGrid::with_cells(DomeGrid { nodes: self.scale.nodes }.cells() * LOOKS);
-        let row = |row: usize| -> Vec<Option<Vec4>> {
-            let light = |column: usize| {
-                let place = fine.place(column, row);
-                (place.length() <= 1.0).then(|| self.still_at(place.as_vec2()))
-            };
-            (0..fine.nodes).map(light).collect()
-        };
-        let rows: Vec<Vec<Option<Vec4>>> = (0..fine.nodes).into_par_iter().map(row).collect();
-        let (mut brightest, mut steepest) = (Vec4::ZERO, 0.0_f32);
-        for (j, row) in rows.iter().enumerate() {
-            for (i, here) in row.iter().enumerate() {
-                let Some(here) = here else { continue };
-                brightest = brightest.max(*here);
-                let below = rows.get(j + 1).and_then(|row| row.get(i));
-                for there in [row.get(i + 1), below].into_iter().flatten().flatten() {
-                    steepest = steepest.max((*there - *here).abs().max_element());
-                }
-            }
-        }
-        self.brightest = [brightest.x, brightest.y, brightest.z].map(f64::from);
-        // The map's scale is at most sqrt(2) (at the rim, along it), so a cell is at least this long.
-        let cell_mm = fine.cell() * self.radius_mm / std::f64::consts::SQRT_2;
-        self.steepest_per_mm = std::f64::consts::SQRT_2 * f64::from(steepest) / cell_mm;
+    fn brightest_node(&self, grid: &DomeGrid) -> [f64; 3] {
+        let inside = (0..grid.nodes * grid.nodes).map(|i| grid.place(i % grid.nodes, i / grid.nodes));
+        let light = inside.filter(|place| place.length() <= 1.0).map(|place| self.still_at(place.as_vec2()));
+        let brightest = light.fold(Vec4::ZERO, Vec4::max);
+        [brightest.x, brightest.y, brightest.z].map(f64::from)
     }
 
     /// Irradiance of an undeformed point in this unit direction, for the channels red, green, blue; the fourth number means
@@ -189,13 +156,6 @@ impl LightField {
         (self.still(direction) + change.extend(0.0)).max(Vec4::ZERO)
     }
 
-    /// What that is more than the irradiance of an undeformed point in the same direction from the dome's centre.
-    pub fn change(&self, point_mm: Vec3A, normal: Vec3A) -> Vec3A {
-        let distance_mm = point_mm.length();
-        let direction = if distance_mm > 0.0 { point_mm / distance_mm } else { Vec3A::Z };
-        self.change_at(distance_mm, direction, normal)
-    }
-
     #[inline]
     fn change_at(&self, distance_mm: f32, direction: Vec3A, normal: Vec3A) -> Vec3A {
         self.shells.as_ref().map_or(Vec3A::ZERO, |shells| shells.change(distance_mm, direction, normal))
@@ -217,7 +177,7 @@ impl LightField {
         light
     }
 
-    /// Largest irradiance of each channel on the undeformed membrane.
+    /// Largest irradiance of each channel at the nodes of the undeformed membrane's table.
     pub fn brightest(&self) -> [f64; 3] {
         self.brightest
     }
@@ -231,24 +191,6 @@ impl LightField {
     pub fn evaluations(&self) -> u64 {
         self.evaluations
     }
-
-    /// Largest difference of the undeformed membrane's light between near places over their distance, 1/mm.
-    pub fn steepest_per_mm(&self) -> f64 {
-        self.steepest_per_mm
-    }
-}
-
-/// A function of the disc at a place, beyond its rim as the parabola through the rim and two places inside goes on, as
-/// far apart as the place lies outside.
-fn continued<const K: usize>(place: DVec2, inside: impl Fn(DVec2) -> [f64; K]) -> [f64; K] {
-    let radius = place.length();
-    if radius <= 1.0 {
-        return inside(place);
-    }
-    // The square's corners lie far out, where nothing is looked up.
-    let beyond = (radius - 1.0).min(0.45);
-    let [rim, near, deep] = [1.0, 1.0 - beyond, 1.0 - 2.0 * beyond].map(|r| inside(place * (r / radius)));
-    std::array::from_fn(|k| 3.0 * (rim[k] - near[k]) + deep[k])
 }
 
 /// The lights' irradiance of the undeformed membrane as the channels see it together.

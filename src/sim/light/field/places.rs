@@ -1,6 +1,6 @@
 //! Places of a look-up: from a direction to the disc, to a grid over it, to a cell and the weights of its nodes.
 
-use glam::{Vec2, Vec3A};
+use glam::{DVec2, Vec2, Vec3A};
 
 use crate::light::dome_map::DomeGrid;
 
@@ -51,13 +51,15 @@ pub(super) fn split(at: Vec2, first: f32, last: f32) -> ((usize, usize), Vec2) {
     ((column as usize, row as usize), Vec2::new(x - column as f32, y - row as f32))
 }
 
-/// The box of cells around some directions, as the coordinates of its ends.
-pub(super) fn cells(scale: &Scale, directions: &[Vec3A]) -> (Vec2, Vec2) {
-    let last = Vec2::splat(scale.last_cell - 1.0);
-    let (mut low, mut high) = (last, Vec2::ONE);
-    for at in directions {
-        let place = scale.place(disc_of(*at)).max(Vec2::ONE).min(last);
-        (low, high) = (low.min(place), high.max(place));
+/// A function of the disc at a place, beyond its rim as the parabola through the rim and two places inside goes on, as
+/// far apart as the place lies outside.
+pub(super) fn continued<const K: usize>(place: DVec2, inside: impl Fn(DVec2) -> [f64; K]) -> [f64; K] {
+    let radius = place.length();
+    if radius <= 1.0 {
+        return inside(place);
     }
-    (low.min(high), high)
+    // The square's corners lie far out, where nothing is looked up.
+    let beyond = (radius - 1.0).min(0.45);
+    let [rim, near, deep] = [1.0, 1.0 - beyond, 1.0 - 2.0 * beyond].map(|r| inside(place * (r / radius)));
+    std::array::from_fn(|k| 3.0 * (rim[k] - near[k]) + deep[k])
 }

@@ -7,13 +7,9 @@
 
 use glam::{DVec2, Vec2, Vec3A, Vec4};
 
-use super::bend::{squared_thirds, squares};
-use super::continued;
-use super::places::{Scale, cells, disc_of, split};
+use super::places::{Scale, continued, disc_of, split};
 use crate::light::dome_map::{DomeGrid, bicubic};
 use crate::light::tables::{SHELL_CELLS, SHELLS, Tables, Ways};
-use crate::rests::{largest, rest_of_jumps};
-use crate::shading::{MovedBend, Turned};
 use crate::splines::{Degree, quadratics, to_coefficients};
 
 /// Fluxes of the three channels along x, y and z.
@@ -27,15 +23,6 @@ struct Node {
     third: Flux,
 }
 
-/// Bounds by cell of one of the tables.
-#[derive(Debug, Clone, Default)]
-struct Bends {
-    /// Jump of its second derivative, by the width of a cell.
-    jump: Vec<f32>,
-    /// Its largest value.
-    most: Vec<f32>,
-}
-
 /// The tables.
 #[derive(Debug, Clone)]
 pub(super) struct Shells {
@@ -43,8 +30,6 @@ pub(super) struct Shells {
     scale: Scale,
     /// Coefficients.
     nodes: Vec<Node>,
-    /// Of the outer shell's table, and of the others' differences from it.
-    bends: [Bends; SHELLS.len()],
 }
 
 impl Shells {
@@ -71,7 +56,6 @@ impl Shells {
             radius_mm: ways.radius_mm() as f32,
             scale: Scale::of(&grid),
             nodes: (0..grid.nodes * grid.nodes).map(node).collect(),
-            bends: [&outer, second, third].map(|tables| Bends::new(tables, grid.nodes)),
         })
     }
 
@@ -99,47 +83,6 @@ impl Shells {
         }
         light
     }
-
-    /// How far that may be from the surface of the second order through nine nodes, in rows of three, over a part of the dome
-    /// that holds these directions, for what the tables do and for normals that are not quite known.
-    pub fn bend(&self, directions: &[Vec3A], turned: Turned) -> MovedBend {
-        let (low, high) = cells(&self.scale, directions);
-        let apart = 0.5 * (high - low).max_element();
-        // Its depth and its tilt bound what each table weighs.
-        let deep = turned.moved_mm / self.radius_mm;
-        let weights = [(2.0 * turned.slope + deep).min(2.0), weight_at(deep, 0), weight_at(deep, 1)];
-        let (mut jump, mut most) = (0.0, 0.0);
-        for (k, (bends, weight)) in self.bends.iter().zip(weights).enumerate() {
-            let over = |table: &[f32]| over(table, self.scale.nodes, low, high);
-            jump += weight * over(&bends.jump);
-            most += if k == 0 { 1.0 } else { weight } * over(&bends.most);
-        }
-        MovedBend { table: rest_of_jumps(jump, apart), tilt: most * turned.tilt_rad }
-    }
-}
-
-impl Bends {
-    /// Of a flux.
-    fn new(tables: &[Vec<Vec4>; 3], nodes: usize) -> Self {
-        // By channel, the squares of the parts along x, y and z sum.
-        let mut sums = [const { Vec::new() }; 2];
-        for table in tables {
-            let parts = [squared_thirds(table, nodes), squares(table, nodes, -1..3, -1..3)];
-            for (sum, part) in sums.iter_mut().zip(parts) {
-                sum.resize(part.len(), Vec4::ZERO);
-                sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
-            }
-        }
-        let [jump, most] = sums.map(|sum| sum.into_iter().map(|v: Vec4| v.max_element().sqrt()).collect());
-        Self { jump, most }
-    }
-}
-
-/// The largest value in a box of cells.
-pub(super) fn over(table: &[f32], nodes: usize, low: Vec2, high: Vec2) -> f32 {
-    let [columns, rows] = [(low.x, high.x), (low.y, high.y)]
-        .map(|(low, high): (f32, f32)| low as i32 as usize..high as i32 as usize + 1);
-    largest(table, nodes, &columns, &rows)
 }
 
 /// The flux of all lights on a shell as the channels see it: tables of x, y and z, continued beyond the rim.
@@ -170,14 +113,3 @@ fn shell_weights(part: f32) -> [f32; 2] {
 }
 
 const PARTS: [f32; 3] = [SHELLS[0] as f32, SHELLS[1] as f32, SHELLS[2] as f32];
-
-/// The most that a shell weighs down to some depth, or as far above the dome, part of the radius.
-fn weight_at(deep: f32, shell: usize) -> f32 {
-    let [a, b, c] = PARTS;
-    let deep = deep.min(0.5);
-    // Above the dome both factors grow; below it, no more than these.
-    match shell {
-        0 => deep * (deep + (a - c)) * (1.0 / ((a - b) * (b - c))),
-        _ => deep * (deep + (a - b)) * (1.0 / ((a - c) * (b - c))),
-    }
-}

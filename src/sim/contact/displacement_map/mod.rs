@@ -1,0 +1,214 @@
+//! The deformed membrane as a smooth table: displacement and normal of any point, in some tens of nanoseconds.
+//!
+//! The chart is Lambert's equal-area map about the middle of the touched region: `p = R (1 - s/2) e + k (x t1 + y t2)`
+//! with `s = (x^2 + y^2) / R^2`, `k = sqrt(1 - s/4)`; it is smooth over the whole dome. Between the nodes the
+//! displacement is a cubic spline in each direction, whose second derivative is continuous: the normals have neither
+//! steps nor kinks of the table's making.
+//!
+//! About the pressed part the nodes lie close; where the rest of the dome moves as well, it does so smoothly, and a wide
+//! chart with fewer nodes serves.
+
+mod chart;
+
+use glam::{DVec3, Vec2, Vec3A};
+
+use self::chart::{Chart, Moved};
+use crate::contact::between::Between;
+use domecast_contact::Extent;
+
+/// Displacements of less than this bend nothing that a picture shows, mm.
+const STILL_MM: f64 = 1e-4;
+
+/// Distance of the wide chart's nodes, mm, and as a part of that of the close one's, where that is more: then they are as far
+/// apart as the finite elements, between which slopes jump that a finer table would only copy.
+const WIDE_STEP_MM: f64 = 0.6;
+const WIDER: f64 = 2.0;
+
+/// Slope of the displacement from which on the membrane may fold over a slanting ray.
+const FOLDING: f32 = 0.4;
+
+/// How far beyond the pressed part the nodes lie close, mm.
+const CLOSE_MARGIN_MM: f64 = 1.5;
+
+/// Tables of the displaced membrane.
+#[derive(Debug, Clone)]
+pub struct DisplacementMap {
+    close: Option<Chart>,
+    wide: Option<Chart>,
+}
+
+/// A point of the deformed membrane.
+#[derive(Debug, Clone, Copy)]
+pub struct Displaced {
+    /// Its displacement, mm.
+    pub displacement_mm: Vec3A,
+    /// Outward unit normal of the deformed membrane there.
+    pub normal: Vec3A,
+}
+
+/// Where the nodes of the tables lie: one for all the times that are to be mixed.
+#[derive(Debug, Clone)]
+pub struct MapLayout {
+    close: Option<Chart>,
+    wide: Chart,
+}
+
+impl MapLayout {
+    /// For domes that move in `extents` and bear loads in a cap (direction of its middle, half its angle), with nodes
+    /// no further apart than `step_mm` about that cap where their number allows; `None` where nothing moves.
+    pub fn new(
+        extents: &[Extent],
+        pressed: Option<(DVec3, f64)>,
+        radius_mm: f64,
+        step_mm: f64,
+    ) -> Option<Self> {
+        let middle = extents.iter().map(|e| e.direction).sum::<DVec3>().normalize_or_zero();
+        // Each extent, seen from the common middle.
+        let angle_of =
+            |e: &Extent| e.angle_rad + middle.dot(e.direction.normalize_or(middle)).clamp(-1.0, 1.0).acos();
+        let angle = extents.iter().map(angle_of).fold(0.0, f64::max);
+        if middle == DVec3::ZERO || angle.is_nan() || angle <= 0.0 {
+            return None;
+        }
+        // Where the rest of the dome moves as well, the chart reaches the farthest point of the rim.
+        let whole = |middle: DVec3| middle.z.clamp(-1.0, 1.0).acos() + std::f64::consts::FRAC_PI_2;
+        let far = extents.iter().any(|e| e.beyond_mm > STILL_MM);
+        let angle = if far { whole(middle) } else { angle.min(whole(middle)) };
+        let pressed = pressed
+            .map(|(at, half)| (at, (half + CLOSE_MARGIN_MM / radius_mm).min(whole(at))))
+            .filter(|(_, half)| *half < 0.7 * angle);
+        let chart = |middle, angle, step_mm| Chart::new(radius_mm, middle, angle, step_mm);
+        Some(match pressed {
+            Some((at, half)) => Self {
+                close: Some(chart(at, half, step_mm)),
+                wide: chart(middle, angle, (WIDER * step_mm).max(WIDE_STEP_MM)),
+            },
+            None => Self { close: None, wide: chart(middle, angle, step_mm) },
+        })
+    }
+
+    /// The tables of a dome; zero where it does not move.
+    pub fn map(&self, between: &Between) -> DisplacementMap {
+        let wide = self.wide.filled(between, None);
+        DisplacementMap {
+            close: self.close.as_ref().map(|chart| chart.filled(between, Some(&wide))),
+            wide: Some(wide),
+        }
+    }
+}
+
+impl DisplacementMap {
+    /// The tables of a touched dome, with nodes no further apart than `step_mm` about the pressed part where their
+    /// number allows; `None` where nothing moves. The second value is the number of nodes.
+    pub fn new(between: &Between, radius_mm: f64, step_mm: f64) -> Option<(Self, u64)> {
+        let layout = MapLayout::new(&between.extents(), between.pressed_cap(), radius_mm, step_mm)?;
+        let map = layout.map(between);
+        let nodes = map.node_count();
+        Some((map, nodes))
+    }
+
+    /// Nodes of the tables.
+    pub fn node_count(&self) -> u64 {
+        self.close.iter().chain(&self.wide).map(Chart::node_count).sum()
+    }
+
+    /// The tables a part of the way from these to others of the same layout.
+    pub fn towards(&self, to: &Self, part: f64) -> Self {
+        let mix = |a: &Option<Chart>, b: &Option<Chart>| match (a, b) {
+            (Some(a), Some(b)) => Some(a.towards(b, part as f32)),
+            _ => None,
+        };
+        Self { close: mix(&self.close, &to.close), wide: mix(&self.wide, &to.wide) }
+    }
+
+    /// Whether the membrane is so steep somewhere that a ray may meet it more than once: then what a search finds depends
+    /// on where it begins.
+    pub fn may_fold(&self) -> bool {
+        self.close.iter().chain(&self.wide).any(|chart| chart.steepest() > FOLDING)
+    }
+
+    /// The place of a chart that serves a point of the undeformed dome best.
+    fn near(&self, rest_mm: Vec3A) -> Option<(&Chart, Vec2, Moved)> {
+        [&self.close, &self.wide].into_iter().flatten().find_map(|chart| {
+            let place = chart.place(rest_mm);
+            Some((chart, place, chart.at(place)?))
+        })
+    }
+
+    /// Where a ray that meets the undeformed dome at `rest_mm` along the unit direction `inside` meets the deformed
+    /// one: the undeformed place of that point, and how it moved. `None` where the membrane does not move. `near_mm` is how
+    /// a point nearby moved, or zero: there the search begins.
+    ///
+    /// Newton's method on the chart: the ray meets the tangent plane of the moved membrane, and the way there along the
+    /// plane is the next step. A step that does not shrink gives way to the plain one, the point of the sphere on the
+    /// ray moved back by the displacement, which does as long as the membrane does not fold.
+    pub fn meet(&self, rest_mm: Vec3A, inside: Vec3A, near_mm: Vec3A) -> Option<(Vec3A, Displaced)> {
+        let mut place =
+            if near_mm == Vec3A::ZERO { rest_mm } else { back_on_sphere(rest_mm, inside, near_mm) };
+        let mut last = f32::INFINITY;
+        // At a crease Newton's steps may jump from side to side: then the nearest of them, and from it plain ones.
+        let (mut nearest_mm, mut smallest) = (Vec3A::ZERO, f32::INFINITY);
+        for step in 1..=MAX_STEPS + PLAIN_STEPS {
+            let (chart, at, moved) = self.near(place)?;
+            let normal = moved.along_x.cross(moved.along_y);
+            let surface = place + moved.displacement_mm;
+            let along = (surface - rest_mm).dot(normal) / inside.dot(normal);
+            let miss = rest_mm + inside * along - surface;
+            let miss2 = miss.length_squared();
+            let found = |place: Vec3A, displacement_mm| {
+                let normal = normal.try_normalize().unwrap_or(place.normalize_or(Vec3A::Z));
+                Some((place, Displaced { displacement_mm, normal }))
+            };
+            if miss2 < smallest {
+                (nearest_mm, smallest) = (moved.displacement_mm, miss2);
+            }
+            if step == MAX_STEPS + PLAIN_STEPS {
+                return found(place, moved.displacement_mm);
+            }
+            let on_plane = || {
+                let per = normal.length_squared().recip();
+                Vec2::new(miss.cross(moved.along_y).dot(normal), moved.along_x.cross(miss).dot(normal)) * per
+            };
+            if miss2 < NEAR_MM * NEAR_MM {
+                // So near that the tangent plane is the membrane: the point on it, and where that was.
+                let place = chart.point_near(at + on_plane());
+                return found(place, surface + miss - place);
+            }
+            // NaN, of a ray along the plane, is no smaller either.
+            place = if step >= MAX_STEPS {
+                nearest_mm =
+                    nearest_mm.lerp(moved.displacement_mm, if step == MAX_STEPS { 0.0 } else { 0.5 });
+                back_on_sphere(rest_mm, inside, nearest_mm)
+            } else if miss2 < 0.25 * last && miss2 < FARTHEST_MM * FARTHEST_MM {
+                chart.point_near(at + on_plane())
+            } else {
+                back_on_sphere(rest_mm, inside, moved.displacement_mm)
+            };
+            last = miss2;
+        }
+        None
+    }
+}
+
+/// Where a ray moved back by a displacement meets the sphere that it met at `rest_mm`.
+fn back_on_sphere(rest_mm: Vec3A, inside: Vec3A, displacement_mm: Vec3A) -> Vec3A {
+    let radius_mm = rest_mm.length();
+    let base = rest_mm - displacement_mm;
+    // |base + s inside| = R; the root near zero.
+    let b = base.dot(inside);
+    let c = radius_mm * radius_mm - base.length_squared();
+    let root = (b * b + c).max(0.0).sqrt();
+    let s = if b > 0.0 { c / (b + root) } else { root - b };
+    let next = base + inside * s;
+    next * (radius_mm / next.length().max(1e-6))
+}
+
+/// Repetitions of [`DisplacementMap::meet`]; a slope of 0.5 leaves a thousandth after ten.
+const MAX_STEPS: u32 = 10;
+/// More of them, each half of the plain one's way, where those do not end.
+const PLAIN_STEPS: u32 = 16;
+/// A step no longer than this is the last, mm: over it a membrane turns by a thousandth of a radian where it is sharpest, which
+/// is tenths of a grey level.
+const NEAR_MM: f32 = 4e-4;
+/// A step longer than this is none of Newton's, mm.
+const FARTHEST_MM: f32 = 1.0;

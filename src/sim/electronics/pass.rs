@@ -1,0 +1,47 @@
+//! Passes over the picture, between light and bytes.
+
+use crate::effect_name::EffectName;
+use crate::raster::frame::{Frame, Image8};
+use crate::work::Work;
+
+/// Where on the way from light to bytes a pass stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Brightness of the image on the image plane, before any blur: vignetting.
+    Vignetting,
+    /// Sharpness: defocus. Runs on each of the averaged pictures, whose scene stands still.
+    Focus,
+    /// From here on once a frame, after averaging: the colour filters. May leave one plane.
+    Mosaic,
+    /// Electrons: shot and read noise, the converter.
+    Sensor,
+    /// Back to three planes.
+    Demosaic,
+}
+
+/// Which picture a pass works on.
+#[derive(Debug, Clone)]
+pub struct PassContext {
+    /// Number of the frame.
+    pub frame: u32,
+    /// Seed of the run; random numbers depend on seed, frame and place only, never on threads.
+    pub seed: u64,
+}
+
+/// A pass over the picture.
+pub trait Pass: Send + Sync {
+    /// The effect that installed it, to which its work is counted.
+    fn effect(&self) -> EffectName;
+    /// When it runs.
+    fn stage(&self) -> Stage;
+    /// Changes the picture.
+    fn run(&self, frame: &mut Frame, context: &PassContext, work: &mut Work);
+}
+
+/// A pass over the coded picture.
+pub trait CodedPass: Send + Sync {
+    /// The effect that installed it.
+    fn effect(&self) -> EffectName;
+    /// Changes the picture.
+    fn run(&self, image: &mut Image8, context: &PassContext, work: &mut Work);
+}

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use domecast::springs::Displacement;
-use domecast::track::{Frame, Motion, TrackOptions, Tracker};
+use domecast::track::{CameraFrame, FollowMethod, TrackOptions, Tracker};
 use glam::DVec3;
 
 fn frames(criterion: &mut Criterion) {
@@ -30,13 +30,13 @@ fn frames(criterion: &mut Criterion) {
     for (name, options) in [
         ("steady", TrackOptions::default()),
         ("searched", TrackOptions { search_every: 1, ..TrackOptions::default() }),
-        ("flow", TrackOptions { motion: Motion::LucasKanade, ..TrackOptions::default() }),
+        ("flow", TrackOptions { motion: FollowMethod::LucasKanade, ..TrackOptions::default() }),
     ] {
         let mut tracker = Tracker::new(&constants, options).expect("a tracker");
         let mut number = 0;
         criterion.bench_function(&format!("track/{name}"), |bencher| {
             bencher.iter(|| {
-                let frame = Frame::new(640, 480, 3, &drawn[number as usize % 16]).expect("a frame");
+                let frame = CameraFrame::new(640, 480, 3, &drawn[number as usize % 16]).expect("a frame");
                 let found = tracker.track(number, black_box(&frame)).pose.is_some();
                 number += 1;
                 found

@@ -46,7 +46,7 @@ impl Suspension {
             displacement,
             residual_n,
             iterations,
-            least_stiffness_n_per_mm: self.least_stiffness(&self.tangent_at(&displacement)?),
+            min_stiffness_n_per_mm: self.min_stiffness(&self.tangent_at(&displacement)?),
         })
     }
 
@@ -98,11 +98,11 @@ impl Suspension {
     ///
     /// # Errors
     /// As [`Suspension::wrench_at`].
-    pub fn least_stiffness_at(&self, displacement: &Displacement) -> Result<f64, MechanicsError> {
-        Ok(self.least_stiffness(&self.tangent_at(displacement)?))
+    pub fn min_stiffness_at(&self, displacement: &Displacement) -> Result<f64, MechanicsError> {
+        Ok(self.min_stiffness(&self.tangent_at(displacement)?))
     }
 
-    fn least_stiffness(&self, tangent: &Matrix6<f64>) -> f64 {
+    fn min_stiffness(&self, tangent: &Matrix6<f64>) -> f64 {
         let reach = self.reach_mm();
         let scale = |i: usize| if i < 3 { 1.0 } else { 1.0 / reach };
         let symmetric =

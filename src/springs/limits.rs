@@ -208,8 +208,8 @@ pub fn try_load(suspension: &Suspension, limits: &Limits, wrench: &Wrench) -> Lo
 
 /// Least stiffness at a balance over that at rest.
 fn stiffness_left(suspension: &Suspension, balance: &Equilibrium) -> f64 {
-    let rest = suspension.least_stiffness_at(&Displacement::default()).unwrap_or(0.0);
-    if rest > 0.0 { balance.least_stiffness_n_per_mm / rest } else { 0.0 }
+    let rest = suspension.min_stiffness_at(&Displacement::default()).unwrap_or(0.0);
+    if rest > 0.0 { balance.min_stiffness_n_per_mm / rest } else { 0.0 }
 }
 
 /// Every mechanical limit at a pose, the most used first: one line for each limit, with the part nearest to it.

@@ -95,7 +95,7 @@ pub struct Equilibrium {
     pub iterations: u32,
     /// Least eigenvalue of the symmetric tangent stiffness, forces and moments scaled by the springs' reach,
     /// N/mm: where it is not above 0 the platform would tip over.
-    pub least_stiffness_n_per_mm: f64,
+    pub min_stiffness_n_per_mm: f64,
 }
 
 /// What one spring bears at a pose.

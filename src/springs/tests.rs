@@ -256,7 +256,7 @@ fn equilibrium_inverts_the_law() {
         let balance = suspension.equilibrium(&wrench).unwrap();
         let miss = Vector6::from(balance.displacement.to_array()) - Vector6::from(x);
         assert!(miss.norm() < 1e-11, "{miss}");
-        assert!(balance.least_stiffness_n_per_mm > 0.0);
+        assert!(balance.min_stiffness_n_per_mm > 0.0);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use domecast::constants::Constants;
 use domecast::numeric::Rigid;
-use domecast::track::{Frame, MarkState, Problem, TrackOptions, Tracked, Tracker};
+use domecast::track::{CameraFrame, MarkState, Problem, TrackOptions, Tracked, Tracker};
 use serde_json::{Value, json};
 use std::str::FromStr;
 
@@ -57,7 +57,7 @@ fn bad_frames_have_names_and_the_stream_goes_on() {
     let tracked = tracker.skip(next());
     assert_eq!(names(tracked), ["unreadable"]);
     let small = vec![90; 320 * 240];
-    let tracked = tracker.track(next(), &Frame::new(320, 240, 1, &small).unwrap());
+    let tracked = tracker.track(next(), &CameraFrame::new(320, 240, 1, &small).unwrap());
     assert_eq!(names(tracked), ["wrong_size"]);
     let last = good(12);
     let tracked = tracker.track(next(), &frame(&last.bytes));

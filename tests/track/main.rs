@@ -19,7 +19,7 @@ use domecast::layout::Layout;
 use domecast::numeric::Rigid;
 use domecast::optics::SensorOptics;
 use domecast::springs::{Direction, Displacement, Suspension, Wrench, reach, standard_directions, try_load};
-use domecast::track::{Frame, MarkState, Springs, TrackOptions, Tracked, Tracker};
+use domecast::track::{CameraFrame, MarkState, Springs, TrackOptions, Tracked, Tracker};
 use glam::{DVec2, DVec3};
 use render::{draw, still};
 
@@ -53,9 +53,9 @@ fn tracker(options: TrackOptions) -> Tracker {
     Tracker::new(&SENSOR.constants, options).expect("a tracker")
 }
 
-fn frame(bytes: &[u8]) -> Frame<'_> {
+fn frame(bytes: &[u8]) -> CameraFrame<'_> {
     let camera = &SENSOR.constants.camera;
-    Frame::new(camera.width as usize, camera.height as usize, 1, bytes).expect("a frame")
+    CameraFrame::new(camera.width as usize, camera.height as usize, 1, bytes).expect("a frame")
 }
 
 struct Score {

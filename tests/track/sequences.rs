@@ -1,7 +1,7 @@
 //! Many frames: missing, hidden and false dots, fast motion, long runs.
 
 use domecast::numeric::rotation_from_vector;
-use domecast::track::{MarkState, Motion, Reference, Steps, Thresholds, TrackOptions};
+use domecast::track::{FollowMethod, MarkState, Reference, Steps, Thresholds, TrackOptions};
 use glam::{DVec2, DVec3};
 
 use super::render::{Picture, still};
@@ -123,7 +123,7 @@ fn sheared(mm: f64) -> impl Fn(DVec3) -> DVec3 {
 #[test]
 fn motion_of_half_a_pitch_is_followed() {
     // 18 px of pitch are 1.3 mm on the dome at the pole.
-    for motion in [Motion::Predicted, Motion::LucasKanade] {
+    for motion in [FollowMethod::Predicted, FollowMethod::LucasKanade] {
         let mut tracker = tracker(TrackOptions { motion, ..TrackOptions::default() });
         let mut at = 0.0;
         for (number, step) in [0.0, 0.3, 0.62, -0.62, -0.62, 0.5, 0.62, 0.0].into_iter().enumerate() {
@@ -170,7 +170,7 @@ fn the_papers_steps_serve_too() {
     let papers = TrackOptions {
         thresholds: Thresholds::Fixed { black: 90, white: 200 },
         steps: Steps { blur: true, sharpen: true, open: true },
-        motion: Motion::LucasKanade,
+        motion: FollowMethod::LucasKanade,
         search_every: 1,
         ..TrackOptions::default()
     };

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use domecast::sim::scene::SceneFile;
 use domecast::sim::{Around, Drawn, Plan, Renderer, Scene, Scratch};
-use domecast::track::{Frame, MarkState, Reference, TrackOptions, Tracked};
+use domecast::track::{CameraFrame, MarkState, Reference, TrackOptions, Tracked};
 use glam::DVec2;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -126,7 +126,8 @@ fn track_all(drawn: &[Drawn], options: TrackOptions) -> Told {
     let mut told = Told::default();
     for drawn in drawn {
         let image = drawn.image.as_ref().expect("a picture");
-        let frame = Frame::new(image.width, image.height, image.channels, &image.bytes).expect("a frame");
+        let frame =
+            CameraFrame::new(image.width, image.height, image.channels, &image.bytes).expect("a frame");
         let number = drawn.truth.frame;
         let tracked = tracker.track(number.into(), &frame);
         assert!(tracked.pose.is_some(), "frame {number}: {:?}", names(tracked));

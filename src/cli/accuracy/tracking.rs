@@ -4,12 +4,14 @@ use super::clock::{TimeLimit, time_again};
 use super::frames::Sequence;
 use super::sweep::{Law, Sweep, SweepSample, sizes};
 use domecast_runtime::constants::Constants;
-use domecast_runtime::track::{Channel, Frame, MarkState, Motion, Steps, Thresholds, TrackOptions, Tracker};
+use domecast_runtime::track::{
+    CameraFrame, Channel, FollowMethod, MarkState, Steps, Thresholds, TrackOptions, Tracker,
+};
 
 /// The sweep of options; `None` where the frames have no pictures or the constants fit no tracker.
 pub fn sweep(constants: &Constants, frames: &Sequence, time_limit: TimeLimit) -> Option<Sweep> {
     let plain = TrackOptions::default();
-    let flow = |pyramid_levels| TrackOptions { motion: Motion::LucasKanade, pyramid_levels, ..plain };
+    let flow = |pyramid_levels| TrackOptions { motion: FollowMethod::LucasKanade, pyramid_levels, ..plain };
     let options: [(&str, TrackOptions); 8] = [
         (
             "the paper's steps on every frame as a whole",
@@ -17,7 +19,7 @@ pub fn sweep(constants: &Constants, frames: &Sequence, time_limit: TimeLimit) ->
                 channel: Channel::Luma,
                 thresholds: Thresholds::Fixed { black: 60, white: 200 },
                 steps: Steps { blur: true, sharpen: true, open: true },
-                motion: Motion::LucasKanade,
+                motion: FollowMethod::LucasKanade,
                 search_every: 1,
                 ..plain
             },
@@ -37,7 +39,7 @@ pub fn sweep(constants: &Constants, frames: &Sequence, time_limit: TimeLimit) ->
         let (mut errors, mut seen, mut missed) = (Vec::new(), 0_usize, 0_usize);
         for (number, drawn) in (0_u64..).zip(&frames.drawn) {
             let image = drawn.image.as_ref()?;
-            let frame = Frame::new(image.width, image.height, image.channels, &image.bytes).ok()?;
+            let frame = CameraFrame::new(image.width, image.height, image.channels, &image.bytes).ok()?;
             let tracked = tracker.track(number, &frame);
             for truth in drawn.truth.black_dots.iter().filter(|dot| dot.visible) {
                 let Some(at) = truth.centroid_px else { continue };
@@ -58,7 +60,8 @@ pub fn sweep(constants: &Constants, frames: &Sequence, time_limit: TimeLimit) ->
             tracker.restart();
             for (number, drawn) in (0_u64..).zip(&frames.drawn) {
                 if let Some(image) = &drawn.image
-                    && let Ok(frame) = Frame::new(image.width, image.height, image.channels, &image.bytes)
+                    && let Ok(frame) =
+                        CameraFrame::new(image.width, image.height, image.channels, &image.bytes)
                 {
                     tracker.track(number, &frame);
                 }

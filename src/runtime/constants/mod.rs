@@ -1,4 +1,11 @@
 //! What the runtime needs to know of one sensor: the form of `constants.json`, and the sensor that it describes.
+//!
+//! ```
+//! use domecast_runtime::constants::Constants;
+//!
+//! let fault = "{}".parse::<Constants>().unwrap_err();
+//! assert!(fault.to_string().starts_with("is not a constants file"));
+//! ```
 
 use std::path::Path;
 use std::str::FromStr;

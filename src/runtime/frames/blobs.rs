@@ -6,7 +6,7 @@ use super::Gray;
 
 /// Which side of the level a blob lies on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub enum BlobSide {
     /// Brighter than the level.
     Bright,
     /// Darker.
@@ -55,15 +55,15 @@ impl Blob {
 
 /// The blobs of a frame on one side of a level; `level` gives it for the pixel of a number (counted by rows), `None`
 /// where there is nothing to find. In the order of their first pixels.
-pub fn blobs(frame: &Gray, side: Side, level: impl Fn(usize) -> Option<f32>) -> Vec<Blob> {
+pub fn blobs(frame: &Gray, side: BlobSide, level: impl Fn(usize) -> Option<f32>) -> Vec<Blob> {
     let (width, height) = (frame.width(), frame.height());
     let mut open: Vec<bool> = frame
         .values()
         .iter()
         .enumerate()
         .map(|(i, value)| match (level(i), side) {
-            (Some(level), Side::Bright) => *value > level,
-            (Some(level), Side::Dark) => *value < level,
+            (Some(level), BlobSide::Bright) => *value > level,
+            (Some(level), BlobSide::Dark) => *value < level,
             (None, _) => false,
         })
         .collect();

@@ -20,7 +20,7 @@ fn picture(width: usize, height: usize, ground: impl Fn(DVec2) -> f64, discs: &[
     Gray::new(width, height, values).unwrap()
 }
 
-fn marks(frame: &Gray, side: Side, reach: usize) -> Vec<Blob> {
+fn marks(frame: &Gray, side: BlobSide, reach: usize) -> Vec<Blob> {
     let levels = local_levels(frame, reach);
     blobs(frame, side, |i| (levels.contrast[i] > 0.2).then_some(levels.middle[i]))
 }
@@ -34,7 +34,7 @@ fn discs_are_found_to_hundredths_under_shading_and_blur() {
     ];
     let frame = picture(48, 44, |p| 0.4 + 0.004 * p.x + 0.002 * p.y, &discs);
     for frame in [frame.clone(), frame.blurred(0.8)] {
-        let found = marks(&frame, Side::Dark, 12);
+        let found = marks(&frame, BlobSide::Dark, 12);
         assert_eq!(found.len(), 3);
         let taken = |x: u32, y: u32| found.iter().any(|b| b.pixels.contains(&[x, y]));
         for ((place, radius, _), blob) in discs.iter().zip([&found[0], &found[1], &found[2]]) {
@@ -58,7 +58,7 @@ fn an_edge_beside_a_disc_moves_it_little() {
     let frame = picture(40, 40, |p| if p.x + 0.3 * p.y < 16.5 { 0.5 } else { 0.2 }, &[(place, 4.5, 0.95)])
         .blurred(0.7);
     let found: Vec<Blob> =
-        marks(&frame, Side::Bright, 12).into_iter().filter(|b| b.fullness() > 0.9).collect();
+        marks(&frame, BlobSide::Bright, 12).into_iter().filter(|b| b.fullness() > 0.9).collect();
     let spot = found.iter().filter_map(|b| centroid(&frame, b, |_, _| false));
     let nearest = spot.map(|s| s.at_px.distance(place)).fold(f64::INFINITY, f64::min);
     assert!(nearest < 0.1, "{nearest}");
@@ -93,13 +93,13 @@ fn blobs_join_over_corners_and_know_the_border() {
     let rows = ["#...", ".#..", "...#", "...#"];
     let values = rows.iter().flat_map(|r| r.chars()).map(|c| if c == '#' { 1.0 } else { 0.0 }).collect();
     let frame = Gray::new(4, 4, values).unwrap();
-    let found = blobs(&frame, Side::Bright, |_| Some(0.5));
+    let found = blobs(&frame, BlobSide::Bright, |_| Some(0.5));
     assert_eq!(found.len(), 2);
     assert_eq!(found[0].pixels, [[0, 0], [1, 1]]);
     assert_eq!(found[1].corners, [[3, 2], [3, 3]]);
     assert!(found[0].touches_border(&frame));
     assert!(centroid(&frame, &found[0], |_, _| false).is_none());
-    assert!(blobs(&frame, Side::Bright, |_| None).is_empty());
+    assert!(blobs(&frame, BlobSide::Bright, |_| None).is_empty());
 }
 
 #[test]

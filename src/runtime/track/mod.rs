@@ -1,7 +1,21 @@
 //! From frames and constants to markers, pose, wrench and local displacement.
 //!
-//! [`Tracker`] is the one state object: a [`Frame`] in, a [`Tracked`] out, and nothing is allocated once it runs. It
+//! [`Tracker`] is the one state object: a [`CameraFrame`] in, a [`Tracked`] out, and nothing is allocated once it runs. It
 //! sees only the constants of a sensor, as a runtime on a robot does.
+//!
+//! ```no_run
+//! use domecast_runtime::constants::Constants;
+//! use domecast_runtime::track::{CameraFrame, TrackOptions, Tracker};
+//!
+//! let constants = Constants::load("constants.json".as_ref())?;
+//! let mut tracker = Tracker::new(&constants, TrackOptions::default())?;
+//! let bytes = std::fs::read("frame.gray")?;
+//! let tracked = tracker.track(0, &CameraFrame::new(640, 480, 1, &bytes)?);
+//! if let Some(wrench) = tracked.wrench {
+//!     println!("{} N", wrench.force_n.z);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! # The stages
 //!
@@ -37,7 +51,7 @@
 //! | low / high threshold | half way between local ground and mark ([`Thresholds`]); the paper's fixed ones on request | an edge at half height is where the outline is, whatever the light |
 //! | morphology | on request; else blobs are judged by area and fullness | opening eats at the edge of dots that are seven pixels wide |
 //! | components, centroids | the same in the search; then grey-weighted centroids against the local ground | a binary centroid has whole pixels to count; a grey one of a 7 px dot is good to 0.02 px |
-//! | pyramidal Lucas-Kanade | where the pose and the last frame put each dot, then its centroid; flow on request ([`Motion`]) | flow drifts, centroids do not; the platform's part of the motion is known exactly from the white markers |
+//! | pyramidal Lucas-Kanade | where the pose and the last frame put each dot, then its centroid; flow on request ([`FollowMethod`]) | flow drifts, centroids do not; the platform's part of the motion is known exactly from the white markers |
 //! | solvePnP | least squares on raw pixels through lens, layers and disc | plain PnP is biased by millimetres behind a sheet |
 //! | wrench linear in the pose | the springs' law by compression ([`Springs`]) | springs between magnets are not linear over their travel |
 
@@ -53,10 +67,10 @@ mod tracker;
 mod wrench;
 
 pub use error::TrackError;
-pub use frame::{Frame, FrameFault, Undistorted};
+pub use frame::{CameraFrame, FrameFault, Undistorted};
 pub use identities::MAX_FALSE_DOTS;
 pub use marks::MarkState;
-pub use options::{Channel, Motion, Reference, Steps, Thresholds, TrackOptions};
+pub use options::{Channel, FollowMethod, Reference, Steps, Thresholds, TrackOptions};
 pub use report::{
     CSV_HEADER, DOTS_CSV_HEADER, DotResult, MarkerResult, OverlayError, Problem, Problems, Tracked,
     overlay_png, write_csv, write_dots_csv, write_json,

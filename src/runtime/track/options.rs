@@ -31,7 +31,7 @@ pub enum Thresholds {
 
 /// How a dot is found again in the next frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Motion {
+pub enum FollowMethod {
     /// Where the new pose puts it, plus what it was displaced by; the neighbours' motion where that fails.
     #[default]
     Predicted,
@@ -76,8 +76,8 @@ pub struct TrackOptions {
     /// Steps of that search.
     pub steps: Steps,
     /// How a dot is found again.
-    pub motion: Motion,
-    /// Levels of the pyramid of [`Motion::LucasKanade`], 1 to 5: each doubles the way that a dot can be followed.
+    pub motion: FollowMethod,
+    /// Levels of the pyramid of [`FollowMethod::LucasKanade`], 1 to 5: each doubles the way that a dot can be followed.
     pub pyramid_levels: usize,
     /// Where displacements and wrenches are counted from.
     pub reference: Reference,
@@ -97,7 +97,7 @@ impl Default for TrackOptions {
             channel: Channel::Luma,
             thresholds: Thresholds::Adaptive,
             steps: Steps::default(),
-            motion: Motion::Predicted,
+            motion: FollowMethod::Predicted,
             pyramid_levels: 3,
             reference: Reference::Constants,
             max_residual_px: 2.0,

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::error::TrackError;
-use super::frame::{ExposureMeter, Frame, Plane, sharpness};
+use super::frame::{CameraFrame, ExposureMeter, Plane, sharpness};
 use super::identities::{DotFrame, DotIdentities, MarkerFrame, MarkerIdentities};
 use super::model::SensorModel;
 use super::options::{Thresholds, TrackOptions};
@@ -114,7 +114,7 @@ impl Tracker {
     }
 
     /// Takes the next frame in. Numbers that leave one out are a gap; nothing else depends on them.
-    pub fn track(&mut self, number: u64, frame: &Frame<'_>) -> &Tracked {
+    pub fn track(&mut self, number: u64, frame: &CameraFrame<'_>) -> &Tracked {
         self.begin(number);
         let spec = self.model.optics.lens().spec();
         if frame.width() != spec.width as usize || frame.height() != spec.height as usize {

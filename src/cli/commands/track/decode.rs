@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use domecast_runtime::track::Frame;
+use domecast_runtime::track::CameraFrame;
 
 /// Bytes at most of an unpacked picture.
 const MAX_BYTES: usize = 3 << 26;
@@ -18,7 +18,7 @@ pub struct Picture {
 
 impl Picture {
     fn checked(self) -> Result<Self, String> {
-        match Frame::new(self.width, self.height, self.channels, &self.bytes) {
+        match CameraFrame::new(self.width, self.height, self.channels, &self.bytes) {
             Ok(_) => Ok(self),
             Err(error) => Err(error.to_string()),
         }

@@ -18,8 +18,8 @@ use domecast_files::StagedFile;
 use domecast_optics::SensorOptics;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
-    CSV_HEADER, Channel, DOTS_CSV_HEADER, Frame, Motion, Reference, Steps, Thresholds, TrackOptions, Tracked,
-    Tracker, Undistorted, overlay_png, write_csv, write_dots_csv, write_json,
+    CSV_HEADER, CameraFrame, Channel, DOTS_CSV_HEADER, FollowMethod, Reference, Steps, Thresholds,
+    TrackOptions, Tracked, Tracker, Undistorted, overlay_png, write_csv, write_dots_csv, write_json,
 };
 use source::{FrameSource, RawSize};
 
@@ -128,7 +128,7 @@ impl TrackArguments {
                 .thresholds
                 .map_or(Thresholds::Adaptive, |[black, white]| Thresholds::Fixed { black, white }),
             steps: Steps { blur: !self.no_blur, sharpen: self.sharpen, open: self.open },
-            motion: if self.flow { Motion::LucasKanade } else { Motion::Predicted },
+            motion: if self.flow { FollowMethod::LucasKanade } else { FollowMethod::Predicted },
             pyramid_levels: self.pyramid_levels,
             reference: self.reference.map_or(Reference::Constants, Reference::Frames),
             search_every: self.search_every,
@@ -275,7 +275,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     while let Some(next) = source.next_frame() {
         output.step(&format!("frame {}", next.number));
         let picture = match &next.picture {
-            Ok(picture) => Frame::new(picture.width, picture.height, picture.channels, &picture.bytes)
+            Ok(picture) => CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes)
                 .map_err(|error| error.to_string()),
             Err(problem) => Err(problem.clone()),
         };

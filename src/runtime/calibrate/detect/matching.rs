@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2};
 
-use crate::frames::{Blob, Gray, Side, blobs, centroid, local_levels};
+use crate::frames::{Blob, BlobSide, Gray, blobs, centroid, local_levels};
 
 /// Least difference between mark and surroundings, of the full range.
 const MIN_CONTRAST: f32 = 0.08;
@@ -54,7 +54,7 @@ pub(super) struct Blobs {
 impl Blobs {
     /// Those on one side of the level halfway between the extremes around; over squares that hold the largest mark
     /// and its surroundings.
-    pub fn of(smooth: &Gray, side: Side, wanted: &[Wanted]) -> Self {
+    pub fn of(smooth: &Gray, side: BlobSide, wanted: &[Wanted]) -> Self {
         let largest = wanted.iter().map(|one| one.area_px).fold(1.0, f64::max);
         // The diameter of a disc of that area, and half of it around.
         let reach = (1.5 * (4.0 * largest / std::f64::consts::PI).sqrt()).ceil() as usize + 2;

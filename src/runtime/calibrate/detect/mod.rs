@@ -11,7 +11,7 @@ use matching::{Blobs, affine, area_of, combinations, with_spacing};
 
 use super::optics::{Kind, Observation};
 use crate::constants::Constants;
-use crate::frames::{Gray, Side};
+use crate::frames::{BlobSide, Gray};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 use domecast_optics::pose::{PoseOptions, PoseSolver, Sighting, outline_centroid_offset};
@@ -136,7 +136,7 @@ impl<'a> Detector<'a> {
             wanted.push((marker.id as usize, image.centroid_px, area_of(&outline)));
         }
         let wanted = with_spacing(wanted);
-        let bright = Blobs::of(smooth, Side::Bright, &wanted);
+        let bright = Blobs::of(smooth, BlobSide::Bright, &wanted);
         let mut choices: Vec<Vec<DVec2>> = Vec::new();
         for one in &wanted {
             let mut near: Vec<(f64, DVec2)> = bright
@@ -187,7 +187,7 @@ impl<'a> Detector<'a> {
             Some((dot.id, center + offset, area_of(&outline)))
         };
         let wanted = with_spacing(self.constants.black_dots.iter().filter_map(seen).collect());
-        let dark = Blobs::of(smooth, Side::Dark, &wanted);
+        let dark = Blobs::of(smooth, BlobSide::Dark, &wanted);
         let middle = 0.5 * DVec2::new(frame.width() as f64, frame.height() as f64);
         let (mut shift, mut stretch) = (DVec2::ZERO, DMat2::IDENTITY);
         let mut matched: Vec<(usize, usize)> = Vec::new();

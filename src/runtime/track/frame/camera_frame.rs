@@ -5,7 +5,7 @@ pub const MAX_PIXELS: usize = 1 << 26;
 
 /// A raw frame: rows from the top, grey or interleaved red, green, blue.
 #[derive(Debug, Clone, Copy)]
-pub struct Frame<'a> {
+pub struct CameraFrame<'a> {
     width: usize,
     height: usize,
     channels: usize,
@@ -29,7 +29,7 @@ impl std::fmt::Display for FrameFault {
 
 impl std::error::Error for FrameFault {}
 
-impl<'a> Frame<'a> {
+impl<'a> CameraFrame<'a> {
     /// A frame of 1 (grey) or 3 (red, green, blue) channels.
     ///
     /// # Errors

@@ -106,12 +106,12 @@ pub(crate) fn sharpness(plane: &Plane<'_>, mask: &Mask, exposure: &Exposure) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::frame::Frame;
+    use crate::track::frame::CameraFrame;
     use crate::track::options::Channel;
 
     fn measured(meter: &mut ExposureMeter, level: impl Fn(usize, usize) -> u8) -> (Exposure, f64) {
         let bytes: Vec<u8> = (0..64 * 48).map(|i| level(i % 64, i / 64)).collect();
-        let frame = Frame::new(64, 48, 1, &bytes).unwrap();
+        let frame = CameraFrame::new(64, 48, 1, &bytes).unwrap();
         let (plane, mask) = (Plane::new(&frame, Channel::Luma), Mask::all(64, 48));
         let exposure = meter.measure(&plane, &mask);
         (exposure, sharpness(&plane, &mask, &exposure))

@@ -9,7 +9,7 @@ mod mask;
 mod plane;
 mod undistortion;
 
-pub use camera_frame::{Frame, FrameFault, MAX_PIXELS};
+pub use camera_frame::{CameraFrame, FrameFault, MAX_PIXELS};
 pub(crate) use exposure::{Exposure, ExposureMeter, sharpness};
 pub(crate) use mask::Mask;
 pub(crate) use plane::Plane;

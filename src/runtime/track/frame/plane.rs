@@ -1,6 +1,6 @@
 //! One channel of a frame, read where it stands.
 
-use super::camera_frame::Frame;
+use super::camera_frame::CameraFrame;
 use crate::track::options::Channel;
 
 #[derive(Debug, Clone, Copy)]
@@ -31,7 +31,7 @@ fn luma(pixel: &[u8]) -> u8 {
 
 impl<'a> Plane<'a> {
     /// One channel of a frame; of a grey frame, the grey.
-    pub fn new(frame: &Frame<'a>, channel: Channel) -> Self {
+    pub fn new(frame: &CameraFrame<'a>, channel: Channel) -> Self {
         let pick = match (frame.channels(), channel) {
             (1, _) | (_, Channel::Red) => Pick::Byte(0),
             (_, Channel::Green) => Pick::Byte(1),

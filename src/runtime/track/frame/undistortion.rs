@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::camera_frame::{Frame, MAX_PIXELS};
+use super::camera_frame::{CameraFrame, MAX_PIXELS};
 use crate::constants::Constants;
 use crate::track::error::TrackError;
 use domecast_optics::camera::{Lens, LensLimit};
@@ -54,7 +54,7 @@ impl Undistorted {
     }
 
     /// The undistorted, masked frame, with the channels of the raw one; `None` for a frame of another size.
-    pub fn of<'a>(&self, frame: &Frame<'_>, out: &'a mut Vec<u8>) -> Option<&'a [u8]> {
+    pub fn of<'a>(&self, frame: &CameraFrame<'_>, out: &'a mut Vec<u8>) -> Option<&'a [u8]> {
         if frame.width() != self.width || frame.height() != self.height {
             return None;
         }

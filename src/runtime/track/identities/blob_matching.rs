@@ -245,3 +245,74 @@ impl BlobMatcher {
         count
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::identities::false_dots::find_false_dots;
+    use crate::track::marks::{MarkState, SpotOutline};
+
+    const SPACING_PX: f64 = 20.0;
+
+    /// Dots of a lattice, where they are expected, and blobs a third of the spacing away from there.
+    fn scene(missing: &[usize]) -> (Vec<DotModel>, Vec<DotTrack>, Vec<DarkBlob>) {
+        let outline = SpotOutline { radius_px: 3.5, area_px: 38.0, spread_px2: 6.0 };
+        let models = DotModel::lattice(6, 5, SPACING_PX, outline);
+        let at =
+            |i: usize| DVec2::new(30.0 + SPACING_PX * (i % 6) as f64, 30.0 + SPACING_PX * (i / 6) as f64);
+        let track = |i: usize| DotTrack {
+            expected_px: Some(at(i)),
+            outline,
+            state: MarkState::Missing,
+            ..DotTrack::default()
+        };
+        // A shear on top of the shift: the neighbours lead where the commonest offset does not.
+        let moved = |p: DVec2| p + DVec2::new(7.0 + 0.04 * (p.y - 30.0), -3.0);
+        let blob = |i: usize| DarkBlob { at_px: moved(at(i)), area_px: 36.0, spread_px2: 6.0 };
+        let seen = (0..models.len()).filter(|i| !missing.contains(i));
+        let blobs = seen.rev().map(blob).collect();
+        (models, (0..30).map(track).collect(), blobs)
+    }
+
+    #[test]
+    fn shifted_and_sheared_blobs_keep_their_dots() {
+        let missing = [8, 21];
+        let (models, tracks, blobs) = scene(&missing);
+        let mut matcher = BlobMatcher::new(30, 64);
+        assert_eq!(matcher.match_blobs(&blobs, &models, &tracks, [200, 160]), 28);
+        for (dot, blob) in matcher.blob_of.iter().enumerate() {
+            let Some(blob) = blob else {
+                assert!(missing.contains(&dot));
+                continue;
+            };
+            let y = tracks[dot].expected_px.unwrap().y - 30.0;
+            let away = blobs[*blob].at_px - tracks[dot].expected_px.unwrap();
+            assert!(away.distance(DVec2::new(7.0 + 0.04 * y, -3.0)) < 1e-9, "{dot}: {away}");
+        }
+    }
+
+    #[test]
+    fn a_blob_between_dots_that_are_found_is_a_false_dot() {
+        let (models, mut tracks, mut blobs) = scene(&[]);
+        let mut matcher = BlobMatcher::new(30, 64);
+        matcher.match_blobs(&blobs, &models, &tracks, [200, 160]);
+        for (track, blob) in tracks.iter_mut().zip(&matcher.blob_of) {
+            track.spot = blob.map(|blob| crate::track::marks::DarkSpot {
+                at_px: blobs[blob].at_px,
+                contrast: 0.5,
+                area_px: 36.0,
+                spread_px2: 6.0,
+                sd_px: 0.02,
+                ground: 150.0,
+            });
+        }
+        let between = tracks[0].now_px().unwrap() + SPACING_PX * 0.5;
+        blobs.push(DarkBlob { at_px: between, area_px: 30.0, spread_px2: 5.0 });
+        // Too small, and too far from the pattern.
+        blobs.push(DarkBlob { at_px: between + 2.0, area_px: 3.0, spread_px2: 0.5 });
+        blobs.push(DarkBlob { at_px: DVec2::splat(-80.0), area_px: 30.0, spread_px2: 5.0 });
+        let mut found = Vec::new();
+        find_false_dots(&blobs, &models, &tracks, &mut found);
+        assert_eq!(found, [between]);
+    }
+}

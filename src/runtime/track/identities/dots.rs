@@ -10,7 +10,7 @@ use super::false_dots::{MAX_FALSE_DOTS, find_false_dots};
 use crate::track::frame::{Mask, Plane};
 use crate::track::marks::{BlobScan, DarkBlob, Flow, ScanSettings, SpotMeter};
 use crate::track::model::DotModel;
-use crate::track::options::{Motion, Thresholds, TrackOptions};
+use crate::track::options::{FollowMethod, Thresholds, TrackOptions};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 
@@ -115,7 +115,7 @@ impl DotIdentities {
             meter.prepare(largest * model.outline.radius_px);
         }
         let count = models.len();
-        let follows = options.motion == Motion::LucasKanade;
+        let follows = options.motion == FollowMethod::LucasKanade;
         let steps = options.steps;
         Self {
             dots: Dots { meter, tracks: vec![DotTrack::default(); count], order: Vec::with_capacity(count) },

@@ -133,3 +133,26 @@ fn neighbors_of(dot: &BlackDot, index: usize, by_id: &[(usize, usize)]) -> Resul
     }
     Ok(found)
 }
+
+#[cfg(test)]
+impl DotModel {
+    /// Dots of a square lattice of so many columns and rows in the image, each with its four neighbours.
+    pub fn lattice(columns: usize, rows: usize, spacing_px: f64, outline: SpotOutline) -> Vec<Self> {
+        let neighbors = |x: usize, y: usize| {
+            let left = (x > 0).then(|| y * columns + x - 1);
+            let right = (x + 1 < columns).then(|| y * columns + x + 1);
+            let above = (y > 0).then(|| (y - 1) * columns + x);
+            let below = (y + 1 < rows).then(|| (y + 1) * columns + x);
+            [left, right, above, below].into_iter().flatten().collect()
+        };
+        let dot = |index: usize| Self {
+            id: index as u32,
+            surface_mm: DVec3::ZERO,
+            radius_mm: 0.3,
+            outline,
+            neighbors: neighbors(index % columns, index / columns),
+            spacing_px,
+        };
+        (0..columns * rows).map(dot).collect()
+    }
+}

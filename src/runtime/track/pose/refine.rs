@@ -117,3 +117,56 @@ pub(super) fn refine(
     let rms_px = (now.chi2 / (2.0 * seen.len() as f64)).sqrt();
     Some(RefinedPose { pose, rms_px, covariance: inverse * now.noisy * inverse })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use domecast_optics::camera::{LensModel, LensSpec};
+    use domecast_optics::{FlatLayer, OpticsSpec};
+    use glam::DMat3;
+
+    fn sensor() -> (SensorOptics, [Marker; 4]) {
+        let optics = SensorOptics::new(&OpticsSpec {
+            lens: LensSpec {
+                model: LensModel::Pinhole,
+                width: 640,
+                height: 480,
+                matrix: [[230.0, 0.0, 319.5], [0.0, 230.0, 239.5], [0.0, 0.0, 1.0]],
+                distortion: vec![],
+                field_of_view_rad: 2.5,
+                pupil_shift_mm: vec![],
+            },
+            sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0)),
+            layers: vec![
+                FlatLayer { name: "acrylic".into(), index: [1.49; 3], thickness_mm: Some(1.0) },
+                FlatLayer { name: "silicone".into(), index: [1.41; 3], thickness_mm: None },
+            ],
+            dome_radius_mm: 10.0,
+        });
+        let corners = [(11.0, 10.0), (-11.0, 10.0), (-11.0, -10.0), (11.0, -9.0)];
+        let marker = |id: usize| Marker {
+            id: id as u32,
+            position_mm: DVec3::new(corners[id].0, corners[id].1, 0.0),
+            diameter_mm: 1.0,
+        };
+        (optics.unwrap(), std::array::from_fn(marker))
+    }
+
+    #[test]
+    fn sightings_of_a_pose_give_it_back_with_its_covariance() {
+        let (mut optics, markers) = sensor();
+        let pose = Rigid::new(DMat3::from_rotation_x(0.05), DVec3::new(0.1, 0.0, -1.0));
+        let moved = optics.at_pose(&pose).unwrap();
+        let sightings = markers.map(|marker| MarkerSighting {
+            marker,
+            centroid_px: marker.image(&moved).unwrap().centroid_px,
+            sd_px: 0.05,
+        });
+        let found = refine(&mut optics, &sightings, &Rigid::identity()).unwrap();
+        assert!(found.rms_px < 1e-6, "{}", found.rms_px);
+        assert!(found.pose.translation_mm.distance(pose.translation_mm) < 1e-6);
+        let variances = found.covariance.diagonal();
+        assert!(variances.iter().all(|v| *v > 0.0 && v.sqrt() < 0.05), "{variances}");
+        assert_eq!(refine(&mut optics, &sightings[..2], &Rigid::identity()), None);
+    }
+}

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use tiny_skia::{Color, Paint, PathBuilder, Pixmap, PremultipliedColorU8, Stroke, Transform};
 
 use super::result::Tracked;
-use crate::track::frame::Frame;
+use crate::track::frame::CameraFrame;
 use domecast_optics::SensorOptics;
 use domecast_springs::Wrench;
 
@@ -94,7 +94,7 @@ impl Canvas {
 /// # Errors
 /// [`OverlayError`].
 pub fn overlay_png(
-    frame: &Frame<'_>,
+    frame: &CameraFrame<'_>,
     tracked: &Tracked,
     rest: &SensorOptics,
     magnify: f64,

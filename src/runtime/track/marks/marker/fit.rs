@@ -107,3 +107,62 @@ fn accept(
         shading,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::frame::CameraFrame;
+    use crate::track::marks::Candidate;
+    use crate::track::options::Channel;
+    use glam::DMat2;
+
+    /// A view straight from above: a disc of 5 px, the dome's rim far away.
+    fn view() -> MarkerView {
+        MarkerView {
+            mm_by_px: DMat2::IDENTITY * 0.05,
+            place_mm: DVec2::new(30.0, 0.0),
+            radius_mm: 0.25,
+            rim_mm: 10.0,
+            half_px: 9,
+            around_px: [[8, 0], [6, 6], [0, 8], [-6, 6], [-8, 0], [-6, -6], [0, -8], [6, -6]],
+        }
+    }
+
+    /// A disc on its ground; each pixel the mean of 8 x 8 samples.
+    fn picture(at: DVec2, radius_px: f64, [ground, disc]: [f64; 2]) -> Vec<u8> {
+        let level = |i: usize| {
+            let corner = DVec2::new((i % 48) as f64, (i / 48) as f64) - 0.5;
+            let inside = |k: usize| {
+                let sample = corner + (DVec2::new((k % 8) as f64, (k / 8) as f64) + 0.5) / 8.0;
+                sample.distance(at) < radius_px
+            };
+            let part = (0..64).filter(|k| inside(*k)).count() as f64 / 64.0;
+            (ground + (disc - ground) * part).round() as u8
+        };
+        (0..48 * 40).map(level).collect()
+    }
+
+    #[test]
+    fn a_disc_is_found_and_fitted_to_hundredths_of_a_pixel() {
+        let center = DVec2::new(22.3, 18.7);
+        let bytes = picture(center, 5.0, [40.0, 200.0]);
+        let frame = CameraFrame::new(48, 40, 1, &bytes).unwrap();
+        let plane = Plane::new(&frame, Channel::Luma);
+        let mut places = [Candidate::default(); 2];
+        assert!(view().candidates(&plane, DVec2::new(20.0, 20.0), 10.0, None, &mut places) > 0);
+        let disc = view().fit(&plane, places[0].at_px, FIT_REACH_PX, None, DVec2::ZERO).unwrap();
+        assert!(disc.centroid_px.distance(center) < 0.03, "{}", disc.centroid_px);
+        assert!(disc.sd_px > 0.0 && disc.sd_px < 0.05 && disc.misfit < 0.1, "{disc:?}");
+    }
+
+    #[test]
+    fn flat_ground_and_dark_discs_are_no_markers() {
+        for [ground, disc] in [[80.0, 80.0], [200.0, 40.0]] {
+            let bytes = picture(DVec2::new(22.0, 19.0), 5.0, [ground, disc]);
+            let frame = CameraFrame::new(48, 40, 1, &bytes).unwrap();
+            let plane = Plane::new(&frame, Channel::Luma);
+            let start = DVec2::new(22.0, 19.0);
+            assert_eq!(view().fit(&plane, start, FIT_REACH_PX, None, DVec2::ZERO), None);
+        }
+    }
+}

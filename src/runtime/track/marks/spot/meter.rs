@@ -239,3 +239,36 @@ fn finish(
     let sd_px = noise * (0.5 * stencil.lever).sqrt() / sums.weight;
     Ok(DarkSpot { at_px, contrast, area_px, spread_px2, sd_px, ground: level })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::frame::CameraFrame;
+    use crate::track::options::Channel;
+
+    #[test]
+    fn a_dark_spot_is_measured_and_nothing_is_named() {
+        let center = DVec2::new(20.4, 17.8);
+        let dark = |at: DVec2| if at.distance(center) < 3.5 { 40.0 } else { 160.0 };
+        let level = |i: usize| {
+            let corner = DVec2::new((i % 40) as f64, (i / 40) as f64) - 0.5;
+            let sample = |k: usize| corner + (DVec2::new((k % 8) as f64, (k / 8) as f64) + 0.5) / 8.0;
+            ((0..64).map(|k| dark(sample(k))).sum::<f64>() / 64.0).round() as u8
+        };
+        let bytes: Vec<u8> = (0..40 * 36).map(level).collect();
+        let frame = CameraFrame::new(40, 36, 1, &bytes).unwrap();
+        let plane = Plane::new(&frame, Channel::Luma);
+        let area_px = std::f64::consts::PI * 3.5 * 3.5;
+        let outline = SpotOutline { radius_px: 3.5, area_px, spread_px2: 0.5 * 3.5 * 3.5 };
+        let mut meter = SpotMeter::default();
+        assert_eq!(meter.measure(&plane, center, &outline, 4.0), Err(SpotFault::NoGround));
+        meter.prepare(outline.radius_px);
+        let spot = meter.measure(&plane, center + DVec2::new(1.0, -1.2), &outline, 4.0).unwrap();
+        assert!(spot.at_px.distance(center) < 0.02, "{}", spot.at_px);
+        assert!((spot.area_px / area_px - 1.0).abs() < 0.05, "{}", spot.area_px);
+        let far = meter.measure(&plane, DVec2::new(8.0, 8.0), &outline, 2.0);
+        assert_eq!(far, Err(SpotFault::Faint));
+        let outside = meter.measure(&plane, DVec2::new(-3.0, 8.0), &outline, 2.0);
+        assert_eq!(outside, Err(SpotFault::Strayed));
+    }
+}

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 const AGAIN: u32 = 200;
 
 /// A task is repeated for so long, s.
-const LEAST_S: f64 = 0.1;
+const MIN_S: f64 = 0.1;
 
 /// Each figure is the median of so many rounds.
 const ROUNDS: usize = 7;
@@ -109,7 +109,7 @@ fn frame_s(scene: &Scene, rounds: usize) -> Option<[f64; 2]> {
         let solved: Result<Vec<_>, _> = (0..count).map(step).collect();
         touches = solved.map_err(|error| println!("contact: {error}")).ok()?;
         (spent_s, times) = (spent_s + clock_s() - began, times + 1.0);
-        if spent_s > LEAST_S {
+        if spent_s > MIN_S {
             break;
         }
     }
@@ -125,7 +125,7 @@ fn again_s(mut task: impl FnMut()) -> f64 {
         task();
         times += 1;
         let spent = clock_s() - began;
-        if spent > LEAST_S {
+        if spent > MIN_S {
             return spent / f64::from(times);
         }
     }

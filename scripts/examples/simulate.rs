@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use domecast::sim::{Plan, Renderer};
-use domecast::track::{Frame, TrackOptions};
+use domecast::track::{CameraFrame, TrackOptions};
 use domecast::{Scene, Tracker, constants};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for number in 0..scene.frame_count() {
         let drawn = renderer.frame(number)?;
         let image = drawn.image.ok_or("the scene draws no frames")?;
-        let frame = Frame::new(image.width, image.height, image.channels, &image.bytes)?;
+        let frame = CameraFrame::new(image.width, image.height, image.channels, &image.bytes)?;
         let tracked = tracker.track(u64::from(number), &frame);
         let [felt, sd] = [tracked.wrench, tracked.wrench_sd].map(|w| w.map_or(f64::NAN, |w| w.force_n.z));
         println!("{number:5}  {:10.4}  {felt:10.4}  {sd:5.3}  {}", drawn.truth.wrench[2], tracked.status());

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use domecast::track::{Frame, TrackOptions};
+use domecast::track::{CameraFrame, TrackOptions};
 use domecast::{Constants, Tracker};
 
 /// Width, height, channels and bytes of a picture.
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut tracker = Tracker::new(&Constants::load(Path::new(constants))?, TrackOptions::default())?;
     for (number, path) in frames.iter().enumerate() {
         let (width, height, channels, bytes) = read(path)?;
-        let tracked = tracker.track(number as u64, &Frame::new(width, height, channels, &bytes)?);
+        let tracked = tracker.track(number as u64, &CameraFrame::new(width, height, channels, &bytes)?);
         print!("{path}: {}", tracked.status());
         // a frame without pose or wrench says why in its status
         if let (Some(pose), Some(wrench)) = (tracked.pose, tracked.wrench) {

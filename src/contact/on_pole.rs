@@ -16,7 +16,7 @@ use crate::state::ContactState;
 use domecast_optics::numeric::Rigid;
 
 /// Elements along the meridian: 4 times a power of two, from 8 to this.
-const MOST_ELEMENTS: usize = 1024;
+const MAX_ELEMENTS: usize = 1024;
 
 /// The solved contact.
 #[derive(Debug)]
@@ -52,7 +52,7 @@ impl OnPole {
         if depth_mm > DEEPEST * dome_mm {
             return Err(ContactError::TooDeep { depth_mm, limit_mm: DEEPEST * dome_mm });
         }
-        if !(8..=MOST_ELEMENTS).contains(&elements) || !elements.is_power_of_two() {
+        if !(8..=MAX_ELEMENTS).contains(&elements) || !elements.is_power_of_two() {
             let (field, allowed) = ("elements", "a power of two from 8 to 1024");
             return Err(ContactError::Dimension { field, value: elements as f64, allowed });
         }

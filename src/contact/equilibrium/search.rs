@@ -18,22 +18,22 @@ use domecast_optics::numeric::{Rigid, cross_matrix};
 use domecast_springs::{Displacement, MechanicsError, Suspension, Wrench};
 
 /// Contact solves that a balance may take.
-const MOST_SOLVES: u32 = 80;
+const MAX_SOLVES: u32 = 80;
 /// The search ends when the residual is below this part of the load; ten times that still counts as
 /// balanced.
 const TOLERANCE: f64 = 1e-7;
 /// Loads below this one are balanced as closely as it is, N.
-const LEAST_SCALE_N: f64 = 0.05;
+const MIN_SCALE_N: f64 = 0.05;
 
 /// Contact solves without any gain after which a search ends.
-const MOST_WITHOUT_GAIN: u32 = 20;
+const MAX_WITHOUT_GAIN: u32 = 20;
 
 /// How much closer than the balance a trial's contact is solved.
 const CLOSER: f64 = 1e-2;
 /// Starts that are tried where the models refuse the first.
-const MOST_STARTS: u32 = 6;
+const MAX_STARTS: u32 = 6;
 /// Times that a balance is looked for again after the contact was solved to its end.
-const MOST_ENDS: u32 = 4;
+const MAX_ENDS: u32 = 4;
 
 /// One trial of the unknowns.
 struct Trial {
@@ -206,7 +206,7 @@ impl Task<'_> {
         let mut trial = loop {
             match self.try_at(&mut solves, &search.x, first_off) {
                 Ok(trial) => break trial,
-                Err(error) if search.count >= MOST_STARTS => return Err(error),
+                Err(error) if search.count >= MAX_STARTS => return Err(error),
                 // A start that the models refuse is no answer to the task: from rest, then, and the object back to where
                 // it hardly touches.
                 Err(_) => {
@@ -229,7 +229,7 @@ impl Task<'_> {
         // What the frame before learnt of the stiffness serves this one.
         search.jacobian =
             learnt.filter(|j| j.nrows() == self.unknowns() && !trial.state.nodes.is_empty()).cloned();
-        for _ in 0..MOST_ENDS {
+        for _ in 0..MAX_ENDS {
             trial = self.search(&mut solves, &mut search, trial)?;
             if matches!(solves, Solves::Each) {
                 break;
@@ -239,7 +239,7 @@ impl Task<'_> {
             let last = self.try_at(&mut solves, &search.x, None);
             trial = last?;
             if trial.size <= TOLERANCE * self.scale(trial.wrench.force_n.length())
-                || search.count >= MOST_SOLVES
+                || search.count >= MAX_SOLVES
             {
                 break;
             }
@@ -249,7 +249,7 @@ impl Task<'_> {
 
     /// The load that residuals are measured by, N.
     fn scale(&self, force_n: f64) -> f64 {
-        force_n.max(self.force.map_or(0.0, |f| f.1.abs())).max(LEAST_SCALE_N)
+        force_n.max(self.force.map_or(0.0, |f| f.1.abs())).max(MIN_SCALE_N)
     }
 
     /// Broyden's method from a trial on, until it balances or nothing helps.
@@ -266,14 +266,14 @@ impl Task<'_> {
         };
         let (mut best_size, mut best_count) = (trial.size, search.count);
         // A contact whose forces have steps has no balance to be found.
-        while search.count < MOST_SOLVES.min(best_count + MOST_WITHOUT_GAIN) {
+        while search.count < MAX_SOLVES.min(best_count + MAX_WITHOUT_GAIN) {
             if trial.size <= 0.3 * TOLERANCE * self.scale(trial.wrench.force_n.length()) {
                 break;
             }
             let Some(step) = jacobian.clone().lu().solve(&-&trial.residual) else { break };
             let mut part = self.step_part(&step);
             let mut next = None;
-            while part > 1e-4 && search.count < MOST_SOLVES {
+            while part > 1e-4 && search.count < MAX_SOLVES {
                 search.count += 1;
                 let there = &search.x + &step * part;
                 if let Ok(found) = self.try_at(solves, &there, Some(trial.size))
@@ -318,7 +318,7 @@ impl Task<'_> {
 
     fn finish(&self, trial: Trial, search: Search) -> Result<Pressed, ContactError> {
         let (x, iterations) = (&search.x, search.count);
-        let scale = trial.wrench.force_n.length().max(LEAST_SCALE_N);
+        let scale = trial.wrench.force_n.length().max(MIN_SCALE_N);
         let displacement = Displacement::from_array(std::array::from_fn(|i| x[i]));
         let solid = self.suspension.spec().spring.solid_compression_mm();
         let bound = self.suspension.springs_at(&displacement).ok().and_then(|springs| {

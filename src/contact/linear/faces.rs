@@ -80,18 +80,18 @@ pub(crate) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, 
     let mut nodes: BTreeMap<usize, Option<Over>> = BTreeMap::new();
     let mut faces: BTreeMap<usize, (DVec3, Over)> = BTreeMap::new();
     for (number, at_mm) in near {
-        let (mut told_mm, mut shares) = (0.0, 0.0);
+        let (mut interpolated_mm, mut shares) = (0.0, 0.0);
         for &(node, share) in places.parts(grid, number).as_slice() {
             let seen = nodes.entry(node).or_insert_with(|| {
                 queries += 8.0;
                 over(grid.place(grid.node(node)))
             });
-            told_mm += share * seen.map_or(ahead_mm, |over| over.gap_mm);
+            interpolated_mm += share * seen.map_or(ahead_mm, |over| over.gap_mm);
             shares += share;
         }
         queries += 8.0;
         let Some(over) = over(at_mm) else { continue };
-        if shares > 0.0 && told_mm / shares - over.gap_mm > UNSEEN * spacing_mm {
+        if shares > 0.0 && interpolated_mm / shares - over.gap_mm > UNSEEN * spacing_mm {
             faces.insert(number, (at_mm, over));
         }
     }
@@ -101,10 +101,10 @@ pub(crate) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, 
         let node = grid.node(number);
         let hat = hat_places(grid.place(node), grid.spread(node));
         // What its hat tells of a node, a wall that runs over it does not show in.
-        let told_mm: f64 =
+        let interpolated_mm: f64 =
             hat.iter().map(|at_mm| over(*at_mm).map_or(0.25 * ahead_mm, |over| 0.25 * over.gap_mm)).sum();
         queries += 32.0;
-        is_fine |= seen.gap_mm < 0.0 && told_mm - seen.gap_mm > UNSEEN * spacing_mm;
+        is_fine |= seen.gap_mm < 0.0 && interpolated_mm - seen.gap_mm > UNSEEN * spacing_mm;
         let middle_mm = hat.iter().map(|at_mm| *at_mm * 0.25).sum();
         faces.insert(number, (middle_mm, seen));
     }

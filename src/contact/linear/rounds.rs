@@ -14,7 +14,7 @@ use crate::outcome::{NodeMemory, Status, TouchedNode, sum};
 use crate::state::ContactState;
 
 /// Rounds of planes and sweeps.
-const MOST_ROUNDS: u32 = 160;
+const MAX_ROUNDS: u32 = 160;
 /// Rounds are over when no node moves by more than this part of the radius.
 pub(crate) const SETTLED: f64 = 1e-8;
 /// A node may be left this part of the radius inside the object.
@@ -27,9 +27,9 @@ const CLOSENESS: f64 = 0.2;
 const SHRINKS: f64 = 0.7;
 const STALLED: u32 = 3;
 /// A plane turns by this part of its way at least.
-const LEAST_PART: f64 = 1e-6;
+const MIN_PART: f64 = 1e-6;
 /// Sweeps of one round.
-const MOST_SWEEPS: u32 = 400;
+const MAX_SWEEPS: u32 = 400;
 
 /// The candidates of one frame.
 pub(crate) struct Touch<'a> {
@@ -100,7 +100,7 @@ impl<'a> Touch<'a> {
         let mut moved_mm = FIRST_ROUND * radius;
         // Planes on an edge may flip between its faces; turned in part, they come to rest between.
         let (mut part, mut least_mm, mut stalled) = (1.0, f64::INFINITY, 0);
-        for count in 1..=MOST_ROUNDS {
+        for count in 1..=MAX_ROUNDS {
             // A round is solved as closely as the planes deserve: within what they still move.
             let swept = self.sweep((CLOSENESS * moved_mm).max(0.1 * settled_mm));
             moved_mm = self.displace();
@@ -114,10 +114,10 @@ impl<'a> Touch<'a> {
             if moved_mm < SHRINKS * least_mm {
                 (least_mm, stalled) = (moved_mm, 0);
             } else if stalled == STALLED {
-                (part, stalled) = (f64::max(0.6 * part, LEAST_PART), 0);
+                (part, stalled) = (f64::max(0.6 * part, MIN_PART), 0);
             }
         }
-        Rounds { count: MOST_ROUNDS, moved_mm, settled: false }
+        Rounds { count: MAX_ROUNDS, moved_mm, settled: false }
     }
 
     /// Pressures and friction for the planes.
@@ -128,8 +128,7 @@ impl<'a> Touch<'a> {
             .iter()
             .map(|c| Node { normal: c.normal, rest_gap_mm: c.rest_gap_mm, carried_mm: c.carried_mm })
             .collect();
-        let ended =
-            sweeps(&self.blocks, &nodes, self.elastomer.friction, &mut forces, wanted_mm, MOST_SWEEPS);
+        let ended = sweeps(&self.blocks, &nodes, self.elastomer.friction, &mut forces, wanted_mm, MAX_SWEEPS);
         self.work += ended.work;
         for (candidate, force) in self.candidates.iter_mut().zip(forces.chunks_exact(3)) {
             candidate.force_n = DVec3::from_slice(force);

@@ -19,16 +19,16 @@ use crate::state::ContactState;
 use domecast_optics::numeric::Rigid;
 
 /// Looks for nodes that no plane held back.
-const MOST_LOOKS: u32 = 8;
+const MAX_LOOKS: u32 = 8;
 
 /// Part of the nodes' distance by which an object that touches nothing may reach into the dome.
-const LEAST_SEEN: f64 = 0.5;
+const MIN_SEEN: f64 = 0.5;
 
 /// Where no node bears a force, the object must not reach far into the dome between the nodes.
 fn check_seen(placed: &Placed, deepest_mm: DVec3, spacing_mm: f64) -> Result<(), ContactError> {
     let radius = deepest_mm.length();
     match placed.walk_out(deepest_mm, -deepest_mm / radius, radius) {
-        Some((depth_mm, _)) if depth_mm > LEAST_SEEN * spacing_mm => {
+        Some((depth_mm, _)) if depth_mm > MIN_SEEN * spacing_mm => {
             Err(ContactError::Unseen { depth_mm, spacing_mm })
         }
         _ => Ok(()),
@@ -116,7 +116,7 @@ impl<'a> Solver<'a> {
             return Ok(state);
         }
         let mut field = self.field();
-        for look in 0..if self.fine.is_none() { MOST_LOOKS } else { 0 } {
+        for look in 0..if self.fine.is_none() { MAX_LOOKS } else { 0 } {
             let missed = self.missed(&field);
             if missed.is_empty() {
                 break;
@@ -125,7 +125,7 @@ impl<'a> Solver<'a> {
             ended = self.touch.run(settled_mm);
             field = self.field();
             // The last ones were not looked at again.
-            ended.settled &= look + 1 < MOST_LOOKS;
+            ended.settled &= look + 1 < MAX_LOOKS;
         }
         let state = self.state(state, ended, field);
         if state.status == Status::Free {

@@ -31,7 +31,7 @@ pub(crate) fn look_spacing() -> f64 {
 /// Looks from which the search goes on.
 const STARTS: usize = 3;
 /// Distances that one search may ask for; a search takes some two hundred, one along an edge of the object more.
-const MOST_QUERIES: usize = 1_500;
+const MAX_QUERIES: usize = 1_500;
 /// Turn of the searched directions from step to step, rad: the golden angle, so that one of them soon lies along an
 /// edge on which the others only creep.
 const SEARCH_TURN: f64 = 2.399_963_229_728_653;
@@ -99,7 +99,7 @@ fn descend(
     mut step: f64,
 ) -> (f64, DVec3, usize) {
     let mut queries = 0;
-    while step > 1e-7 && queries < MOST_QUERIES {
+    while step > 1e-7 && queries < MAX_QUERIES {
         let (u, v) = direction.any_orthonormal_pair();
         let (sine, cosine) = (SEARCH_TURN * (queries / 4) as f64).sin_cos();
         let (u, v) = (u * cosine + v * sine, v * cosine - u * sine);

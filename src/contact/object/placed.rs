@@ -6,7 +6,7 @@ use super::solid::Solid;
 use domecast_optics::numeric::Rigid;
 
 /// Steps of a walk to the surface.
-const MOST_STEPS: usize = 64;
+const MAX_STEPS: usize = 64;
 
 /// An object at its place, seen from the dome.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +78,7 @@ impl Placed {
         }
         let tiny = 1e-10 * most_mm;
         let (mut inside, mut way) = (0.0, 0.0_f64);
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let slope = outward.dot(along);
             let step = if value < 0.0 {
                 inside = f64::max(inside, way);

@@ -199,7 +199,7 @@ impl<'a> Pictures<'a> {
         &mut self,
         output: &Output,
         number: u64,
-        frame: &Frame<'_>,
+        frame: &CameraFrame<'_>,
         tracked: &Tracked,
     ) -> Result<(), Failure> {
         if let Some(folder) = self.overlay {

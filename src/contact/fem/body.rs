@@ -97,24 +97,25 @@ impl Body {
         self.kinds.len()
     }
 
-    fn lives(&self, unknown: usize, m: f64) -> bool {
+    fn lives(&self, unknown: usize, m: usize) -> bool {
         match self.kinds[unknown] {
             Kind::Free => true,
             Kind::Never => false,
-            Kind::Only(harmonic) => harmonic as f64 == m,
+            Kind::Only(harmonic) => harmonic == m,
         }
     }
 
     /// K0 + m K1 + m^2 K2 over the sweep, dead unknowns replaced by ones on the diagonal.
-    fn matrix(&self, m: f64) -> Vec<f64> {
-        let sweep = if m == 0.0 { 2.0 * PI } else { PI };
+    fn matrix(&self, m: usize) -> Vec<f64> {
+        let sweep = if m == 0 { 2.0 * PI } else { PI };
+        let h = m as f64;
         let mut values = Vec::with_capacity(self.rows.len());
         for column in 0..self.unknowns() {
             let alive = self.lives(column, m);
             for at in self.columns[column]..self.columns[column + 1] {
                 let row = self.rows[at];
                 values.push(if alive && self.lives(row, m) {
-                    sweep * (self.values[0][at] + m * (self.values[1][at] + m * self.values[2][at]))
+                    sweep * (self.values[0][at] + h * (self.values[1][at] + h * self.values[2][at]))
                 } else {
                     f64::from(u8::from(row == column))
                 });
@@ -123,8 +124,8 @@ impl Body {
         values
     }
 
-    /// Factors one harmonic. Above 1 its number need not be whole: the stiffness is a polynomial in it.
-    pub fn factor(&self, m: f64) -> Result<Harmonic, ContactError> {
+    /// Factors one harmonic.
+    pub fn factor(&self, m: usize) -> Result<Harmonic, ContactError> {
         let values = self.matrix(m);
         let n = self.unknowns();
         let view = SymbolicSparseColMatRef::new_checked(n, n, &self.columns, None, &self.rows);
@@ -137,11 +138,6 @@ impl Body {
         Ok(Harmonic { factors })
     }
 
-    /// Nodes of the surface, from the pole to the rim.
-    pub(super) fn surface_nodes(&self) -> usize {
-        self.mesh.surface.len()
-    }
-
     /// The unknowns of surface node `p` in the direction r, z or phi (0, 1, 2), with weights.
     pub(super) fn surface_unknown(&self, p: usize, direction: usize) -> (usize, f64) {
         let node = self.mesh.surface[p] as usize;
@@ -150,7 +146,7 @@ impl Body {
     }
 
     /// Puts zeros where a harmonic has no unknown.
-    pub(super) fn mask(&self, m: f64, rhs: &mut Mat<f64>) {
+    pub(super) fn mask(&self, m: usize, rhs: &mut Mat<f64>) {
         for row in 0..self.unknowns() {
             if !self.lives(row, m) {
                 for column in 0..rhs.ncols() {

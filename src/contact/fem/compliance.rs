@@ -2,16 +2,18 @@
 
 use std::f64::consts::TAU;
 
+use faer::Mat;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::between::Places;
 use super::body::Body;
 use super::grid::{Grid, GridNode};
-use super::harmonics::harmonics;
-use super::response::{AXES, Solved, Spectrum};
 use crate::elastomer::Elastomer;
 use crate::error::ContactError;
+
+/// Directions in a node's frame: r, z, phi.
+const AXES: usize = 3;
 
 /// Compliance of the bonded dome between contact nodes, and its spectrum for the field.
 #[derive(Debug)]
@@ -26,6 +28,15 @@ pub(crate) struct Compliance {
     spectrum: Vec<Spectrum>,
 }
 
+/// One harmonic's response.
+#[derive(Debug)]
+pub(crate) struct Spectrum {
+    /// First ring that this harmonic reaches.
+    pub first_ring: usize,
+    /// Column by column, (ring - first_ring, direction): the surface nodes' three amplitudes, hats included, mm/N.
+    pub columns: Vec<Vec<f64>>,
+}
+
 impl Compliance {
     /// Factors the dome's stiffness for every harmonic and solves it for every ring.
     pub fn new(elastomer: &Elastomer, elements: usize) -> Result<Self, ContactError> {
@@ -33,7 +44,8 @@ impl Compliance {
         let body = Body::new(elastomer, elements)?;
         let last = (0..grid.elements).map(|ring| grid.harmonics(ring)).max().unwrap_or(1);
         let hats: Vec<Vec<(usize, f64)>> = (0..grid.elements).map(|ring| grid.hat(ring)).collect();
-        let solved = harmonics(&grid, &body, &hats, last)?;
+        let solved: Vec<(Spectrum, Vec<f64>)> =
+            (0..last).into_par_iter().map(|m| harmonic(&grid, &body, &hats, m)).collect::<Result<_, _>>()?;
         let mut table = vec![[0.0; 9]; grid.elements * (grid.elements + 1) / 2 * (grid.azimuths / 2 + 1)];
         let steps = grid.azimuths / 2 + 1;
         table.par_chunks_mut(steps).enumerate().for_each(|(pair, entries)| {
@@ -81,8 +93,83 @@ fn rings_of(pair: usize) -> (usize, usize) {
     (i, pair - i * (i + 1) / 2)
 }
 
+/// A ring's unit force along an axis in one harmonic, as parts of the surface nodes' (node, direction).
+///
+/// The pole is one node: it pushes along z in the harmonic 0 alone, and sideways in the harmonic 1 alone, where
+/// the same force is half in u_r and half in -u_phi at every azimuth.
+fn ring_load(
+    grid: &Grid,
+    hat: &[(usize, f64)],
+    ring: usize,
+    axis: usize,
+    m: usize,
+) -> Vec<((usize, usize), f64)> {
+    if grid.harmonics(ring) <= m {
+        return Vec::new();
+    }
+    let factor = grid.hat_harmonic(ring, m);
+    let along =
+        |direction: usize, factor: f64| hat.iter().map(move |(p, part)| ((*p, direction), part * factor));
+    match (ring, axis, m) {
+        (0, 1, 0) => along(1, 1.0).collect(),
+        (0, 0 | 2, 1) => {
+            let half = if axis == 0 { 0.5 } else { -0.5 };
+            along(0, half).chain(along(2, -half)).collect()
+        }
+        (0, ..) => Vec::new(),
+        _ => along(axis, factor).collect(),
+    }
+}
+
+/// Solves one harmonic: the surface's response to every ring that has a hat, and the rings' own, hats included.
+pub(super) fn harmonic(
+    grid: &Grid,
+    body: &Body,
+    hats: &[Vec<(usize, f64)>],
+    m: usize,
+) -> Result<(Spectrum, Vec<f64>), ContactError> {
+    let first_ring = (0..hats.len()).find(|ring| grid.harmonics(*ring) > m).unwrap_or(hats.len());
+    // Rings between that do not reach this harmonic have zero columns, and are rare.
+    let rings = hats.len() - first_ring;
+    let loads: Vec<Vec<((usize, usize), f64)>> = (0..AXES * rings)
+        .map(|column| {
+            let ring = first_ring + column / AXES;
+            ring_load(grid, &hats[ring], ring, column % AXES, m)
+        })
+        .collect();
+    let mut rhs = Mat::<f64>::zeros(body.unknowns(), AXES * rings);
+    for (column, load) in loads.iter().enumerate() {
+        for &((p, direction), part) in load {
+            let (unknown, sign) = body.surface_unknown(p, direction);
+            rhs[(unknown, column)] += sign * part;
+        }
+    }
+    body.mask(m, &mut rhs);
+    body.factor(m)?.solve(&mut rhs);
+    let surface = 2 * grid.elements + 1;
+    let mut columns = Vec::with_capacity(AXES * rings);
+    for column in 0..AXES * rings {
+        let mut values = Vec::with_capacity(AXES * surface);
+        for p in 0..surface {
+            for axis in 0..AXES {
+                let (unknown, sign) = body.surface_unknown(p, axis);
+                values.push(sign * rhs[(unknown, column)]);
+            }
+        }
+        columns.push(values);
+    }
+    // What the rings see with their own hats.
+    let mut own = Vec::with_capacity((AXES * rings).pow(2));
+    for values in &columns {
+        for load in &loads {
+            own.push(load.iter().map(|&((p, direction), part)| part * values[AXES * p + direction]).sum());
+        }
+    }
+    Ok((Spectrum { first_ring, columns }, own))
+}
+
 /// Sums the harmonics of one pair of rings over the azimuth steps.
-fn fill_pair(grid: &Grid, solved: &[Solved], i: usize, j: usize, entries: &mut [[f64; 9]]) {
+fn fill_pair(grid: &Grid, solved: &[(Spectrum, Vec<f64>)], i: usize, j: usize, entries: &mut [[f64; 9]]) {
     let waves: Vec<(f64, f64)> = (0..grid.azimuths)
         .map(|k| {
             let (sine, cosine) = (TAU * k as f64 / grid.azimuths as f64).sin_cos();

@@ -11,9 +11,7 @@ mod compliance;
 mod element;
 mod field;
 mod grid;
-mod harmonics;
 mod mesh;
-mod response;
 mod revolved;
 
 pub(crate) use between::Parts;

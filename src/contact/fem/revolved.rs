@@ -5,9 +5,9 @@ use std::f64::consts::FRAC_PI_2;
 use glam::{DMat3, DVec3};
 
 use super::body::Body;
+use super::compliance::{Spectrum, harmonic};
 use super::element::quadratic;
 use super::grid::{Grid, GridNode};
-use super::response::{Spectrum, harmonic};
 use crate::elastomer::Elastomer;
 use crate::error::ContactError;
 

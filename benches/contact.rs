@@ -4,7 +4,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use domecast::contact::{Contact, Elastomer, Indenter, Level, Pressed, Solid};
+use domecast::contact::{Contact, Elastomer, Indenter, Level, Pressed, ContactSolid};
 use domecast::design::suspension_of;
 use domecast::numeric::Rigid;
 use domecast::springs::Suspension;
@@ -32,7 +32,7 @@ fn pressed(
 
 fn levels(c: &mut Criterion) {
     let Some((elastomer, suspension)) = dome() else { return };
-    let Ok(sphere) = Solid::sphere(0.8 * elastomer.dome_radius_mm) else { return };
+    let Ok(sphere) = ContactSolid::sphere(0.8 * elastomer.dome_radius_mm) else { return };
     let ball = Indenter::rigid(sphere);
     let linear = |part: f64| Level::Linear { element_mm: part * elastomer.dome_radius_mm };
     let frames = [

@@ -1,7 +1,7 @@
 //! What touches: the dome's material and the object.
 
 use crate::error::{ContactError, positive};
-use crate::object::Solid;
+use crate::object::ContactSolid;
 
 /// The dome as an elastic body: a solid hemisphere, bonded to the rigid sheet by its base.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +60,7 @@ fn poisson(field: &'static str, value: f64) -> Result<(), ContactError> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Indenter {
     /// Its shape.
-    pub solid: Solid,
+    pub solid: ContactSolid,
     /// Its Young's modulus, MPa; `None`: rigid.
     pub young_mpa: Option<f64>,
     /// Its Poisson's ratio; without meaning for a rigid object.
@@ -69,7 +69,7 @@ pub struct Indenter {
 
 impl Indenter {
     /// A rigid object.
-    pub fn rigid(solid: Solid) -> Self {
+    pub fn rigid(solid: ContactSolid) -> Self {
         Self { solid, young_mpa: None, poisson: 0.3 }
     }
 

@@ -32,7 +32,7 @@ pub use equilibrium::{PressStatus, Pressed};
 pub use error::ContactError;
 pub use estimate::{Estimate, estimate, most_force_n};
 pub use level::Level;
-pub use object::{Distance, Solid};
+pub use object::{Distance, ContactSolid};
 pub use on_pole::OnPole;
 pub use outcome::{Extent, Status, TouchedNode};
 pub use state::ContactState;

@@ -10,7 +10,7 @@ use crate::error::{ContactError, positive};
 use crate::fem::{Parts, Revolved};
 use crate::level::DEEPEST;
 use crate::linear::{Candidate, Spot, Touch, Way};
-use crate::object::{Placed, Solid};
+use crate::object::{Placed, ContactSolid};
 use crate::outcome::Status;
 use crate::state::ContactState;
 use domecast_optics::numeric::Rigid;
@@ -56,7 +56,7 @@ impl OnPole {
             let (field, allowed) = ("elements", "a power of two from 8 to 1024");
             return Err(ContactError::Dimension { field, value: elements as f64, allowed });
         }
-        let solid = Solid::sphere(radius_mm)?;
+        let solid = ContactSolid::sphere(radius_mm)?;
         let center_mm = DVec3::Z * (dome_mm + radius_mm - depth_mm);
         let placed = Placed::new(solid.clone(), Rigid::from_translation(center_mm));
         // A rigid ball touches nothing that it did not overlap: the two spheres' circle.
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn the_linear_level_nears_the_ball_on_the_pole() {
         let elastomer = Elastomer { dome_radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, friction: 0.6 };
-        let ball = Indenter { solid: Solid::sphere(5.0).unwrap(), young_mpa: None, poisson: 0.3 };
+        let ball = Indenter { solid: ContactSolid::sphere(5.0).unwrap(), young_mpa: None, poisson: 0.3 };
         let depth_mm = 0.5;
         let at = Rigid::from_translation(DVec3::Z * (15.0 - depth_mm));
         let places: Vec<DVec3> = (0..60)

@@ -292,11 +292,11 @@ fn truth_tells_how_the_contact_was_solved() {
 /// No known scene makes the linear level stop at its bound; what truth tells then holds for any contact that says so.
 #[test]
 fn a_contact_at_its_bound_is_told_with_what_is_left() {
-    use domecast_contact::{Contact, Indenter, Level, Solid, Status};
+    use domecast_contact::{Contact, Indenter, Level, ContactSolid, Status};
     use domecast_optics::numeric::Rigid;
     let still = scene("still.json");
     let contact = Contact::new(elastomer_of(still.design()), Level::Geometric).expect("a level");
-    let ball = Indenter::rigid(Solid::sphere(4.0).expect("a ball"));
+    let ball = Indenter::rigid(ContactSolid::sphere(4.0).expect("a ball"));
     let at = Rigid::from_translation(DVec3::new(0.0, 0.0, 13.2));
     let mut pressed = contact.press(&ball, still.suspension(), &at, None).expect("pressed");
     pressed.state.status = Status::BoundReached;

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::clock::{TimeLimit, time};
 use super::sweep::{Law, Sweep, SweepSample, sizes};
-use domecast_contact::{Contact, ContactError, ContactState, Indenter, Level, OnPole, Solid};
+use domecast_contact::{Contact, ContactError, ContactState, Indenter, Level, OnPole, ContactSolid};
 use domecast_design::Design;
 use domecast_design::layout::Layout;
 use domecast_fab::numbers::significant;
@@ -35,7 +35,7 @@ pub fn sweep(
 ) -> Result<Sweep, ContactError> {
     let elastomer = domecast_sim::elastomer_of(design);
     let radius_mm = elastomer.dome_radius_mm;
-    let ball = Indenter { solid: Solid::sphere(BALL * radius_mm)?, young_mpa: None, poisson: 0.3 };
+    let ball = Indenter { solid: ContactSolid::sphere(BALL * radius_mm)?, young_mpa: None, poisson: 0.3 };
     let at = Rigid::from_translation(DVec3::Z * radius_mm * (1.0 + BALL - DEPTH));
     let places: Vec<DVec3> = layout.dots.iter().map(|dot| dot.surface_mm).collect();
     let arc_mm = std::f64::consts::FRAC_PI_2 * radius_mm;

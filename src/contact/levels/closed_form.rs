@@ -47,21 +47,7 @@ pub(crate) fn closed_form(
     let normal = at_mm / radius;
     let polar = normal.z.clamp(-1.0, 1.0).acos();
     let back = held(elastomer, polar) / (elastomer.plane_strain_mpa() * radius);
-    let (first, patch_at): (DVec3, Box<dyn Fn(f64) -> Option<Patch>>) = match feature {
-        Feature::Smooth { along, across, first, .. } => {
-            let gap = [0.5 * (1.0 / radius + along), 0.5 * (1.0 / radius + across)];
-            // The first axis goes with the smaller curvature.
-            let (gap, first) = if gap[0] <= gap[1] {
-                (gap, first)
-            } else {
-                ([gap[1], gap[0]], normal.cross(first).normalize_or(first))
-            };
-            (first, Box::new(move |depth| ellipse(depth, gap, modulus)))
-        }
-        Feature::Apex { slope, .. } => {
-            (DVec3::X, Box::new(move |depth| Some(cone(depth, 1.0 / radius, slope, modulus))))
-        }
-    };
+    let (first, patch_at) = patches(&feature, normal, radius, modulus);
     // Half-space approach d with d - back F(d) = depth: the finite body's approach.
     let law = |d: f64| {
         let force = patch_at(d).map_or(0.0, |patch| patch.force_n);
@@ -105,6 +91,28 @@ pub(crate) fn closed_form(
         turn_rad: drag.turn_rad,
     });
     Ok(state)
+}
+
+/// The first axis of the patch, and the patch at an approach of the half-spaces, mm.
+type Patches = (DVec3, Box<dyn Fn(f64) -> Option<Patch>>);
+
+/// The patches of a feature that touches along a normal.
+fn patches(feature: &Feature, normal: DVec3, radius: f64, modulus: f64) -> Patches {
+    match *feature {
+        Feature::Smooth { along, across, first, .. } => {
+            let gap = [0.5 * (1.0 / radius + along), 0.5 * (1.0 / radius + across)];
+            // The first axis goes with the smaller curvature.
+            let (gap, first) = if gap[0] <= gap[1] {
+                (gap, first)
+            } else {
+                ([gap[1], gap[0]], normal.cross(first).normalize_or(first))
+            };
+            (first, Box::new(move |depth| ellipse(depth, gap, modulus)))
+        }
+        Feature::Apex { slope, .. } => {
+            (DVec3::X, Box::new(move |depth| Some(cone(depth, 1.0 / radius, slope, modulus))))
+        }
+    }
 }
 
 /// Rings and spokes over the ellipse; the forces are scaled to the patch's own, exactly.

@@ -46,32 +46,7 @@ pub(crate) fn overlap(placed: &Placed, radius: f64) -> Overlap {
     let azimuths: [(f64, f64); SPOKES] =
         std::array::from_fn(|k| ((k as f64 + 0.5) * std::f64::consts::TAU / SPOKES as f64).sin_cos());
     let spokes = azimuths.map(|(sine, cosine)| u * cosine + v * sine);
-    // The cap that holds every touched look, then the same cap looked at closely.
-    let (center, reach) = placed.solid.bounding_sphere();
-    let center = placed.sensor_from_object().point(center);
-    let coarse = first_looks()
-        .filter(|d| (*d * radius).distance(center) < reach && placed.distance(*d * radius).0 < 0.0)
-        .chain([deepest_mm / radius])
-        .map(|d| d.dot(axis))
-        .fold(1.0, f64::min)
-        .clamp(-1.0, 1.0)
-        .acos()
-        + 1.5 * look_spacing();
-    let touched = |angle: f64| {
-        let (sine, cosine) = angle.sin_cos();
-        spokes.iter().step_by(2).any(|spoke| {
-            let d = axis * cosine + *spoke * sine;
-            d.z >= 0.0 && placed.distance(d * radius).0 < 0.0
-        })
-    };
-    let rings = (1..=RINGS).rev().find(|ring| touched(coarse * *ring as f64 / RINGS as f64)).unwrap_or(0);
-    // The edge by bisection, so that the samples move smoothly with the object.
-    let (mut low, mut high) =
-        (coarse * rings as f64 / RINGS as f64, coarse * (rings + 1) as f64 / RINGS as f64);
-    for _ in 0..30 {
-        let middle = 0.5 * (low + high);
-        if touched(middle) { low = middle } else { high = middle }
-    }
+    let high = touched_edge_rad(placed, radius, deepest_mm, axis, &spokes);
     let cap = (1.02 * high).min(std::f64::consts::PI);
     found.queries += FIRST_LOOK + (RINGS + 30) * (SPOKES / 2);
     let (mut first, mut second) = (0.0, 0.0);
@@ -112,6 +87,43 @@ pub(crate) fn overlap(placed: &Placed, radius: f64) -> Overlap {
         found.distance_mm = -found.samples.iter().map(|(_, _, way, _)| *way).fold(0.0, f64::max);
     }
     found
+}
+
+/// Angle about an axis of the cap that holds every touched look, to the last bit of a bisection.
+fn touched_edge_rad(
+    placed: &Placed,
+    radius: f64,
+    deepest_mm: DVec3,
+    axis: DVec3,
+    spokes: &[DVec3; SPOKES],
+) -> f64 {
+    // The cap that holds every touched look, then the same cap looked at closely.
+    let (center, reach) = placed.solid.bounding_sphere();
+    let center = placed.sensor_from_object().point(center);
+    let coarse = first_looks()
+        .filter(|d| (*d * radius).distance(center) < reach && placed.distance(*d * radius).0 < 0.0)
+        .chain([deepest_mm / radius])
+        .map(|d| d.dot(axis))
+        .fold(1.0, f64::min)
+        .clamp(-1.0, 1.0)
+        .acos()
+        + 1.5 * look_spacing();
+    let touched = |angle: f64| {
+        let (sine, cosine) = angle.sin_cos();
+        spokes.iter().step_by(2).any(|spoke| {
+            let d = axis * cosine + *spoke * sine;
+            d.z >= 0.0 && placed.distance(d * radius).0 < 0.0
+        })
+    };
+    let rings = (1..=RINGS).rev().find(|ring| touched(coarse * *ring as f64 / RINGS as f64)).unwrap_or(0);
+    // The edge by bisection, so that the samples move smoothly with the object.
+    let (mut low, mut high) =
+        (coarse * rings as f64 / RINGS as f64, coarse * (rings + 1) as f64 / RINGS as f64);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if touched(middle) { low = middle } else { high = middle }
+    }
+    high
 }
 
 /// What presses on a sample is at most this often its distance from the object's surface. A face that is met head on

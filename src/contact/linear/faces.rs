@@ -38,14 +38,14 @@ struct Over {
     gap_mm: f64,
 }
 
-/// The faces of an object over the dome, if it is finer than the nodes there; and the distances asked for.
-pub(crate) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, f64) {
+/// Places no farther from an object than `ahead_mm`, with their numbers; the way into it, of no unit length; and the
+/// distances asked for.
+fn near_places(
+    placed: &Placed,
+    compliance: &Compliance,
+    ahead_mm: f64,
+) -> (Vec<(usize, DVec3)>, DVec3, f64) {
     let (grid, places) = (&compliance.grid, &compliance.places);
-    let spacing_mm = grid.radius_mm * std::f64::consts::FRAC_PI_2 / grid.elements as f64;
-    if placed.ball().is_some_and(|(_, radius_mm)| radius_mm > ROUND * spacing_mm) {
-        return (None, 0.0);
-    }
-    let ahead_mm = AHEAD * spacing_mm;
     let (mut near, mut queries) = (Vec::new(), 0.0);
     let mut inward = DVec3::ZERO;
     for row in places.rows(grid) {
@@ -66,6 +66,18 @@ pub(crate) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, 
             }
         }
     }
+    (near, inward, queries)
+}
+
+/// The faces of an object over the dome, if it is finer than the nodes there; and the distances asked for.
+pub(crate) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, f64) {
+    let (grid, places) = (&compliance.grid, &compliance.places);
+    let spacing_mm = grid.radius_mm * std::f64::consts::FRAC_PI_2 / grid.elements as f64;
+    if placed.ball().is_some_and(|(_, radius_mm)| radius_mm > ROUND * spacing_mm) {
+        return (None, 0.0);
+    }
+    let ahead_mm = AHEAD * spacing_mm;
+    let (near, inward, mut queries) = near_places(placed, compliance, ahead_mm);
     let Some(inward) = inward.try_normalize() else { return (None, queries) };
     let over = |at_mm: DVec3| -> Option<Over> {
         let start_mm = at_mm - inward * ahead_mm;

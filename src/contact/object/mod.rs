@@ -11,4 +11,4 @@ pub(crate) use deepest::{FIRST_LOOK, deepest, deepest_from, first_looks, look_sp
 pub use distance::Distance;
 pub(crate) use feature::{Feature, feature_at};
 pub(crate) use placed::Placed;
-pub use solid::Solid;
+pub use solid::ContactSolid;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::solid::Solid;
+use super::solid::ContactSolid;
 use domecast_optics::numeric::Rigid;
 
 /// Steps of a walk to the surface.
@@ -11,13 +11,13 @@ const MAX_STEPS: usize = 64;
 /// An object at its place, seen from the dome.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Placed {
-    pub solid: Solid,
+    pub solid: ContactSolid,
     sensor_from_object: Rigid,
     object_from_sensor: Rigid,
 }
 
 impl Placed {
-    pub fn new(solid: Solid, sensor_from_object: Rigid) -> Self {
+    pub fn new(solid: ContactSolid, sensor_from_object: Rigid) -> Self {
         Self { solid, sensor_from_object, object_from_sensor: sensor_from_object.inverse() }
     }
 

@@ -11,7 +11,7 @@ use domecast_mesh::TriMesh;
 
 /// A solid object, checked when it was made; cheap to clone.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Solid(pub(super) Form);
+pub struct ContactSolid(pub(super) Form);
 
 /// What a solid is.
 #[derive(Debug, Clone)]
@@ -40,7 +40,7 @@ impl PartialEq for Form {
     }
 }
 
-impl Solid {
+impl ContactSolid {
     /// A ball about the origin.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ fn smooth(element_mm: f64) -> Contact {
     Contact::new(elastomer, Level::Linear { element_mm }).unwrap()
 }
 
-fn force(contact: &Contact, solid: &Solid, at_mm: DVec3) -> DVec3 {
+fn force(contact: &Contact, solid: &ContactSolid, at_mm: DVec3) -> DVec3 {
     let object = Indenter::rigid(solid.clone());
     let state = contact.solve(&object, &Rigid::from_translation(at_mm), None).unwrap();
     assert_eq!(state.status, Status::Solved, "{at_mm}: {} {}", state.residual_mm, state.penetration_mm);
@@ -22,7 +22,7 @@ fn force(contact: &Contact, solid: &Solid, at_mm: DVec3) -> DVec3 {
 fn a_box_is_a_box_as_a_mesh_too() {
     let contact = smooth(1.0);
     let size = DVec3::new(5.0, 6.0, 7.0);
-    let (exact, mesh) = (Solid::cuboid(size).unwrap(), Solid::mesh(&box_mesh(size)).unwrap());
+    let (exact, mesh) = (ContactSolid::cuboid(size).unwrap(), ContactSolid::mesh(&box_mesh(size)).unwrap());
     for (x, depth) in [(0.0, 0.2), (0.3, 0.7), (3.0, 0.5)] {
         let at = DVec3::new(x, 0.1, 10.0 - depth + 3.5);
         let apart = force(&contact, &exact, at) - force(&contact, &mesh, at);
@@ -32,7 +32,7 @@ fn a_box_is_a_box_as_a_mesh_too() {
 
 #[test]
 fn long_a_thin_wall_is_met_wherever_it_comes_down() {
-    let wall = Solid::cuboid(DVec3::new(10.0, 0.4, 6.0)).unwrap();
+    let wall = ContactSolid::cuboid(DVec3::new(10.0, 0.4, 6.0)).unwrap();
     let fine = smooth(0.3);
     for depth in [0.4, 1.0] {
         let expected = -force(&fine, &wall, DVec3::new(0.0, 0.07, 13.0 - depth)).z;
@@ -55,7 +55,7 @@ fn long_a_thin_wall_is_met_wherever_it_comes_down() {
 
 #[test]
 fn a_little_more_depth_is_a_little_more_force() {
-    let wall = Solid::cuboid(DVec3::new(10.0, 0.4, 6.0)).unwrap();
+    let wall = ContactSolid::cuboid(DVec3::new(10.0, 0.4, 6.0)).unwrap();
     let contact = smooth(0.5);
     let mut last = 0.0;
     for step in 0..16 {
@@ -69,7 +69,7 @@ fn a_little_more_depth_is_a_little_more_force() {
 #[test]
 fn a_needle_between_the_nodes_is_said() {
     let contact = smooth(1.0);
-    let needle = Indenter::rigid(Solid::cylinder(0.05, 6.0).unwrap());
+    let needle = Indenter::rigid(ContactSolid::cylinder(0.05, 6.0).unwrap());
     let pose = Rigid::from_translation(DVec3::new(0.29, 0.17, 12.0));
     let told = contact.solve(&needle, &pose, None).unwrap_err();
     assert!(matches!(told, ContactError::Unseen { .. }), "{told}");

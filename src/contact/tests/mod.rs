@@ -50,7 +50,7 @@ fn suspension() -> Suspension {
 }
 
 fn ball(radius_mm: f64) -> Indenter {
-    Indenter::rigid(Solid::sphere(radius_mm).unwrap())
+    Indenter::rigid(ContactSolid::sphere(radius_mm).unwrap())
 }
 
 /// A ball that reaches `depth_mm` into the dome at a polar angle.
@@ -139,9 +139,9 @@ fn no_object_presses_harder_than_is_said() {
     for depth in [0.2, 1.0] {
         let raised = |height: f64| Rigid::from_translation(DVec3::Z * (10.0 - depth + height));
         for (object, pose) in [
-            (rigid(Solid::cuboid(DVec3::new(30.0, 30.0, 8.0)).unwrap()), raised(4.0)),
-            (rigid(Solid::cylinder(3.0, 8.0).unwrap()), raised(4.0)),
-            (rigid(Solid::sphere(60.0).unwrap()), raised(60.0)),
+            (rigid(ContactSolid::cuboid(DVec3::new(30.0, 30.0, 8.0)).unwrap()), raised(4.0)),
+            (rigid(ContactSolid::cylinder(3.0, 8.0).unwrap()), raised(4.0)),
+            (rigid(ContactSolid::sphere(60.0).unwrap()), raised(60.0)),
         ] {
             let force_n = contact.solve(&object, &pose, None).unwrap().wrench.force_n.length();
             let most_n = most_force_n(&silicone(), &object, depth);
@@ -204,7 +204,7 @@ fn nearly_incompressible_domes_do_not_lock() {
 #[test]
 fn a_press_balances_at_every_level() {
     let suspension = suspension();
-    for solid in [Solid::sphere(5.0).unwrap(), Solid::cuboid(DVec3::splat(12.0)).unwrap()] {
+    for solid in [ContactSolid::sphere(5.0).unwrap(), ContactSolid::cuboid(DVec3::splat(12.0)).unwrap()] {
         let object = Indenter::rigid(solid);
         for level in [Level::Geometric, Level::ClosedForm, Level::Linear { element_mm: 1.0 }] {
             let contact = Contact::new(silicone(), level).unwrap();
@@ -237,7 +237,7 @@ fn a_balance_that_goes_on_from_the_last_frame_is_the_one_found_afresh() {
     let smooth = Elastomer { friction: 0.0, ..silicone() };
     let contact = Contact::new(smooth, Level::Linear { element_mm: 1.0 }).unwrap();
     let suspension = suspension();
-    for solid in [Solid::sphere(5.0).unwrap(), Solid::mesh(&box_mesh(DVec3::splat(9.0))).unwrap()] {
+    for solid in [ContactSolid::sphere(5.0).unwrap(), ContactSolid::mesh(&box_mesh(DVec3::splat(9.0))).unwrap()] {
         let object = Indenter::rigid(solid);
         let mut before: Option<Pressed> = None;
         for x in [0.0, 0.2, 0.4, 1.5] {
@@ -262,7 +262,7 @@ fn a_balance_that_goes_on_from_the_last_frame_is_the_one_found_afresh() {
 fn edges_with_much_friction_come_to_rest() {
     let rough = Elastomer { friction: 2.0, ..silicone() };
     let contact = Contact::new(rough, Level::Linear { element_mm: 1.0 }).unwrap();
-    let object = Indenter::rigid(Solid::cuboid(DVec3::new(5.0, 7.0, 6.0)).unwrap());
+    let object = Indenter::rigid(ContactSolid::cuboid(DVec3::new(5.0, 7.0, 6.0)).unwrap());
     let mut before: Option<ContactState> = None;
     for step in 0..12 {
         let turn = DVec3::new(0.9 + 0.03 * f64::from(step), 0.5, 0.1 * f64::from(step));
@@ -308,7 +308,7 @@ fn unusable_tasks_have_named_errors() {
     ));
     assert!(matches!(error(&above(3.0)), ContactError::TooDeep { .. }));
     assert!(matches!(error(&above(f64::NAN)), ContactError::BadPose(_)));
-    assert!(Solid::sphere(-1.0).is_err() && Solid::cuboid(DVec3::new(1.0, 0.0, 1.0)).is_err());
+    assert!(ContactSolid::sphere(-1.0).is_err() && ContactSolid::cuboid(DVec3::new(1.0, 0.0, 1.0)).is_err());
     assert!(Contact::new(Elastomer { poisson: 0.5, ..silicone() }, Level::Geometric).is_err());
     let fine = Level::Linear { element_mm: 1e-3 };
     assert!(matches!(Contact::new(silicone(), fine), Err(ContactError::TooFine { .. })));
@@ -316,20 +316,20 @@ fn unusable_tasks_have_named_errors() {
         vertices_mm: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z],
         triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3]],
     };
-    assert!(matches!(Solid::mesh(&open), Err(ContactError::OpenMesh { edges: 3 })));
+    assert!(matches!(ContactSolid::mesh(&open), Err(ContactError::OpenMesh { edges: 3 })));
     let mut closed = open.clone();
     closed.triangles.push([0, 3, 2]);
-    assert!(Solid::mesh(&closed).is_ok());
+    assert!(ContactSolid::mesh(&closed).is_ok());
     let inside_out = TriMesh {
         triangles: closed.triangles.iter().map(|t| [t[0], t[2], t[1]]).collect(),
         ..closed.clone()
     };
-    assert!(matches!(Solid::mesh(&inside_out), Err(ContactError::InsideOut { .. })));
+    assert!(matches!(ContactSolid::mesh(&inside_out), Err(ContactError::InsideOut { .. })));
     let mut thick = closed.clone();
     thick.vertices_mm.push(DVec3::splat(2.0));
     thick.triangles.extend([[0, 1, 4], [1, 0, 4]]);
-    assert!(matches!(Solid::mesh(&thick), Err(ContactError::NotManifold { .. })));
-    assert!(matches!(Solid::mesh(&TriMesh::default()), Err(ContactError::EmptyMesh)));
+    assert!(matches!(ContactSolid::mesh(&thick), Err(ContactError::NotManifold { .. })));
+    assert!(matches!(ContactSolid::mesh(&TriMesh::default()), Err(ContactError::EmptyMesh)));
 }
 
 /// A box of twelve triangles.
@@ -349,11 +349,11 @@ fn box_mesh(size: DVec3) -> TriMesh {
 fn distances_are_distances() {
     let size = DVec3::new(3.0, 4.0, 6.0);
     let solids = [
-        Solid::sphere(2.0).unwrap(),
-        Solid::cylinder(1.5, 4.0).unwrap(),
-        Solid::cuboid(size).unwrap(),
-        Solid::cone(2.0, 3.0).unwrap(),
-        Solid::mesh(&box_mesh(size)).unwrap(),
+        ContactSolid::sphere(2.0).unwrap(),
+        ContactSolid::cylinder(1.5, 4.0).unwrap(),
+        ContactSolid::cuboid(size).unwrap(),
+        ContactSolid::cone(2.0, 3.0).unwrap(),
+        ContactSolid::mesh(&box_mesh(size)).unwrap(),
     ];
     let scatter = |k: u32| (f64::from(k) * 12.9898).sin() * 43_758.547 % 1.0;
     for solid in &solids {

@@ -89,7 +89,7 @@ impl<'a> Surroundings<'a> {
         f64::from(self.frame.at(x as isize, y as isize))
     }
 
-    fn from_middle(&self, x: i64, y: i64) -> DVec2 {
+    fn offset_px(&self, x: i64, y: i64) -> DVec2 {
         DVec2::new(x as f64, y as f64) - self.blob.middle_px
     }
 
@@ -126,7 +126,7 @@ impl<'a> Surroundings<'a> {
         for (x, y) in self.pixels().filter(|(x, y)| self.distance(*x, *y) <= reach) {
             if let Some(weight) = weight(x, y) {
                 sum += weight;
-                moment += self.from_middle(x, y) * weight;
+                moment += self.offset_px(x, y) * weight;
             }
         }
         (sum, moment)
@@ -149,7 +149,7 @@ impl GroundPlane {
             let steps = around.distance(x, y);
             // A neighbour's own edge is no ground either.
             if steps > EDGE && steps < FAR && !around.is_near_other(x, y, &taken) {
-                let d = around.from_middle(x, y);
+                let d = around.offset_px(x, y);
                 let terms = Vector3::new(1.0, d.x, d.y);
                 let value = around.value(x, y);
                 normal += terms * terms.transpose();
@@ -197,7 +197,7 @@ pub fn centroid(frame: &Gray, blob: &Blob, taken: impl Fn(u32, u32) -> bool) -> 
     } else {
         // How much of each pixel is covered: a mark of one value on ground that is shaded stands out more on one side.
         around.moments(EDGE, |x, y| {
-            let here = ground.at(around.from_middle(x, y));
+            let here = ground.at(around.offset_px(x, y));
             let depth = (mark - here) / contrast;
             (depth > MIN_DEPTH).then(|| (around.value(x, y) - here) / (contrast * depth))
         })

@@ -12,7 +12,7 @@ use crate::work::Work;
 
 /// The touched dome at a time, as far as a picture needs it.
 #[derive(Debug, Clone, Default)]
-pub struct Shape {
+pub struct SkinShape {
     /// The touched dome; `None` where contact takes no part.
     pub touch: Option<Between>,
     /// The deformed membrane as a table; only where light falls on it.
@@ -21,7 +21,7 @@ pub struct Shape {
     pub displaced_mm: Option<Vec<DVec3>>,
 }
 
-impl Shape {
+impl SkinShape {
     /// At one time; its map has nodes no further apart than `map_step_mm`, where that is given.
     pub fn of(touch: Option<Between>, radius_mm: f64, map_step_mm: Option<f64>, work: &mut Work) -> Self {
         let map = touch.as_ref().filter(|between| between.is_dented()).and_then(|between| {
@@ -76,10 +76,10 @@ impl<'a> Shapes<'a> {
     }
 
     /// At a time of so many frames after the frame.
-    pub fn at(&self, frames: f64) -> Shape {
+    pub fn at(&self, frames: f64) -> SkinShape {
         let touch = self.around.at(frames);
         if !touch.is_dented() {
-            return Shape { touch: Some(touch), ..Shape::default() };
+            return SkinShape { touch: Some(touch), ..SkinShape::default() };
         }
         let [before, now, after] = &self.known;
         let (from, to) = if frames < 0.0 { (before, now) } else { (now, after) };
@@ -87,6 +87,6 @@ impl<'a> Shapes<'a> {
         let mix = |(a, b): (&DVec3, &DVec3)| a.lerp(*b, part);
         let displaced_mm = from.displaced_mm.iter().zip(&to.displaced_mm).map(mix).collect();
         let map = from.map.as_ref().zip(to.map.as_ref()).map(|(from, to)| from.towards(to, part));
-        Shape { touch: Some(touch), map, displaced_mm: Some(displaced_mm) }
+        SkinShape { touch: Some(touch), map, displaced_mm: Some(displaced_mm) }
     }
 }

@@ -11,7 +11,7 @@ use crate::{Pipeline, Scene, SimError};
 use domecast_contact::{estimate, most_force_n};
 
 /// See the module.
-pub struct Contact;
+pub struct ContactEffect;
 
 /// Times at which an object's way is looked at.
 const LOOKS: u32 = 257;
@@ -100,7 +100,7 @@ fn deepest_mm(scene: &Scene) -> Option<f64> {
     Some(deepest)
 }
 
-impl Effect for Contact {
+impl Effect for ContactEffect {
     fn name(&self) -> EffectName {
         EffectName::Contact
     }

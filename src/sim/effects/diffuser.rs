@@ -9,9 +9,9 @@ use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
-pub struct Diffuser;
+pub struct DiffuserEffect;
 
-impl Effect for Diffuser {
+impl Effect for DiffuserEffect {
     fn name(&self) -> EffectName {
         EffectName::Diffuser
     }

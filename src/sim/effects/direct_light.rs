@@ -7,12 +7,12 @@ use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
-pub struct DirectLight;
+pub struct DirectLightEffect;
 
 /// Samples of the membrane that a frame asks for, about: for the prediction of work.
 pub(super) const SAMPLES: u64 = 8_000;
 
-impl Effect for DirectLight {
+impl Effect for DirectLightEffect {
     fn name(&self) -> EffectName {
         EffectName::DirectLight
     }

@@ -5,7 +5,7 @@ use glam::DVec2;
 use crate::SimError;
 use crate::contact::between::Between;
 use crate::contact::level::level_named;
-use crate::contact::shape::Shape;
+use crate::contact::shape::SkinShape;
 use crate::contact::stepper::SolvedFrames;
 use crate::raster::projector::Projector;
 use crate::raster::sensor_state::SensorState;
@@ -90,7 +90,7 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
         let time_s = scene.time_s(frame);
         let between = Between::at_frame(touch.clone());
         let mut at = |eye: &Projector, geometry: Geometry| {
-            let shape = Shape { touch: Some(between.clone()), ..Shape::default() };
+            let shape = SkinShape { touch: Some(between.clone()), ..SkinShape::default() };
             SensorState::new(eye, geometry, time_s, touch.state.clone(), shape, &mut uncounted)
         };
         let (a, b) = (at(&a_eye, with)?, at(&b_eye, without)?);

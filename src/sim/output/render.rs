@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::SimError;
 use crate::contact::between::Around;
 use crate::contact::level::map_step_mm;
-use crate::contact::shape::{Shape, Shapes};
+use crate::contact::shape::{SkinShape, Shapes};
 use crate::contact::stepper::Stepper;
 use crate::effect_name::EffectName;
 use crate::effects;
@@ -130,7 +130,7 @@ impl<'a> Renderer<'a> {
         // Where light is gathered over a time, that very instant is not drawn.
         let step_mm = self.map_step_mm().filter(|_| self.is_at_once());
         let touch = around.map(|around| around.at(0.0));
-        let shape = Shape::of(touch, self.scene.optics().dome_radius_mm(), step_mm, work);
+        let shape = SkinShape::of(touch, self.scene.optics().dome_radius_mm(), step_mm, work);
         self.instant_of(frame, self.scene.time_s(frame), shape, work)
     }
 
@@ -144,7 +144,7 @@ impl<'a> Renderer<'a> {
         &self,
         frame: u32,
         time_s: f64,
-        shape: Shape,
+        shape: SkinShape,
         work: &mut Work,
     ) -> Result<SensorState, SimError> {
         let state = match &shape.touch {
@@ -291,18 +291,9 @@ impl<'a> Renderer<'a> {
             for (sample, after_s) in exposure_s.iter().enumerate() {
                 let mut extra = Work::default();
                 let spent = if sample == 0 { &mut *work } else { &mut extra };
-                let mut instants = Vec::with_capacity(rows_s.len());
-                for (slice, (_, row_s)) in rows_s.iter().enumerate() {
-                    let mut one = Work::default();
-                    let frames = (after_s + row_s) * self.rate_hz();
-                    let free = || Shape { touch: around.map(|around| around.at(frames)), ..Shape::default() };
-                    let shape = shapes.as_ref().map_or_else(free, |shapes| shapes.at(frames));
-                    instants.push(self.instant_of(number, now.time_s + after_s + row_s, shape, &mut one)?);
-                    match slice {
-                        0 => spent.merge(&one),
-                        _ => spent.add(EffectName::RollingShutter, one.total()),
-                    }
-                }
+                let times_s = (now.time_s, *after_s);
+                let shapes = (around, shapes.as_ref());
+                let instants = self.states_of_rows(number, times_s, &rows_s, shapes, spent)?;
                 let slice = |((rows, _), instant): (&(Range<usize>, f64), _)| Slice {
                     first: rows.start,
                     end: rows.end,
@@ -338,6 +329,31 @@ impl<'a> Renderer<'a> {
         }
         scratch.frame = Some(frame);
         Ok((image, parts_seen))
+    }
+
+    /// The sensor at the middle of each slice of rows, for one part of the exposure: at a time, s, and so long after it.
+    fn states_of_rows(
+        &self,
+        number: u32,
+        (now_s, after_s): (f64, f64),
+        rows_s: &[(Range<usize>, f64)],
+        (around, shapes): (Option<&Around>, Option<&Shapes<'_>>),
+        work: &mut Work,
+    ) -> Result<Vec<SensorState>, SimError> {
+        let mut states = Vec::with_capacity(rows_s.len());
+        for (slice, (_, row_s)) in rows_s.iter().enumerate() {
+            let mut one = Work::default();
+            let frames = (after_s + row_s) * self.rate_hz();
+            let free =
+                || SkinShape { touch: around.map(|around| around.at(frames)), ..SkinShape::default() };
+            let shape = shapes.map_or_else(free, |shapes| shapes.at(frames));
+            states.push(self.instant_of(number, now_s + after_s + row_s, shape, &mut one)?);
+            match slice {
+                0 => work.merge(&one),
+                _ => work.add(EffectName::RollingShutter, one.total()),
+            }
+        }
+        Ok(states)
     }
 
     fn run_passes(

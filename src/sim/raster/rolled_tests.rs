@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::contact::between::Between;
-use crate::contact::shape::{Shape, Shapes};
+use crate::contact::shape::{SkinShape, Shapes};
 use crate::contact::stepper::{Stepper, Touch};
 use crate::*;
 
@@ -90,7 +90,7 @@ fn a_dome_between_frames_is_the_mean_of_both() {
     for (frames, from, to, part) in [(-0.7, 0, 1, 0.3), (0.0, 1, 1, 0.0), (0.25, 1, 2, 0.25)] {
         let shape = shapes.at(frames);
         let between = Between { from: touches[from].clone(), to: touches[to].clone(), part };
-        let alone = Shape::of(Some(between.clone()), radius_mm, Some(0.5), &mut work);
+        let alone = SkinShape::of(Some(between.clone()), radius_mm, Some(0.5), &mut work);
         let expected = between.displacements_mm(&places);
         let mut largest = 0.0_f64;
         for (k, (a, b)) in shape.displaced_mm.unwrap().iter().zip(&expected).enumerate() {

@@ -1,7 +1,7 @@
 //! The sensor at one time: its pose, its shape, and the camera over it.
 
 use crate::SimError;
-use crate::contact::shape::Shape;
+use crate::contact::shape::SkinShape;
 use crate::effect_name::EffectName;
 use crate::raster::projector::{PlacedProjector, Projector};
 use crate::raster::settings::Geometry;
@@ -37,7 +37,7 @@ pub struct SensorState {
     /// The camera over it.
     pub eye: PlacedProjector,
     /// The touched dome.
-    pub shape: Shape,
+    pub shape: SkinShape,
 }
 
 impl SensorState {
@@ -50,7 +50,7 @@ impl SensorState {
         geometry: Geometry,
         time_s: f64,
         state: State,
-        shape: Shape,
+        shape: SkinShape,
         work: &mut Work,
     ) -> Result<Self, SimError> {
         let pose = if geometry.sheet_motion {

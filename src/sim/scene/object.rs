@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::motion::interpolate;
 use super::objects::{ObjectSection, ShapeSection};
-use domecast_contact::{ContactError, Indenter, Solid};
+use domecast_contact::{ContactError, Indenter, ContactSolid};
 use domecast_design::DesignError;
 use domecast_mesh::read_stl;
 use domecast_optics::numeric::{Rigid, rotation_from_vector};
@@ -91,7 +91,7 @@ impl SceneObject {
     }
 }
 
-fn solid(shape: &ShapeSection, at: &str, folder: &Path) -> Result<Solid, DesignError> {
+fn solid(shape: &ShapeSection, at: &str, folder: &Path) -> Result<ContactSolid, DesignError> {
     let fault = |error: ContactError| {
         let field = match &error {
             ContactError::Dimension { field, .. } => {
@@ -102,12 +102,12 @@ fn solid(shape: &ShapeSection, at: &str, folder: &Path) -> Result<Solid, DesignE
         DesignError::at(field, "", error.to_string(), "a closed solid")
     };
     match shape {
-        ShapeSection::Sphere { radius_mm } => Solid::sphere(*radius_mm).map_err(fault),
+        ShapeSection::Sphere { radius_mm } => ContactSolid::sphere(*radius_mm).map_err(fault),
         ShapeSection::Cylinder { radius_mm, length_mm } => {
-            Solid::cylinder(*radius_mm, *length_mm).map_err(fault)
+            ContactSolid::cylinder(*radius_mm, *length_mm).map_err(fault)
         }
-        ShapeSection::Box { size_mm } => Solid::cuboid(DVec3::from_array(*size_mm)).map_err(fault),
-        ShapeSection::Cone { radius_mm, height_mm } => Solid::cone(*radius_mm, *height_mm).map_err(fault),
+        ShapeSection::Box { size_mm } => ContactSolid::cuboid(DVec3::from_array(*size_mm)).map_err(fault),
+        ShapeSection::Cone { radius_mm, height_mm } => ContactSolid::cone(*radius_mm, *height_mm).map_err(fault),
         ShapeSection::Mesh { file, scale } => {
             let path = folder.join(file);
             let field = format!("{at}.file");
@@ -118,7 +118,7 @@ fn solid(shape: &ShapeSection, at: &str, folder: &Path) -> Result<Solid, DesignE
                 .map_err(|error| unreadable(format!("{} cannot be read ({error})", path.display())))?;
             let mut mesh = read_stl(&bytes).map_err(|error| unreadable(format!("not an STL ({error})")))?;
             mesh.vertices_mm.iter_mut().for_each(|vertex| *vertex *= *scale);
-            Solid::mesh(&mesh).map_err(|error| unreadable(error.to_string()))
+            ContactSolid::mesh(&mesh).map_err(|error| unreadable(error.to_string()))
         }
     }
 }

@@ -75,7 +75,7 @@ impl<'a> EvenFrame<'a> {
     pub fn new(lens: &'a Lens, even_in: EvenIn, undistorted: UndistortedFrame) -> Self {
         let undistorted = match even_in {
             EvenIn::Raw => None,
-            EvenIn::UndistortedFrame => Some(undistorted),
+            EvenIn::Undistorted => Some(undistorted),
         };
         Self { lens, undistorted }
     }

@@ -53,7 +53,7 @@ pub fn camera_view(spec: &LayoutSpec, layout: &Layout) -> Result<Vec<u8>, Render
         }
     }
     if let Some(mask) = &spec.mask {
-        let undistorted = EvenFrame::new(optics.lens(), EvenIn::UndistortedFrame, spec.undistorted);
+        let undistorted = EvenFrame::new(optics.lens(), EvenIn::Undistorted, spec.undistorted);
         let corners: Vec<DVec2> = around()
             .filter_map(|out| undistorted.raw_from_even(mask.center_px + out * mask.radius_px).ok())
             .collect();

@@ -27,7 +27,7 @@ pub enum EvenIn {
     #[default]
     Raw,
     /// The undistorted frame of the runtime (its own camera matrix).
-    UndistortedFrame,
+    Undistorted,
 }
 
 /// What lies at the pattern's centre.

@@ -4,7 +4,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use domecast::contact::{Contact, Elastomer, Indenter, Level, Pressed, ContactSolid};
+use domecast::contact::{Contact, ContactSolid, Elastomer, Indenter, Level, Pressed};
 use domecast::design::suspension_of;
 use domecast::numeric::Rigid;
 use domecast::springs::Suspension;

@@ -10,7 +10,9 @@ use domecast::track::{CameraFrame, TrackOptions};
 use domecast::{Constants, Tracker};
 
 /// Width, height, channels and bytes of a picture.
-fn read(path: &str) -> Result<(usize, usize, usize, Vec<u8>), Box<dyn std::error::Error>> {
+type Picture = (usize, usize, usize, Vec<u8>);
+
+fn read(path: &str) -> Result<Picture, Box<dyn std::error::Error>> {
     let mut reader = png::Decoder::new(BufReader::new(File::open(path)?)).read_info()?;
     let mut bytes = vec![0; reader.output_buffer_size().ok_or("too large")?];
     let info = reader.next_frame(&mut bytes)?;

@@ -9,6 +9,22 @@
 //! Everything is in the *sensor* frame: origin at the centre of the dome's base, +z through the pole; lengths mm,
 //! forces N, moduli and pressures MPa. A contact wrench is what the object puts on the dome, about the base's
 //! centre.
+//!
+//! ```
+//! use domecast_contact::{Contact, ContactSolid, Elastomer, Indenter, Level};
+//! use domecast_optics::numeric::Rigid;
+//! use glam::DVec3;
+//!
+//! let dome = Elastomer { dome_radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, friction: 0.5 };
+//! let contact = Contact::new(dome, Level::ClosedForm)?;
+//! let ball = Indenter::rigid(ContactSolid::sphere(5.0)?);
+//! // the ball's centre, half a millimetre lower than where it first touches the pole
+//! let mut sensor_from_ball = Rigid::identity();
+//! sensor_from_ball.translation_mm = DVec3::new(0.0, 0.0, 14.5);
+//! let state = contact.solve(&ball, &sensor_from_ball, None)?;
+//! assert!(state.wrench.force_n.z < 0.0, "it pushes down");
+//! # Ok::<(), domecast_contact::ContactError>(())
+//! ```
 
 mod contact;
 mod elastomer;
@@ -32,7 +48,7 @@ pub use equilibrium::{PressStatus, Pressed};
 pub use error::ContactError;
 pub use estimate::{Estimate, estimate, most_force_n};
 pub use level::Level;
-pub use object::{Distance, ContactSolid};
+pub use object::{ContactSolid, Distance};
 pub use on_pole::OnPole;
 pub use outcome::{Extent, Status, TouchedNode};
 pub use state::ContactState;

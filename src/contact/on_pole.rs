@@ -10,7 +10,7 @@ use crate::error::{ContactError, positive};
 use crate::fem::{Parts, Revolved};
 use crate::level::DEEPEST;
 use crate::linear::{Candidate, Spot, Touch, Way};
-use crate::object::{Placed, ContactSolid};
+use crate::object::{ContactSolid, Placed};
 use crate::outcome::Status;
 use crate::state::ContactState;
 use domecast_optics::numeric::Rigid;

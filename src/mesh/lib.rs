@@ -17,6 +17,16 @@
 //! decides how many triangles a circle gets. The *rounding epsilon*
 //! ([`TriMesh::rounding_mm`]) follows from the size of the numbers and decides
 //! what counts as equal. Neither ever stands in for the other.
+//!
+//! ```
+//! use domecast_mesh::{Chord, Fit, Shape, inspect};
+//!
+//! let peg = Shape::cylinder(2.0, 0.0, 5.0, Fit::Area).triangulate("peg", Chord::new(0.01)?)?;
+//! let found = inspect(&peg.welded_f32());
+//! assert!(found.is_one_solid());
+//! assert!((found.volume_mm3 / (20.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
+//! # Ok::<(), domecast_mesh::MeshError>(())
+//! ```
 
 mod check;
 mod chord;

@@ -292,7 +292,7 @@ fn truth_tells_how_the_contact_was_solved() {
 /// No known scene makes the linear level stop at its bound; what truth tells then holds for any contact that says so.
 #[test]
 fn a_contact_at_its_bound_is_told_with_what_is_left() {
-    use domecast_contact::{Contact, Indenter, Level, ContactSolid, Status};
+    use domecast_contact::{Contact, ContactSolid, Indenter, Level, Status};
     use domecast_optics::numeric::Rigid;
     let still = scene("still.json");
     let contact = Contact::new(elastomer_of(still.design()), Level::Geometric).expect("a level");

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::clock::{TimeLimit, time};
 use super::sweep::{Law, Sweep, SweepSample, sizes};
-use domecast_contact::{Contact, ContactError, ContactState, Indenter, Level, OnPole, ContactSolid};
+use domecast_contact::{Contact, ContactError, ContactSolid, ContactState, Indenter, Level, OnPole};
 use domecast_design::Design;
 use domecast_design::layout::Layout;
 use domecast_fab::numbers::significant;

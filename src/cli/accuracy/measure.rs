@@ -52,7 +52,7 @@ pub fn measure(
     let settings = design.settings();
     let mut on = Measurement {
         design,
-        settings: &settings,
+        settings,
         constants: constants::of(design, &layout)?,
         parts: build(&Measures::of(design)?, &layout.passes)?,
         spec,
@@ -78,7 +78,7 @@ pub fn measure(
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine::here(),
         quick,
-        settings: setting_records(&settings),
+        settings: setting_records(settings),
         sweeps,
         budgets,
         frames_to_average: frames_to_average(design),

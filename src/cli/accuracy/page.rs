@@ -100,7 +100,8 @@ fn chapter(sweep: &Sweep) -> Html {
         let mut remarks: Vec<String> =
             [(is_used, "in use"), (sweep.meets == Some(index), "enough"), (sample.dominated, "dominated")]
                 .into_iter()
-                .filter_map(|(applies, remark)| applies.then(|| remark.to_owned()))
+                .filter(|(applies, _)| *applies)
+                .map(|(_, remark)| remark.to_owned())
                 .collect();
         remarks.extend(sample.notes.iter().map(|(what, value)| format!("{what} {}", significant(*value))));
         let time = &sample.time;

@@ -32,7 +32,7 @@ pub struct Pressed {
     pub rest_from_object: Rigid,
     /// The contact, in the moved sensor frame.
     pub state: ContactState,
-    /// What the contact puts on the platform: rest frame, about [`Suspension::at_mm`].
+    /// What the contact puts on the platform: rest frame, about the springs' reference point.
     pub wrench: Wrench,
     /// What the balance is off, N (moments counted over the springs' reach).
     pub residual_n: f64,

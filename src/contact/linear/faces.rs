@@ -40,11 +40,7 @@ struct Over {
 
 /// Places no farther from an object than `ahead_mm`, with their numbers; the way into it, of no unit length; and the
 /// distances asked for.
-fn near_places(
-    placed: &Placed,
-    compliance: &Compliance,
-    ahead_mm: f64,
-) -> (Vec<(usize, DVec3)>, DVec3, f64) {
+fn near_places(placed: &Placed, compliance: &Compliance, ahead_mm: f64) -> (Vec<(usize, DVec3)>, DVec3, f64) {
     let (grid, places) = (&compliance.grid, &compliance.places);
     let (mut near, mut queries) = (Vec::new(), 0.0);
     let mut inward = DVec3::ZERO;

@@ -9,6 +9,16 @@
 //!
 //! Frames: the platforms are in the sensor frame at rest, the mould has its own
 //! with the parting plane at z = 0 and the cavity below.
+//!
+//! ```
+//! use domecast_design::Design;
+//! use domecast_design::parts::{self, Measures};
+//!
+//! let design: Design = include_str!("../../../designs/thumb24.json").parse()?;
+//! let made = parts::build(&Measures::of(&design)?, &design.layout()?.passes).expect("parts that can be made");
+//! assert!(made.iter().any(|part| part.name == "upper_platform" && part.check().is_ok()));
+//! # Ok::<(), domecast_design::DesignError>(())
+//! ```
 
 mod accessories;
 mod assembly;

@@ -2,6 +2,18 @@
 //!
 //! A [`Drawing`] is a resolved tree in millimetres, y up; [`film`] makes one for each hit of a layout, and
 //! each writer spells it in its format without deciding anything.
+//!
+//! ```
+//! use domecast_design::Design;
+//! use domecast_fab::artwork::{FilmLabel, film, to_svg};
+//!
+//! let design: Design = include_str!("../../../designs/thumb24.json").parse()?;
+//! let label = FilmLabel { design: design.name().into(), hash: "0123456789ab".into() };
+//! let pad_over_image = design.sections().print.pad_over_image;
+//! let svg = to_svg(&film(&design.layout()?, 0, pad_over_image, &label).expect("finite dots"));
+//! assert!(svg.starts_with(b"<"));
+//! # Ok::<(), domecast_design::DesignError>(())
+//! ```
 
 mod camera_view;
 pub mod canvas;

@@ -8,6 +8,7 @@ mod error;
 mod folder;
 mod parts;
 pub(crate) mod render;
+mod timing;
 pub(crate) mod truth;
 mod video;
 mod writer;

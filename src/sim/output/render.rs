@@ -6,12 +6,13 @@ use std::sync::Arc;
 use crate::SimError;
 use crate::contact::between::Around;
 use crate::contact::level::map_step_mm;
-use crate::contact::shape::{SkinShape, Shapes};
+use crate::contact::shape::{Shapes, SkinShape};
 use crate::contact::stepper::Stepper;
 use crate::effect_name::EffectName;
 use crate::effects;
 use crate::effects::pipeline::Pipeline;
 use crate::electronics::pass::{PassContext, Stage};
+use crate::output::timing::{exposure_s, rows_s};
 use crate::output::truth::{EffectTruth, FrameTruth, Seen, dot_truth, effects_of, marker_truth};
 use crate::plan::Plan;
 use crate::raster::edges::EDGE_GREY;
@@ -224,27 +225,6 @@ impl<'a> Renderer<'a> {
         self.pipeline.timing == Timing::default()
     }
 
-    /// Times at which a row gathers light, s after its own.
-    fn exposure_s(&self) -> Vec<f64> {
-        let Some(exposure) = self.pipeline.timing.exposure else { return vec![0.0] };
-        let count = exposure.samples.max(1);
-        let part = |k: u32| (f64::from(k) + 0.5) / f64::from(count) - 0.5;
-        (0..count).map(|k| exposure.exposure_s * part(k)).collect()
-    }
-
-    /// The rows of a picture with the time of their middle, s after the frame's.
-    fn rows_s(&self, height: usize) -> Vec<(Range<usize>, f64)> {
-        let Some(rolling) = self.pipeline.timing.rolling else { return vec![(0..height, 0.0)] };
-        let count = (rolling.slices as usize).clamp(1, height.max(1));
-        let slice = |k: usize| {
-            let rows = k * height / count..(k + 1) * height / count;
-            let middle = 0.5 * (rows.start + rows.end).saturating_sub(1) as f64;
-            let span = (height.max(2) - 1) as f64;
-            (rows, rolling.readout_s * (middle / span - 0.5))
-        };
-        (0..count).map(slice).collect()
-    }
-
     /// The picture, and what was seen in each part of the exposure; empty where all is at the frame's time.
     fn picture(
         &self,
@@ -272,7 +252,7 @@ impl<'a> Renderer<'a> {
         let mut frame =
             scratch.frame.take().filter(fits).unwrap_or_else(|| Frame::new(width, height, planes));
         let context = PassContext { frame: number, seed: scene.file().seed };
-        let (exposure_s, rows_s) = (self.exposure_s(), self.rows_s(height));
+        let (exposure_s, rows_s) = (exposure_s(&self.pipeline), rows_s(&self.pipeline, height));
         let mut parts_seen = Vec::new();
         if self.is_at_once() {
             let slice = Slice { first: 0, end: height, instant: now };
@@ -300,18 +280,7 @@ impl<'a> Renderer<'a> {
                     instant,
                 };
                 let slices: Vec<Slice<'_>> = rows_s.iter().zip(&instants).map(slice).collect();
-                let spots = match slices.as_slice() {
-                    [only] => {
-                        self.count(spent);
-                        self.points.see(scene, only.instant)
-                    }
-                    _ => {
-                        let (spots, pixels) =
-                            Rolled::new(&self.points, &slices).see(scene, now_spots, self.moved_px);
-                        spent.add(EffectName::RollingShutter, pixels * (units::STRAIGHT + units::BEND));
-                        spots
-                    }
-                };
+                let spots = self.spots_of(&slices, now_spots, spent);
                 scratch.painter.draw(parts, &slices, &spots, &mut part, spent);
                 self.run_passes(&mut part, &context, spent, |stage| stage <= Stage::Focus);
                 // What the first picture does not do, the exposure does.
@@ -331,6 +300,17 @@ impl<'a> Renderer<'a> {
         Ok((image, parts_seen))
     }
 
+    /// What is seen in one part of the exposure.
+    fn spots_of(&self, slices: &[Slice<'_>], now: &Spots, work: &mut Work) -> Spots {
+        if let [only] = slices {
+            self.count(work);
+            return self.points.see(self.scene, only.instant);
+        }
+        let (spots, pixels) = Rolled::new(&self.points, slices).see(self.scene, now, self.moved_px);
+        work.add(EffectName::RollingShutter, pixels * (units::STRAIGHT + units::BEND));
+        spots
+    }
+
     /// The sensor at the middle of each slice of rows, for one part of the exposure: at a time, s, and so long after it.
     fn states_of_rows(
         &self,
@@ -344,8 +324,7 @@ impl<'a> Renderer<'a> {
         for (slice, (_, row_s)) in rows_s.iter().enumerate() {
             let mut one = Work::default();
             let frames = (after_s + row_s) * self.rate_hz();
-            let free =
-                || SkinShape { touch: around.map(|around| around.at(frames)), ..SkinShape::default() };
+            let free = || SkinShape { touch: around.map(|around| around.at(frames)), ..SkinShape::default() };
             let shape = shapes.map_or_else(free, |shapes| shapes.at(frames));
             states.push(self.instant_of(number, now_s + after_s + row_s, shape, &mut one)?);
             match slice {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::contact::between::Between;
-use crate::contact::shape::{SkinShape, Shapes};
+use crate::contact::shape::{Shapes, SkinShape};
 use crate::contact::stepper::{Stepper, Touch};
 use crate::*;
 

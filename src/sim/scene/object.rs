@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::motion::interpolate;
 use super::objects::{ObjectSection, ShapeSection};
-use domecast_contact::{ContactError, Indenter, ContactSolid};
+use domecast_contact::{ContactError, ContactSolid, Indenter};
 use domecast_design::DesignError;
 use domecast_mesh::read_stl;
 use domecast_optics::numeric::{Rigid, rotation_from_vector};
@@ -107,7 +107,9 @@ fn solid(shape: &ShapeSection, at: &str, folder: &Path) -> Result<ContactSolid, 
             ContactSolid::cylinder(*radius_mm, *length_mm).map_err(fault)
         }
         ShapeSection::Box { size_mm } => ContactSolid::cuboid(DVec3::from_array(*size_mm)).map_err(fault),
-        ShapeSection::Cone { radius_mm, height_mm } => ContactSolid::cone(*radius_mm, *height_mm).map_err(fault),
+        ShapeSection::Cone { radius_mm, height_mm } => {
+            ContactSolid::cone(*radius_mm, *height_mm).map_err(fault)
+        }
         ShapeSection::Mesh { file, scale } => {
             let path = folder.join(file);
             let field = format!("{at}.file");

@@ -1,0 +1,240 @@
+//! Tables of light over the dome, and bounds of its effects.
+
+use super::*;
+
+fn scene(more: &str) -> crate::Scene {
+    let text = format!(
+        r#"{{ "version": 1, "name": "lit", "design": "thumb24.json",
+        "frames": {{ "count": 1, "rate_hz": 30 }}, "tolerance": {{ "px": 0.01, "grey": 0.5 }},
+        "light": {{ "leds": {{ "level_per_mw_mm2": 450 }} }} {more} }}"#
+    );
+    let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
+    crate::Scene::from_text(&text, &folder).unwrap()
+}
+
+const ALL: LightUse = LightUse::ALL;
+
+fn ways_of(optics: &SensorOptics, source: Emitter) -> Ways {
+    Ways {
+        sources: vec![Source { emitter: source, optics: optics.clone(), seen_mw: [1.0, 0.5, 0.0] }],
+        optics: [optics.clone(), optics.clone(), optics.clone()],
+        cavities: None,
+        through_platform: 0.0,
+        sheet_half_mm: WIDE,
+        fresnel: false,
+    }
+}
+
+#[test]
+fn the_table_of_direct_light_matches_closed_forms_to_a_thousandth() {
+    let optics = sensor(&[1.0], 1.0);
+    let parts = FieldParts { falloff: true, albedo: None, moved: true };
+    // A point on the sphere: even light.
+    let at = DVec3::new(6.0, 0.0, -8.0);
+    let ways = ways_of(&optics, emitter(at, -at, 1e-4, 1.0));
+    let field = LightField::new(&ways, &Prepared::default(), &parts);
+    for direction in directions(300) {
+        let light = field.still(direction.as_vec3a()).to_array().map(f64::from);
+        let exact = 1.0 / PI / 400.0;
+        assert!((light[0] / exact - 1.0).abs() < 1e-3 && (light[1] / exact - 0.5).abs() < 1e-3);
+        assert_eq!(light[2], 0.0);
+    }
+    // A square that faces the dome: Lambert's contour integral.
+    let source = emitter(DVec3::new(4.0, -3.0, -3.3), DVec3::new(-0.4, 0.3, 1.0), 1.0, 1.0);
+    let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+        .map(|(x, y)| source.platform_from_emitter.transform_point3(DVec3::new(x, y, 0.0)));
+    let facing = source.platform_from_emitter.matrix3.z_axis;
+    let field = LightField::new(&ways_of(&optics, source), &Prepared::default(), &parts);
+    let brightest = field.brightest()[0];
+    for direction in directions(300) {
+        let point = direction * 10.0;
+        if corners.iter().any(|c| (point - *c).dot(facing) < 0.0) {
+            continue;
+        }
+        let exact = lambert_polygon(&corners, 1.0 / PI, point, -direction);
+        let found = f64::from(field.still(direction.as_vec3a())[0]);
+        assert!((found - exact).abs() < 1e-3 * brightest, "{direction}: {found} {exact}");
+        // Moved points, with normals of their own.
+        let moved = direction * 9.2;
+        let normal = (direction + DVec3::new(0.1, -0.2, 0.1)).normalize();
+        let exact = lambert_polygon(&corners, 1.0 / PI, moved, -normal);
+        let found = f64::from(field.moved(moved.as_vec3a(), normal.as_vec3a())[0]);
+        assert!((found - exact).abs() < 2e-2 * brightest, "moved {direction}: {found} {exact}");
+    }
+}
+
+#[test]
+fn the_rule_across_the_emitter_is_fine_enough() {
+    let scene = scene("");
+    let ways = setup::ways(&scene, &ALL).unwrap();
+    let open = Ways { cavities: None, ..ways.clone() };
+    let source = &ways.sources[0];
+    let brightest = open.still(source, DVec3::Z, &EmitterRule::default());
+    for direction in directions(12) {
+        let rough = open.still(source, direction, &EmitterRule::default());
+        let fine = open.still(source, direction, &EmitterRule::with_places(24));
+        assert!((rough - fine).abs() < 1e-3 * brightest, "{direction}: {rough} {fine}");
+        // With the shadow's edge across the emitter: against the same rule, and many more lines.
+        let rough = ways.still(source, direction, &EmitterRule::default());
+        let fine = ways.still(source, direction, &EmitterRule::with_places(24));
+        assert!((rough - fine).abs() < 1e-2 * brightest, "shadow {direction}: {rough} {fine}");
+    }
+}
+
+#[test]
+fn shadows_only_darken_and_a_clear_platform_throws_none() {
+    let scene = scene("");
+    let shaded = setup::ways(&scene, &ALL).unwrap();
+    let open = Ways { cavities: None, ..shaded.clone() };
+    let clear = Ways { through_platform: 1.0, ..shaded.clone() };
+    let rule = EmitterRule::default();
+    let mut darkened = 0;
+    for direction in directions(20) {
+        for (i, source) in shaded.sources.iter().enumerate() {
+            let (dark, light) =
+                (shaded.still(source, direction, &rule), open.still(source, direction, &rule));
+            assert!(dark <= light * (1.0 + 1e-2) + 1e-9, "{direction}: {dark} {light}");
+            darkened += usize::from(dark < 0.9 * light);
+            let through = clear.still(&clear.sources[i], direction, &rule);
+            assert!((through - light).abs() <= 1e-9 * light.max(1e-9), "{through} {light}");
+        }
+    }
+    assert!(darkened > 20, "the lip hides most of the emitter: {darkened}");
+}
+
+#[test]
+fn the_sensor_is_lit_from_three_sides() {
+    let scene = scene("");
+    let mut work = Work::default();
+    let dome = ShadedDome::new(&scene, &ALL, &mut work).unwrap().unwrap();
+    let field = dome.field();
+    assert!(field.error() < 0.02, "{}", field.error());
+    assert!(work.of(EffectName::PlatformShadow) > work.of(EffectName::DirectLight));
+    // Half way down, in the direction of each light, its colour is the strongest.
+    for (light, azimuth_deg) in [0.0_f64, 120.0, 240.0].into_iter().enumerate() {
+        let aside = DVec2::from_angle(azimuth_deg.to_radians()) * 0.76;
+        let seen = field.still(aside.extend(0.65).normalize().as_vec3a()).to_array();
+        let strongest = (0..3).max_by(|a, b| seen[*a].total_cmp(&seen[*b])).unwrap();
+        assert_eq!(strongest, light, "{seen:?}");
+    }
+    // A point that was not moved has the same light by either table.
+    let sample = |direction: DVec3, deformed| SurfaceSample {
+        point_mm: (direction * 10.0).as_vec3a(),
+        normal: direction.as_vec3a(),
+        to_camera: Vec3A::NEG_Z,
+        is_moved: deformed,
+    };
+    let moved_scene = self::scene(
+        r#", "objects": [ { "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 },
+             "path": [ { "time_s": 0, "position_mm": [0, 0, 40] } ] } ]"#,
+    );
+    let dome = ShadedDome::new(&moved_scene, &ALL, &mut work).unwrap().unwrap();
+    let brightest = 450.0 * 0.55 / 2.0 * dome.field().brightest()[1];
+    for direction in directions(60).filter(|d| d.z > 0.15) {
+        let levels = [false, true].map(|is_moved| dome.level(&sample(direction, is_moved)));
+        for c in 0..3 {
+            let off = f64::from(levels[0][c] - levels[1][c]).abs();
+            assert!(off < 0.03 * brightest, "{direction}: {levels:?}");
+        }
+    }
+}
+
+#[test]
+fn numbers_for_lights_that_are_not_there_are_refused() {
+    let text = scene("").file().clone();
+    let mut file = text;
+    file.light.leds.as_mut().unwrap().each = vec![1.0, 1.0];
+    let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
+    let design = domecast_design::Design::load(&folder.join("thumb24.json")).unwrap();
+    let scene = crate::Scene::new(file, &folder, design).unwrap();
+    let error = setup::sources(&scene, &ALL).unwrap_err().to_string();
+    assert!(error.contains("light.leds.each"), "{error}");
+}
+
+/// Largest difference of two light fields on the resting membrane, and of a moved one's shells.
+fn largest_change(a: &ShadedDome, b: &ShadedDome, deformed: bool) -> f64 {
+    let mut worst = 0.0_f64;
+    for direction in directions(3_000) {
+        let part = if deformed { (1.0 - direction.z).max(0.93) } else { 1.0 };
+        let sample = SurfaceSample {
+            point_mm: (direction * (10.0 * part)).as_vec3a(),
+            normal: direction.as_vec3a(),
+            to_camera: Vec3A::NEG_Z,
+            is_moved: deformed,
+        };
+        worst = worst.max(f64::from((a.level(&sample) - b.level(&sample)).abs().max_element()));
+    }
+    worst
+}
+
+#[test]
+fn no_effect_of_light_passes_its_bound() {
+    let object = r#", "objects": [ { "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 },
+             "path": [ { "time_s": 0, "position_mm": [0, 0, 40] } ] } ]"#;
+    for more in ["", object] {
+        let scene = scene(more);
+        let bound = bounds::LightBounds::of(&scene).unwrap();
+        let lit = |used: LightUse| ShadedDome::new(&scene, &used, &mut Work::default()).unwrap().unwrap();
+        let open = LightUse { platform_shadow: false, ..ALL };
+        let contexts = if more.is_empty() {
+            vec![ALL, LightUse { diffuser: false, ..open }, LightUse { interreflection: false, ..open }]
+        } else {
+            vec![open]
+        };
+        let mut largest = [0.0_f64; 6];
+        for used in contexts {
+            let all = lit(used);
+            let bounded = [
+                (bound.falloff, LightUse { falloff: !used.falloff, ..used }),
+                (bound.diffuser, LightUse { diffuser: !used.diffuser, ..used }),
+                (bound.fresnel, LightUse { fresnel: !used.fresnel, ..used }),
+                (bound.platform_shadow, LightUse { platform_shadow: !used.platform_shadow, ..used }),
+                (bound.interreflection, LightUse { interreflection: !used.interreflection, ..used }),
+            ];
+            for (k, (bound, other)) in bounded.into_iter().enumerate() {
+                let found = largest_change(&all, &lit(other), !more.is_empty());
+                assert!(found <= bound, "{used:?} and {other:?}: {found} {bound}");
+                largest[k] = largest[k].max(found / bound);
+            }
+            let dark =
+                ShadedDome::new(&self::scene_of_power(0.0), &used, &mut Work::default()).unwrap().unwrap();
+            let brightest = largest_change(&all, &dark, !more.is_empty());
+            assert!(brightest <= bound.brightest, "{used:?}: {brightest} {bound:?}");
+            largest[5] = largest[5].max(brightest / bound.brightest);
+        }
+        println!("largest over bound: {largest:.2?}");
+        // A bound may be too large, but not by so much that nothing can ever be spared.
+        let least = if more.is_empty() { 0.04 } else { 0.005 };
+        assert!(largest.iter().all(|part| *part > least), "{largest:?}");
+    }
+}
+
+fn scene_of_power(power: f64) -> crate::Scene {
+    let mut file = scene("").file().clone();
+    file.light.leds.as_mut().unwrap().power = power;
+    let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
+    let design = domecast_design::Design::load(&folder.join("thumb24.json")).unwrap();
+    crate::Scene::new(file, &folder, design).unwrap()
+}
+
+#[test]
+fn codes_change_most_from_dark() {
+    assert_eq!(bounds::grey_of_change(1.0, 2.0), 255.0);
+    assert!((bounds::grey_of_change(2.0, 0.01) - 25.5).abs() < 1e-9);
+    assert!((bounds::grey_of_change(0.5, 0.01) - 5.1).abs() < 1e-9);
+}
+
+#[test]
+fn a_change_of_light_changes_no_code_by_more_than_its_bound_and_none_by_more_than_the_scale() {
+    for gamma in [0.5, 1.0, 2.2] {
+        let code = |light: f64| 255.0 * light.clamp(0.0, 1.0).powf(1.0 / gamma);
+        for i in 0..60 {
+            for j in 0..60 {
+                let (before, after) = (f64::from(i) * 0.05, f64::from(j) * 0.05);
+                let most = super::bounds::grey_of_change(gamma, (after - before).abs());
+                let found = (code(after) - code(before)).abs();
+                assert!(found <= most + 1e-9 && most <= 255.0, "{gamma} {before} {after}: {found} {most}");
+            }
+        }
+    }
+}

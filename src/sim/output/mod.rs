@@ -13,11 +13,12 @@ pub(crate) mod truth;
 mod video;
 mod writer;
 
-use std::fs;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError, mpsc};
 use std::time::Duration;
+
+use domecast_files::StagedFolder;
 
 use crate::SimError;
 use crate::contact::between::Around;
@@ -29,8 +30,7 @@ use crate::work::Work;
 
 use coded::CodedFrame;
 pub use error::RunError;
-use error::fault;
-use folder::Staging;
+use folder::foreign_entry;
 pub use parts::{ContactFault, PLAN_NAME, Summary, TRUTH_NAME, VIDEO_NAME};
 use parts::{Pending, Sent};
 use writer::Writer;
@@ -54,11 +54,11 @@ pub fn run(
     out: &Path,
     progress: &mut dyn FnMut(u32),
 ) -> Result<Summary, RunError> {
-    let staging = Staging::new(out)?;
+    let staged = StagedFolder::new(out, foreign_entry)?;
     let renderer = Renderer::new(scene, plan)?;
     let state = Pending::default();
     let (send, receive) = mpsc::channel();
-    let writer = Writer::new(scene, &staging.fresh)?;
+    let writer = Writer::new(scene, staged.path())?;
     let (solved, written) = std::thread::scope(|threads| {
         let state = &state;
         let written = threads.spawn(move || writer.write_all(&receive, state));
@@ -69,11 +69,10 @@ pub fn run(
     let mut summary = written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
     summary.work.merge(&solved?);
     summary.work.merge(renderer.setup());
-    let plan_path = staging.fresh.join(PLAN_NAME);
     // numbers, strings and lists only: nothing here can fail to be written
     let text = serde_json::to_string_pretty(plan).unwrap_or_default() + "\n";
-    fs::write(&plan_path, text).map_err(fault("write the plan", &plan_path))?;
-    staging.finish(out)?;
+    staged.write(PLAN_NAME, text.as_bytes())?;
+    staged.commit()?;
     Ok(summary)
 }
 

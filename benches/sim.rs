@@ -82,11 +82,11 @@ const GREY: f64 = 4.0;
 
 static BEGAN: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-/// Seconds that this program has spent computing, where the system tells it; else seconds gone by. Others may load the
+/// Seconds that this program has spent computing, where the system reports it; else seconds gone by. Others may load the
 /// machine while it is measured.
 fn clock_s() -> f64 {
-    let told = std::fs::read_to_string("/proc/self/schedstat").ok();
-    let spent_ns = told.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+    let statistics = std::fs::read_to_string("/proc/self/schedstat").ok();
+    let spent_ns = statistics.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
     spent_ns.map_or_else(|| BEGAN.elapsed().as_secs_f64(), |ns| 1e-9 * ns)
 }
 

@@ -82,7 +82,7 @@ fn are_apart(p: &[DVec3; 3], q: &[DVec3; 3]) -> bool {
     };
     let edges = |t: &[DVec3; 3]| [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
     let (mine, others) = (edges(p), edges(q));
-    // The axes first: most pairs that come this far are told apart by their boxes.
+    // The axes first: most pairs that come this far are separated by their boxes.
     DVec3::AXES.into_iter().any(parted)
         || parted(mine[0].cross(mine[1]))
         || parted(others[0].cross(others[1]))

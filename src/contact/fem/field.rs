@@ -9,7 +9,7 @@ use super::compliance::Compliance;
 use super::element::quadratic;
 use crate::outcome::Extent;
 
-/// The displacement under given forces; worked out when it is first asked for.
+/// The displacement under given forces; computed when it is first asked for.
 #[derive(Debug, Clone)]
 pub(crate) struct SurfaceField {
     compliance: Arc<Compliance>,

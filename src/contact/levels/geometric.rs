@@ -78,9 +78,9 @@ fn stiffen(force_n: f64, depth_mm: f64, back_mm_per_n: f64) -> f64 {
         (x - base.powf(1.5), 1.0 - 1.5 * lever * base.sqrt())
     };
     // Beyond the first stationary point the law has run away from the small-contact theory.
-    let most = if lever > 0.0 { ((1.5 * lever).powi(-2) - 1.0) / lever } else { 2.0 };
-    if most.is_nan() || most <= 1.0 {
+    let limit = if lever > 0.0 { ((1.5 * lever).powi(-2) - 1.0) / lever } else { 2.0 };
+    if limit.is_nan() || limit <= 1.0 {
         return 1.5;
     }
-    bracketed_newton(law, 0.0, most.min(4.0), 1.0).map_or(1.5, |root| root.value.clamp(0.2, 4.0))
+    bracketed_newton(law, 0.0, limit.min(4.0), 1.0).map_or(1.5, |root| root.value.clamp(0.2, 4.0))
 }

@@ -17,7 +17,7 @@ const DOME_PX: f64 = 380.0;
 const GROUND: [u8; 3] = [245, 245, 243];
 const MEMBRANE: [u8; 3] = [205, 205, 200];
 const LINE: [u8; 3] = [120, 120, 120];
-/// The first hit's dots are black, those of the others coloured, so that the shares can be told apart.
+/// The first hit's dots are black, those of the others coloured, so that the shares can be distinguished.
 const HITS: [[u8; 3]; 6] =
     [[10, 10, 10], [160, 30, 30], [25, 90, 160], [30, 120, 50], [140, 80, 10], [110, 40, 130]];
 

@@ -1,6 +1,6 @@
 //! The touched dome at the many times at which one frame gathers light.
 //!
-//! Between frames the membrane's displacement is linear in time, so it is worked out for the frame and its two neighbours
+//! Between frames the membrane's displacement is linear in time, so it is computed for the frame and its two neighbours
 //! only, over one set of places; at any time between it is their mean.
 
 use glam::DVec3;

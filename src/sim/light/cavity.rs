@@ -186,7 +186,7 @@ impl Hollow {
 }
 
 /// Where `a s^2 + 2 b s + c <= 0` and the radius is not negative, within a span. The frustum is convex, so it
-/// is one interval; the other nappe of its cone is told by the radius.
+/// is one interval; the radius excludes the other nappe of its cone.
 fn quadratic_span(
     a: f64,
     b: f64,

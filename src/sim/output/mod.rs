@@ -89,7 +89,7 @@ fn draw_all(
     let mut work = Work::default();
     let mut stepper = renderer.stepper()?;
     let rooms: Mutex<Vec<Scratch>> = Mutex::new(Vec::new());
-    let most = AHEAD_PER_THREAD * rayon::current_num_threads().max(1) as u32;
+    let max_ahead = AHEAD_PER_THREAD * rayon::current_num_threads().max(1) as u32;
     let mut reported = 0;
     let mut wait = |until: u32| {
         loop {
@@ -118,7 +118,7 @@ fn draw_all(
                 }
             }
             let around = Around::of(&touches, (number - first) as usize);
-            wait(number.saturating_sub(most - 1));
+            wait(number.saturating_sub(max_ahead - 1));
             if state.stopped.load(Ordering::Acquire) {
                 break;
             }

@@ -110,7 +110,7 @@ fn explain(output: &Output, scene: &Scene, plan: &Plan) -> Result<(), Failure> {
         let size = if bound.px.is_finite() && bound.grey.is_finite() {
             format!("<= {:.2e} px, {:.2e} grey", bound.px, bound.grey)
         } else {
-            "cannot be spared".into()
+            "is always used".into()
         };
         let mark = if entry.used { "used" } else { "left out" };
         output.say(&format!(

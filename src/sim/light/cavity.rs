@@ -237,7 +237,7 @@ fn convex_parts(shape: &Shape) -> Vec<Convex> {
                 (normal, normal.dot(corner))
             };
             let sides = outline_mm.iter().enumerate().map(side).collect();
-            let reach = outline_mm.iter().fold(DVec2::ZERO, |most, corner| most.max(corner.abs()));
+            let reach = outline_mm.iter().fold(DVec2::ZERO, |max, corner| max.max(corner.abs()));
             vec![Convex::Faces { sides, bottom: *bottom_z_mm, top: *top_z_mm, reach }]
         }
         Shape::Turned { profile, .. } => {

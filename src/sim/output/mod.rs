@@ -88,7 +88,7 @@ fn draw_all(
     let count = scene.frame_count();
     let mut work = Work::default();
     let mut stepper = renderer.stepper()?;
-    let rooms: Mutex<Vec<Scratch>> = Mutex::new(Vec::new());
+    let buffers: Mutex<Vec<Scratch>> = Mutex::new(Vec::new());
     let max_ahead = AHEAD_PER_THREAD * rayon::current_num_threads().max(1) as u32;
     let mut reported = 0;
     let mut wait = |until: u32| {
@@ -123,11 +123,11 @@ fn draw_all(
                 break;
             }
             state.begun.store(number + 1, Ordering::Release);
-            let (rooms, send) = (&rooms, send.clone());
+            let (buffers, send) = (&buffers, send.clone());
             scope.spawn(move |_| {
-                let mut room = lock(rooms).pop().unwrap_or_default();
-                let coded = coded(scene, renderer, number, around.as_ref(), &mut room);
-                lock(rooms).push(room);
+                let mut scratch = lock(buffers).pop().unwrap_or_default();
+                let coded = coded(scene, renderer, number, around.as_ref(), &mut scratch);
+                lock(buffers).push(scratch);
                 // The writer that is gone has met a fault of its own.
                 let _ = send.send((number, coded));
             });
@@ -139,9 +139,9 @@ fn draw_all(
     solved.map(|()| work)
 }
 
-/// What a thread that panicked left is room only.
-fn lock(rooms: &Mutex<Vec<Scratch>>) -> std::sync::MutexGuard<'_, Vec<Scratch>> {
-    rooms.lock().unwrap_or_else(PoisonError::into_inner)
+/// A buffer that a thread left in a panic is only memory to reuse.
+fn lock(buffers: &Mutex<Vec<Scratch>>) -> std::sync::MutexGuard<'_, Vec<Scratch>> {
+    buffers.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn coded(
@@ -149,13 +149,13 @@ fn coded(
     renderer: &Renderer<'_>,
     number: u32,
     around: Option<&Around>,
-    room: &mut Scratch,
+    scratch: &mut Scratch,
 ) -> Result<CodedFrame, SimError> {
-    let drawn = renderer.frame_around(number, around, room)?;
+    let drawn = renderer.frame_around(number, around, scratch)?;
     let (coded, image) = CodedFrame::new(scene, drawn).map_err(|problem| SimError::Frame {
         frame: number,
         problem: format!("its files cannot be coded: {problem}"),
     })?;
-    image.into_iter().for_each(|image| room.give_back(image));
+    image.into_iter().for_each(|image| scratch.give_back(image));
     Ok(coded)
 }

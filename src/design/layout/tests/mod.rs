@@ -67,6 +67,7 @@ fn spec(model: LensModel, change: serde_json::Value) -> LayoutSpec {
         white_markers: vec![],
         pattern,
         print,
+        origin: LayoutOrigin::default(),
     }
 }
 

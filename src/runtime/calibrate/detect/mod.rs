@@ -115,9 +115,9 @@ impl<'a> Detector<'a> {
             .into_iter()
             .map(|(id, centroid_px)| Observation { frame: number, kind: Kind::White, id, centroid_px })
             .collect();
-        let blacks = self.blacks(frame, &smooth, &pose);
-        let black_missing = self.constants.black_dots.len() - blacks.len();
-        observations.extend(blacks.into_iter().map(|(id, centroid_px)| Observation {
+        let black_dots = self.black_dots(frame, &smooth, &pose);
+        let black_missing = self.constants.black_dots.len() - black_dots.len();
+        observations.extend(black_dots.into_iter().map(|(id, centroid_px)| Observation {
             frame: number,
             kind: Kind::Black,
             id,
@@ -173,7 +173,7 @@ impl<'a> Detector<'a> {
     }
 
     /// The black dots that are found at a pose.
-    fn blacks(&self, frame: &Gray, smooth: &Gray, pose: &Rigid) -> Vec<(usize, DVec2)> {
+    fn black_dots(&self, frame: &Gray, smooth: &Gray, pose: &Rigid) -> Vec<(usize, DVec2)> {
         let Ok(optics) = self.optics.at_pose(pose) else { return Vec::new() };
         let radius_mm = self.optics.dome_radius_mm();
         let seen = |dot: &crate::constants::BlackDot| {

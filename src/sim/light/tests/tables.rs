@@ -203,7 +203,7 @@ fn no_effect_of_light_passes_its_bound() {
             largest[5] = largest[5].max(brightest / bound.brightest);
         }
         println!("largest over bound: {largest:.2?}");
-        // A bound may be too large, but not by so much that nothing can ever be spared.
+        // A bound may be too large, but not by so much that no effect can ever be left out.
         let smallest = if more.is_empty() { 0.04 } else { 0.005 };
         assert!(largest.iter().all(|part| *part > smallest), "{largest:?}");
     }

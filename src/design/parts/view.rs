@@ -9,7 +9,7 @@ use domecast_optics::camera::Lens;
 use domecast_optics::numeric::Rigid;
 
 /// Directions round a rim or marker that are followed.
-const DIRECTIONS: u32 = 48;
+pub(super) const DIRECTIONS: u32 = 48;
 /// Heights at which the dome's cone is taken. It is the hull of straight rays,
 /// so its radius is a convex function of height, and straight lines between
 /// these heights lie outside it.

@@ -119,18 +119,11 @@ pub fn drawing(design: &Design, assembly: &Assembly) -> Html {
 fn cut(item: &AssemblyItem, plane: &CuttingPlane) -> String {
     let mut path = String::new();
     for outline in item.mesh.outlines(plane) {
-        let count = outline.len();
-        let mut first = true;
-        for (i, p) in outline.iter().enumerate() {
-            // Faces are cut into pieces by their triangles: points on a straight line say nothing.
-            let (before, after) = (outline[(i + count - 1) % count], outline[(i + 1) % count]);
-            if count > 3 && (*p - before).perp_dot(after - *p).abs() < 1e-7 {
-                continue;
-            }
-            let _ = write!(path, "{}{:.3} {:.3}", if first { 'M' } else { 'L' }, p.x, -p.y);
-            first = false;
+        let kept = without_straight(&outline);
+        for (i, p) in kept.iter().enumerate() {
+            let _ = write!(path, "{}{:.3} {:.3}", if i == 0 { 'M' } else { 'L' }, p.x, -p.y);
         }
-        if !first {
+        if !kept.is_empty() {
             path.push('Z');
         }
     }
@@ -143,6 +136,37 @@ fn cut(item: &AssemblyItem, plane: &CuttingPlane) -> String {
         class_of(&item.name),
         AsHtml(name.as_str())
     )
+}
+
+/// A closed outline less what lies on it within a hair: faces are cut into pieces by their triangles (Douglas and
+/// Peucker 1973, between the first point and the one farthest from it).
+fn without_straight(outline: &[DVec2]) -> Vec<DVec2> {
+    const HAIR_MM: f64 = 5e-4;
+    let Some(&start) = outline.first() else { return Vec::new() };
+    let farthest = |from: usize, to: usize, off: &dyn Fn(DVec2) -> f64| {
+        (from..to)
+            .map(|i| (i, outline.get(i).map_or(0.0, |p| off(*p))))
+            .reduce(|a, b| if b.1 > a.1 { b } else { a })
+    };
+    let count = outline.len();
+    let Some((middle, _)) = farthest(0, count, &|p| p.distance(start)) else { return Vec::new() };
+    let at = |i: usize| outline.get(i % count).copied().unwrap_or(start);
+    let mut keep = vec![false; count];
+    let mut spans = vec![(0, middle), (middle, count)];
+    while let Some((from, to)) = spans.pop() {
+        if let Some(kept) = keep.get_mut(from) {
+            *kept = true;
+        }
+        let (a, b) = (at(from), at(to));
+        let along = (b - a).normalize_or_zero();
+        let off = |p: DVec2| (p - a - along * (p - a).dot(along).clamp(0.0, a.distance(b))).length();
+        if let Some((i, far)) = farthest(from + 1, to, &off)
+            && far > HAIR_MM
+        {
+            spans.extend([(from, i), (i, to)]);
+        }
+    }
+    outline.iter().zip(keep).filter_map(|(p, kept)| kept.then_some(*p)).collect()
 }
 
 /// The outline of a light, board, magnet or spring that stands behind the cut.

@@ -22,6 +22,7 @@
 
 mod accessories;
 mod assembly;
+mod bearing;
 mod bom;
 mod checks;
 mod drawing;
@@ -37,6 +38,7 @@ mod process;
 mod purchased;
 mod remedy;
 mod screws;
+mod seats;
 mod sight;
 mod traced;
 mod undercut;
@@ -63,7 +65,7 @@ pub use measures::Measures;
 pub use poses::Pose;
 pub use sight::{EdgeRay, MarkerView, markers_of};
 pub use traced::{PoseSight, RayCount, trace_sight};
-pub use verdict::{CheckedSensor, check_sensor};
+pub use verdict::{CheckedSensor, build_seated, check_sensor};
 pub use view::ViewCone;
 
 use crate::layout::PrintPass;

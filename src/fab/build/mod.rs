@@ -288,7 +288,7 @@ fn make_parts(
     springs: &constants::DesignSprings,
 ) -> Result<MadeParts, PartError> {
     let measures = springs.sight.measures()?;
-    let made = parts::build(measures, &layout.passes)?;
+    let made = parts::build_seated(design, measures, &layout.passes)?;
     let assembly = parts::Assembly::of(measures, &made)?;
     let checked = parts::check_sensor(design, measures, &made, &assembly, &layout.dots)?;
     let files = parts::files(design, measures, &made, &assembly)?;

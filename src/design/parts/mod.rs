@@ -33,6 +33,7 @@ mod image_rays;
 mod lower;
 mod measures;
 mod mould;
+mod openings;
 mod poses;
 mod process;
 mod purchased;

@@ -7,7 +7,7 @@ use serde_json::json;
 use super::error::Cure;
 use super::measures::polar;
 use super::screws::{THREADS, Thread};
-use super::{Measures, PartError};
+use super::{Measures, PartError, mould};
 use crate::spec::sections::SpringPlaces;
 use crate::spec::{Design, DesignWarning};
 
@@ -40,6 +40,7 @@ pub(super) fn faults(design: &Design, m: &Measures) -> Vec<PartError> {
     magnets_and_springs(design, m, &mut found);
     lights(m, &mut found);
     mounting(m, &mut found);
+    mould_pins(m, &mut found);
     found
 }
 
@@ -85,14 +86,18 @@ fn camera_in_block(m: &Measures) -> Option<PartError> {
     let [body_low, _] = body_z_mm(m);
     // The way into the block: down from above, or up from below.
     let missing = limit - (high - low);
-    let is_below = body_low < m.platforms.lower.underside_z_mm;
-    let to = if is_below { z + missing } else { z - missing };
+    let (underside, top) = (m.platforms.lower.underside_z_mm, m.lower_top_z_mm);
+    let to = if body_low < underside { z + missing } else { z - missing };
     let problem = if high <= low {
         format!("the body is {:.2} mm off the bore; engaged length", low - high)
     } else {
         "engaged length of the body in its bore".to_owned()
     };
-    let cure = Cure::length("camera.position_mm[2]", z, to);
+    let cure = if top - underside < limit {
+        Cure::length("platforms.lower.underside_z_mm", underside, top.min(high) - limit)
+    } else {
+        Cure::length("camera.position_mm[2]", z, to)
+    };
     Some(unheld(["camera", "lower_platform"], problem, [high - low, limit], cure))
 }
 
@@ -340,5 +345,36 @@ fn mounting(m: &Measures, found: &mut Vec<PartError>) {
             let values = [wall, m.process.min_wall_mm];
             found.push(unheld([&name, "lower_platform"], "wall beside its hole", values, cure));
         }
+    }
+}
+
+/// The mould's pins stand on the base beside the cavity, with a wall on both sides of their holes.
+fn mould_pins(m: &Measures, found: &mut Vec<PartError>) {
+    let pins = &m.mould.pins;
+    let wide = 0.5 * pins.diameter_mm + pins.clearance_mm;
+    let room = mould::half_side_mm(m) - wide - m.process.min_wall_mm;
+    let near = m.cavity_radius_mm() + wide + m.process.min_wall_mm;
+    for (i, at) in pins.at_mm.iter().enumerate() {
+        let at = DVec2::from_array(*at);
+        let wall = (room - at.abs().max_element()).min(at.length() - near) + m.process.min_wall_mm;
+        if wall >= m.process.min_wall_mm * (1.0 - 1e-9) {
+            continue;
+        }
+        let corner = DVec2::new(1.0_f64.copysign(at.x), 1.0_f64.copysign(at.y));
+        // Where it is, moved into the room; or, where the cavity is too near, in the corner.
+        let inside = at.clamp(DVec2::splat(-room), DVec2::splat(room));
+        let to = if inside.length() >= near { inside } else { corner * room };
+        if to.length() < near {
+            let wider = m.mould.wall_mm + (near - to.length());
+            let cure = Cure::length("mould.wall_mm", m.mould.wall_mm, wider);
+            let problem = "the mould's wall has no room for its pins; wall";
+            found.push(unheld(["mould pins", "mould_cavity"], problem, [wall, m.process.min_wall_mm], cure));
+            return;
+        }
+        let to = to.to_array().map(|x| (x * 100.0).trunc() / 100.0);
+        let cure = Cure::value(format!("mould.pins.at_mm[{i}]"), json!(to));
+        let name = format!("mould pin {i}");
+        let values = [wall, m.process.min_wall_mm];
+        found.push(unheld([&name, "mould_cavity"], "wall beside its hole", values, cure));
     }
 }

@@ -1,7 +1,7 @@
 //! Everything that is checked of the assembled sensor, with all faults in one answer.
 
 use super::traced::{PoseSight, trace_sight};
-use super::{Assembly, Measures, Part, PartError, bearing, build, check_assembly, seats};
+use super::{Assembly, Measures, Part, PartError, bearing, build, check_assembly, openings, seats};
 use crate::layout::{Dot, PrintPass};
 use crate::spec::{Design, DesignWarning};
 
@@ -22,6 +22,8 @@ pub fn build_seated(design: &Design, m: &Measures, hits: &[PrintPass]) -> Result
     let mut faults = seats::faults(design, m);
     let made = build(m, hits);
     if let Err(fault) = &made {
+        // A wall's thickness alone does not tell where its neighbours should be.
+        faults.extend(openings::faults(design, m));
         faults.push(fault.clone());
     }
     PartError::all(faults)?;

@@ -246,6 +246,23 @@ impl ViewCone {
         self.beams.iter().map(beam).fold(dome, f64::min)
     }
 
+    /// Distance of a point from the opening's surface, mm: sideways at its height, less the slope; negative within.
+    pub(super) fn clearance_mm(&self, at_mm: DVec2, z_mm: f64) -> f64 {
+        let (Some(low), Some(high)) = (self.cone_mm.first(), self.cone_mm.last()) else {
+            return f64::INFINITY;
+        };
+        let height = (high.y - low.y).max(f64::MIN_POSITIVE);
+        let upright = |slope: f64| 1.0 / (1.0 + slope * slope).sqrt();
+        let cone = (at_mm.length() - self.radius_mm(z_mm)) * upright((high.x - low.x) / height);
+        let part = (z_mm - low.y) / height;
+        let beam = |b: &Beam| {
+            let wider = b.high_radius_mm - b.low_radius_mm;
+            let off = at_mm.distance(b.low_mm.lerp(b.high_mm, part)) - (b.low_radius_mm + part * wider);
+            off * upright((wider.abs() + b.low_mm.distance(b.high_mm)) / height)
+        };
+        self.beams.iter().map(beam).fold(cone, f64::min)
+    }
+
     /// Whether all of it is within a distance of the axis.
     pub(super) fn is_within(&self, radius_mm: f64) -> bool {
         let heights = self.cone_mm.iter().all(|p| self.radius_mm(p.y) <= radius_mm);

@@ -356,5 +356,6 @@ fn with_value(design: &Design, mut error: DesignError) -> DesignError {
             error.value = filled.value;
         }
     }
+    error.more = error.more.into_iter().map(|more| with_value(design, more)).collect();
     error
 }

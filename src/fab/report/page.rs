@@ -97,8 +97,11 @@ fn key_figures(subject: &ReportSubject<'_>) -> Html {
         ("Largest field angle", format!("{}°", n(subject.constants.camera.max_field_angle_rad.to_degrees()))),
     ];
     if let Some(coverage) = subject.judged.coverage.first().and_then(|record| record.coverage.as_ref()) {
-        entries.push(("Dome visible at rest", percent(coverage.in_mask)));
+        entries.push(("Dome inside the mask at rest", percent(coverage.in_mask)));
     }
+    let rays = subject.sight.iter().flat_map(|pose| &pose.counts);
+    let (traced, blocked) = rays.fold((0, 0), |(t, b), count| (t + count.traced, b + count.blocked));
+    entries.push(("Rays of the image blocked by a part", format!("{blocked} of {traced} traced")));
     if let Some(springs) = &subject.constants.springs {
         entries.push(("Stiffness Fz", format!("{} N/mm", n(springs.stiffness[2][2]))));
     }

@@ -133,8 +133,16 @@ fn set_screws_beside_the_camera_are_refused() {
 
 #[test]
 fn a_cable_wider_than_its_exit_is_refused() {
-    refused("platforms.lower.cable_exit.width_mm", &["cable", "width"], &[("camera_body.cable_diameter_mm", json!(3.4))]);
-    refused("platforms.lower.cable_exit.height_mm", &["cable", "height"], &[("camera_body.cable_diameter_mm", json!(2.8))]);
+    refused(
+        "platforms.lower.cable_exit.width_mm",
+        &["cable", "width"],
+        &[("camera_body.cable_diameter_mm", json!(3.4))],
+    );
+    refused(
+        "platforms.lower.cable_exit.height_mm",
+        &["cable", "height"],
+        &[("camera_body.cable_diameter_mm", json!(2.8))],
+    );
 }
 
 #[test]
@@ -148,13 +156,17 @@ fn springs_and_magnets_without_a_seat_are_refused() {
     refused(
         "springs.places.ring.radius_mm",
         &["wall beside its seat"],
-        &[("springs.places.ring.radius_mm", json!(10.6))],
+        &[("springs.places.ring.radius_mm", json!(10.2))],
     );
 }
 
 #[test]
 fn lights_without_a_seat_are_refused() {
-    refused("leds.lip_top_z_mm", &["height of the package behind the lip"], &[("leds.lip_top_z_mm", json!(-4.2))]);
+    refused(
+        "leds.lip_top_z_mm",
+        &["height of the package behind the lip"],
+        &[("leds.lip_top_z_mm", json!(-4.2))],
+    );
     refused("leds.center_z_mm", &["LED boards and acrylic_sheet"], &[("leds.center_z_mm", json!(-1.9))]);
 }
 
@@ -194,4 +206,70 @@ fn all_faults_come_in_one_run() {
     ] {
         assert!(fault_in(&faults, field).is_some(), "{field}: {faults:#?}");
     }
+}
+
+/// A camera with a narrow lens, deep below: its view needs an opening in the lower platform.
+fn deep() -> Vec<(&'static str, Value)> {
+    vec![
+        ("camera.position_mm", json!([0, 0, -24])),
+        ("camera.model", json!("pinhole")),
+        ("camera.distortion", json!([])),
+        ("camera.matrix", json!([[480, 0, 319.5], [0, 480, 239.5], [0, 0, 1]])),
+        ("camera.field_of_view_deg", json!(80)),
+        ("runtime.mask_field_angle_deg", json!(29)),
+        ("pattern.polar_angle_deg", json!(50)),
+        ("platforms.lower.underside_z_mm", json!(-30.2)),
+        ("platforms.lower.clamp.z_mm", json!(-28)),
+        ("platforms.lower.clamp.hole_diameter_mm", json!(2.5)),
+        ("platforms.outer_mm", json!([36, 36])),
+        ("envelope.size_mm", json!([36, 36, 45])),
+        ("platforms.lower.mounting.at_mm", json!([[15, 15], [-15, 15], [-15, -15], [15, -15]])),
+        ("platforms.lower.wire_hole_ring_radius_mm", json!(15.8)),
+        ("springs.places.ring.radius_mm", json!(14)),
+        ("leds.list", json!([])),
+    ]
+}
+
+#[test]
+fn a_deep_camera_looks_through_a_cone() {
+    let tree = edited(&deep());
+    let checked = verdict(&tree).unwrap_or_else(|faults| panic!("{faults:#?}"));
+    assert!(checked.sight.iter().flat_map(|pose| &pose.counts).all(|count| count.blocked == 0));
+    // The same camera down a plain bore is blind, and told so.
+    let design = Design::from_str(&tree.to_string()).unwrap();
+    let mut m = Measures::of(&design).unwrap();
+    assert!(m.lower_view.take().is_some());
+    let layout = design.layout().unwrap();
+    let made = build(&m, &layout.passes).unwrap();
+    let assembly = Assembly::of(&m, &made).unwrap();
+    let said = check_sensor(&design, &m, &made, &assembly, &layout.dots).unwrap_err().to_string();
+    for word in ["lower_platform: blocks the view", "the dome's rim 100.0 %", "platforms.window_margin_mm"] {
+        assert!(said.contains(word), "\"{word}\" is not in \"{said}\"");
+    }
+}
+
+#[test]
+fn seats_that_the_view_cuts_into_are_named_with_their_place() {
+    let with = |field: &'static str, value: Value| {
+        let mut edits = deep();
+        edits.push((field, value));
+        edits
+    };
+    let lights = json!([{ "color": "red", "azimuth_deg": 0 }, { "color": "green", "azimuth_deg": 120 }]);
+    refused(
+        "springs.places.ring.radius_mm",
+        &["the camera's view"],
+        &with("springs.places.ring.radius_mm", json!(9.7)),
+    );
+    refused("leds.center_radius_mm", &["the camera's view"], &with("leds.list", lights));
+    refused(
+        "platforms.lower.mounting.at_mm[1]",
+        &["the camera's view"],
+        &with("platforms.lower.mounting.at_mm[1]", json!([-5, 5])),
+    );
+}
+
+#[test]
+fn mould_pins_beside_the_mould_are_refused() {
+    refused("mould.pins.at_mm[0]", &["mould pin 0"], &[("mould.pins.at_mm[0]", json!([25, 25]))]);
 }

@@ -63,7 +63,8 @@ fn bore(m: &Measures, lower: &RayTarget) -> Option<PartError> {
                 .filter(|&k| {
                     let way = DVec2::from_angle(TAU * (f64::from(k) + 0.5) / f64::from(AROUND)) * reach;
                     let to_sensor = |p: DVec2| m.sensor_from_camera.transform_point3(p.extend(along));
-                    lower.is_hit(to_sensor(DVec2::ZERO), to_sensor(way))
+                    let wall = to_sensor(way);
+                    lower.is_hit(to_sensor(DVec2::ZERO), wall) || is_set_screw(m, wall)
                 })
                 .count();
             round as f64 >= ROUND_SHARE * f64::from(AROUND)
@@ -79,6 +80,17 @@ fn bore(m: &Measures, lower: &RayTarget) -> Option<PartError> {
     let cure = Cure::length("camera.position_mm[2]", z, z - (limit - length));
     let problem = "length of the bore that stands round the body";
     Some(unheld(["camera", "lower_platform"], problem, [length, limit], cure))
+}
+
+/// Whether a set screw stands where the bore's wall would be.
+fn is_set_screw(m: &Measures, at_mm: DVec3) -> bool {
+    let clamp = &m.platforms.lower.clamp;
+    let from_axis = at_mm - m.pupil_mm().with_z(clamp.z_mm);
+    clamp.azimuth_deg.iter().any(|&azimuth| {
+        let way = polar(1.0, azimuth).extend(0.0);
+        let along = from_axis.dot(way);
+        along > 0.0 && (from_axis - way * along).length() <= 0.5 * clamp.hole_diameter_mm + skin_mm(m)
+    })
 }
 
 /// How much of the sheet's border lies on its seat.

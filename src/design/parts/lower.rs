@@ -17,8 +17,15 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     );
     // A bore is crossed by what leads into it; push-out holes may end in the
     // cable's channel.
-    b.may_meet =
-        &[("camera bore", "clamp hole"), ("camera bore", "cable exit"), ("push-out hole", "cable exit")];
+    b.may_meet = &[
+        ("camera bore", "clamp hole"),
+        ("camera bore", "cable exit"),
+        ("push-out hole", "cable exit"),
+        ("camera bore", "view cone"),
+        ("camera bore", "marker view"),
+        ("view cone", "marker view"),
+        ("marker view", "marker view"),
+    ];
     if top <= bottom {
         return Err(b.infeasible(
             "height",
@@ -40,6 +47,8 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
         Feature::new("camera bore", "camera_body.bore_clearance_mm", bore).placed(m.sensor_from_camera),
     );
     b.genus += 1;
+
+    view_opening(m, &mut b);
 
     let clamp = &lower.clamp;
     for (i, &azimuth_deg) in clamp.azimuth_deg.iter().enumerate() {
@@ -70,6 +79,20 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
 
     cable_exit(m, reach, &mut b)?;
     Ok(b)
+}
+
+/// Cuts what the camera must see through the block, where the bore is too narrow for it.
+fn view_opening(m: &Measures, b: &mut Blueprint) {
+    let Some(view) = &m.lower_view else { return };
+    let (top, over) = (m.lower_top_z_mm, m.overcut_mm);
+    // About the pupil, from the camera's front to beyond the top; below the front the bore is open anyway.
+    let to_pupil = DAffine3::from_translation(m.pupil_mm().with_z(0.0));
+    let below = 1e-3 * (top - m.platforms.lower.underside_z_mm);
+    let field = "camera.position_mm[2]";
+    b.cut.push(Feature::new("view cone", field, view.cone(below, top + over)).placed(to_pupil));
+    for (i, (shape, placed)) in view.beams(below, top + over).into_iter().enumerate() {
+        b.cut.push(Feature::new("marker view", field, shape).numbered(i).placed(to_pupil * placed));
+    }
 }
 
 /// Cuts the mounting holes with their counterbores.

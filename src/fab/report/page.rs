@@ -97,8 +97,11 @@ fn key_figures(subject: &ReportSubject<'_>) -> Html {
         ("Largest field angle", format!("{}°", n(subject.constants.camera.max_field_angle_rad.to_degrees()))),
     ];
     if let Some(coverage) = subject.judged.coverage.first().and_then(|record| record.coverage.as_ref()) {
-        entries.push(("Dome visible at rest", percent(coverage.in_mask)));
+        entries.push(("Dome inside the mask at rest", percent(coverage.in_mask)));
     }
+    let rays = subject.sight.iter().flat_map(|pose| &pose.counts);
+    let (traced, blocked) = rays.fold((0, 0), |(t, b), count| (t + count.traced, b + count.blocked));
+    entries.push(("Rays of the image blocked by a part", format!("{blocked} of {traced} traced")));
     if let Some(springs) = &subject.constants.springs {
         entries.push(("Stiffness Fz", format!("{} N/mm", n(springs.stiffness[2][2]))));
     }
@@ -118,9 +121,10 @@ fn sensor(subject: &ReportSubject<'_>) -> Html {
     };
     let rows: Vec<Vec<Html>> = subject.constants.optics.layers.iter().map(row).collect();
     figure(
-        &section::drawing(subject.design),
-        "Cut along x, true to scale: red are the rays of the image's middle row, bent at the sheet and in the silicone. \
-         Platforms are drawn as blocks; their true shape is below.",
+        &section::drawing(subject.design, subject.assembly),
+        "Cut along x through the pupil, true to scale, from the meshes of the parts; dashed grey outlines stand behind the \
+         cut. Red are rays of the image's middle row, bent at the sheet and in the silicone; dashed red ones end on a part \
+         beyond the dome.",
     ) + table("Layers from the camera outwards", &["layer", "thickness", "index (red / green / blue)"], &rows)
 }
 

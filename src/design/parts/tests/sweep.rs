@@ -20,9 +20,10 @@ fn sweep(count: usize) -> (usize, Vec<String>) {
         };
         let made = Measures::of(&design).and_then(|m| {
             let passes = [PrintPass::new(0.0, 0.0), PrintPass::new(0.02 * (index % 40) as f64, index as f64)];
-            let parts = build(&m, &passes)?;
+            let parts = build_seated(&design, &m, &passes)?;
             let assembly = Assembly::of(&m, &parts)?;
-            check_assembly(&m, &parts, &assembly)?;
+            let checked = check_sensor(&design, &m, &parts, &assembly, &[])?;
+            assert!(checked.sight.iter().flat_map(|pose| &pose.counts).all(|count| count.blocked == 0));
             Ok(parts)
         });
         match made {
@@ -38,12 +39,17 @@ fn sweep(count: usize) -> (usize, Vec<String>) {
                     assert!((found.volume_mm3 / part.volume_mm3 - 1.0).abs() < 1e-5);
                 }
             }
-            Err(PartError::Infeasible { field, place, .. }) => {
-                assert!(!field.is_empty());
-                refused.push(format!("{field}: {place}"));
+            Err(error) => {
+                for fault in error.faults() {
+                    let field = match fault {
+                        PartError::Infeasible { field, .. } | PartError::View { field, .. } => field,
+                        PartError::Unheld { cure, .. } | PartError::Blocked { cure, .. } => &cure.field,
+                        _ => panic!("design {index} is neither made nor refused by field: {fault}\n{text}"),
+                    };
+                    assert!(!field.is_empty());
+                    refused.push(format!("{field}: {fault}"));
+                }
             }
-            Err(PartError::View { field, problem }) => refused.push(format!("{field}: {problem}")),
-            Err(other) => panic!("design {index} is neither made nor refused by field: {other}\n{text}"),
         }
     }
     (sound, refused)
@@ -106,11 +112,13 @@ fn awkward_parts_are_sound_or_refused() {
             m.process.min_wall_mm = limit;
             match build(&m, &passes()) {
                 Ok(parts) => parts.iter().for_each(|part| part.check().unwrap()),
-                Err(PartError::Infeasible { field, .. }) => assert!(!field.is_empty(), "{name}"),
-                // Without a limit for walls, touching features are let
-                // through to the mesh, which must then be refused as such.
-                Err(PartError::Broken { .. }) if limit == 0.0 => {}
-                Err(other) => panic!("{name}: {other}"),
+                Err(error) => error.faults().iter().for_each(|fault| match fault {
+                    PartError::Infeasible { field, .. } => assert!(!field.is_empty(), "{name}"),
+                    // Without a limit for walls, touching features are let
+                    // through to the mesh, which must then be refused as such.
+                    PartError::Broken { .. } if limit == 0.0 => {}
+                    other => panic!("{name}: {other}"),
+                }),
             }
         }
     }

@@ -78,6 +78,10 @@ pub struct CameraBodySection {
     /// Diameter of the cable that leaves at the back, mm.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 100.0))]
     pub cable_diameter_mm: f64,
+    /// Smallest radius that the cable may be bent to, mm; left out: twice its diameter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1000.0))]
+    pub cable_bend_radius_mm: Option<f64>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,

@@ -11,6 +11,7 @@
 //! ```
 
 pub mod calibration;
+pub mod catalogue;
 pub mod layout;
 pub mod parts;
 mod spec;

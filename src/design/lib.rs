@@ -10,8 +10,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod calibration;
-pub mod catalogue;
 pub mod layout;
 pub mod parts;
 mod spec;

@@ -8,11 +8,11 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
+use super::calibration::{CalibrationHints, CameraCalibration};
+use super::catalogue::{self, CatalogueKind};
 use super::design::DesignWarning;
 use super::error::DesignError;
 use super::source::{parse, read_text};
-use crate::calibration::{Calibration, CalibrationHints};
-use crate::catalogue::{self, CatalogueKind};
 use domecast_optics::camera::LensModel;
 
 /// A field that a calibration or the catalogue filled in.
@@ -140,7 +140,7 @@ fn calibrate(
     };
     let side = |name: &str| camera.get(name).and_then(Value::as_u64);
     let hints = CalibrationHints { camera: which, model, width: side("width"), height: side("height") };
-    let read = Calibration::load(&path, &hints).map_err(|mut fault| {
+    let read = CameraCalibration::load(&path, &hints).map_err(|mut fault| {
         fault.file = None;
         let problem = format!("this calibration cannot be used: {}", described(&fault));
         let place = fault.place;

@@ -5,6 +5,8 @@
 //! checked and derived values are computed once. What later modules see is valid by construction;
 //! they never check again, and they never see a default that the file does not state.
 
+pub mod calibration;
+pub mod catalogue;
 mod design;
 mod error;
 mod explain;

@@ -38,7 +38,7 @@ mod tests {
 
     use super::*;
     use crate::constants;
-    use domecast_design::calibration::{Calibration, CalibrationHints};
+    use domecast_design::calibration::{CalibrationHints, CameraCalibration};
     use domecast_design::layout::Layout;
     use domecast_mesh::TriMesh;
     use domecast_runtime::constants::Constants;
@@ -81,15 +81,13 @@ mod tests {
         all.push(radtan);
         let mut looked = 0;
         for constants in &all {
-            let written = [
-                Ok(opencv_yaml(constants)),
-                Ok(camera_info_yaml(constants)),
-                kalibr_yaml(constants),
-            ];
-            let write = [|c: &Constants| opencv_yaml(c), |c| camera_info_yaml(c), |c| kalibr_yaml(c).unwrap()];
+            let written =
+                [Ok(opencv_yaml(constants)), Ok(camera_info_yaml(constants)), kalibr_yaml(constants)];
+            let write =
+                [|c: &Constants| opencv_yaml(c), |c| camera_info_yaml(c), |c| kalibr_yaml(c).unwrap()];
             for (text, write) in written.into_iter().zip(write) {
                 let Ok(text) = text else { continue };
-                let read = Calibration::parse(&text, &CalibrationHints::default()).unwrap();
+                let read = CameraCalibration::parse(&text, &CalibrationHints::default()).unwrap();
                 assert_eq!(read.matrix, constants.camera.matrix);
                 let mut again = constants.clone();
                 again.camera.model = read.model.as_str().into();

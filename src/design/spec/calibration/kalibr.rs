@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 use super::parts::{Named, Parts, numbers, pixels, word, wrong_count};
-use super::{CalibrationForm, CalibrationHints};
+use super::types::{CalibrationForm, CalibrationHints};
 use crate::spec::DesignError;
 use domecast_optics::camera::LensModel;
 
@@ -106,21 +106,7 @@ pub(super) fn read(
         let name = format!("`{distortion_model}`");
         return Err(wrong_count(&field("distortion_coeffs"), coefficients.len(), &name, &count.to_string()));
     }
-    let (width, height) = match camera.get("resolution") {
-        None => (None, None),
-        Some(Value::Array(sides)) if sides.len() == 2 => {
-            let side = |i: usize| pixels(&format!("{}[{i}]", field("resolution")), &sides[i]);
-            (Some(side(0)?), Some(side(1)?))
-        }
-        Some(other) => {
-            return Err(DesignError::at(
-                field("resolution"),
-                other,
-                "not two numbers",
-                "[width, height], px",
-            ));
-        }
-    };
+    let [width, height] = resolution(&field("resolution"), camera)?;
     Ok(Parts {
         form: CalibrationForm::KalibrCamchain,
         camera: name.clone(),
@@ -130,4 +116,16 @@ pub(super) fn read(
         model,
         distortion: Named { field: field("distortion_coeffs"), value: coefficients },
     })
+}
+
+/// Width and height, where the file has them.
+fn resolution(field: &str, camera: &Map<String, Value>) -> Result<[Option<Named<u64>>; 2], DesignError> {
+    match camera.get("resolution") {
+        None => Ok([None, None]),
+        Some(Value::Array(sides)) if sides.len() == 2 => {
+            let side = |i: usize| pixels(&format!("{field}[{i}]"), &sides[i]);
+            Ok([Some(side(0)?), Some(side(1)?)])
+        }
+        Some(other) => Err(DesignError::at(field, other, "not two numbers", "[width, height], px")),
+    }
 }

@@ -4,7 +4,7 @@ use serde_json::{Map, Number, Value};
 use yaml_rust2::parser::{Event, Parser};
 use yaml_rust2::scanner::TScalarStyle;
 
-use super::ALLOWED_FILE;
+use super::types::ALLOWED_FILE;
 use crate::spec::{DesignError, parse_json};
 
 /// No calibration nests deeper; what does would exhaust the stack.

@@ -1,7 +1,7 @@
 //! Whether what a file says can be a camera, and the one expected.
 
 use super::parts::{Named, Parts};
-use super::{Calibration, CalibrationHints};
+use super::types::{CalibrationHints, CameraCalibration};
 use crate::spec::DesignError;
 use domecast_optics::camera::{LensModel, LensSpec};
 
@@ -17,7 +17,7 @@ const UNUSUAL_OFF_CENTER: f64 = 0.1;
 const UNUSUAL_ASPECT: f64 = 0.02;
 
 /// Checks the parts and puts them together.
-pub(super) fn check(parts: Parts, hints: &CalibrationHints) -> Result<Calibration, DesignError> {
+pub(super) fn check(parts: Parts, hints: &CalibrationHints) -> Result<CameraCalibration, DesignError> {
     let width = size("image_width", "width", parts.width.as_ref(), hints.width)?;
     let height = size("image_height", "height", parts.height.as_ref(), hints.height)?;
     if let Some(wanted) = hints.model.filter(|wanted| *wanted != parts.model) {
@@ -63,7 +63,7 @@ pub(super) fn check(parts: Parts, hints: &CalibrationHints) -> Result<Calibratio
         DesignError::at(field, fault.value, "the lens cannot be", fault.allowed)
     })?;
     let LensSpec { model, distortion, .. } = spec;
-    Ok(Calibration {
+    Ok(CameraCalibration {
         form: parts.form,
         camera: parts.camera,
         width,

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 use super::parts::{Named, Parts, nine, numbers, pixels, word, wrong_count};
-use super::{ALLOWED_FILE, CalibrationForm, CalibrationHints};
+use super::types::{ALLOWED_FILE, CalibrationForm, CalibrationHints};
 use crate::spec::DesignError;
 use domecast_optics::camera::LensModel;
 

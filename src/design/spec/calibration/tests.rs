@@ -1,9 +1,10 @@
 //! What is read alike from every form, and what is refused; files that fail stand in `tests/cases/calibrations`.
 use super::*;
+use domecast_optics::camera::LensModel;
 use proptest::prelude::*;
 
-fn parse(text: &str) -> Result<Calibration, DesignError> {
-    Calibration::parse(text, &CalibrationHints::default())
+fn parse(text: &str) -> Result<CameraCalibration, DesignError> {
+    CameraCalibration::parse(text, &CalibrationHints::default())
 }
 
 const YAML: &str = "%YAML:1.0
@@ -82,9 +83,9 @@ fn a_camera_is_chosen_by_name_only() {
     let fault = parse(&two).unwrap_err().to_string();
     assert!(fault.contains("cam0 or cam1") && fault.contains("calibration_camera"), "{fault}");
     let hints = CalibrationHints { camera: Some("cam1".into()), ..Default::default() };
-    assert_eq!(Calibration::parse(&two, &hints).unwrap().matrix[0][0], 400.0);
+    assert_eq!(CameraCalibration::parse(&two, &hints).unwrap().matrix[0][0], 400.0);
     let hints = CalibrationHints { camera: Some("cam7".into()), ..Default::default() };
-    assert!(Calibration::parse(&two, &hints).unwrap_err().to_string().contains("cam0 or cam1"));
+    assert!(CameraCalibration::parse(&two, &hints).unwrap_err().to_string().contains("cam0 or cam1"));
 }
 
 #[test]
@@ -93,7 +94,7 @@ fn four_coefficients_are_asked_for() {
     assert!(parse(&four).unwrap_err().to_string().contains("kannala_brandt"));
     for model in [LensModel::BrownConrady, LensModel::KannalaBrandt] {
         let hints = CalibrationHints { model: Some(model), ..Default::default() };
-        assert_eq!(Calibration::parse(&four, &hints).unwrap().model, model);
+        assert_eq!(CameraCalibration::parse(&four, &hints).unwrap().model, model);
     }
     let stated = four + "fisheye_model: 1\n";
     assert_eq!(parse(&stated).unwrap().model, LensModel::KannalaBrandt);
@@ -126,7 +127,7 @@ fn what_cannot_be_meant_is_named() {
         assert!(fault.contains(model) && fault.contains("cam0.camera_model"), "{fault}");
     }
     let hints = CalibrationHints { width: Some(1280), ..Default::default() };
-    assert!(Calibration::parse(ROS, &hints).unwrap_err().to_string().contains("1280"));
+    assert!(CameraCalibration::parse(ROS, &hints).unwrap_err().to_string().contains("1280"));
     let aside = parse(&ROS.replace("0, 320", "0, 250")).unwrap();
     assert!(aside.warnings()[0].contains("cx is 250 px"), "{:?}", aside.warnings());
 }

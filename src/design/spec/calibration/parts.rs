@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::CalibrationForm;
+use super::types::CalibrationForm;
 use crate::spec::DesignError;
 use domecast_optics::camera::LensModel;
 

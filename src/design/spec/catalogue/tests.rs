@@ -6,7 +6,7 @@ use crate::Design;
 use std::str::FromStr;
 
 fn thumb24() -> Value {
-    serde_json::from_str(include_str!("../../../designs/thumb24.json")).unwrap()
+    serde_json::from_str(include_str!("../../../../designs/thumb24.json")).unwrap()
 }
 
 #[test]
@@ -107,7 +107,7 @@ fn what_a_design_gives_wins_and_sources_are_kept() {
     assert!(text["magnets"].get("from").is_none());
     assert_eq!(Design::from_str(read.text()).unwrap().sections(), read.sections());
     // a design that names nothing keeps its own bytes
-    let own = include_str!("../../../designs/thumb24.json");
+    let own = include_str!("../../../../designs/thumb24.json");
     assert_eq!(Design::from_str(own).unwrap().text(), own);
 }
 

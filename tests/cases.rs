@@ -349,6 +349,11 @@ fn arguments() {
 }
 
 #[test]
+fn calibrations() {
+    run_topic("calibrations");
+}
+
+#[test]
 fn every_topic_is_run() {
     let mut found = Vec::new();
     for entry in fs::read_dir(Path::new(REPOSITORY).join("tests/cases")).expect("the cases") {
@@ -358,5 +363,8 @@ fn every_topic_is_run() {
         }
     }
     found.sort();
-    assert_eq!(found, ["arguments", "constants", "designs", "frames", "points", "scenes", "tables"]);
+    assert_eq!(
+        found,
+        ["arguments", "calibrations", "constants", "designs", "frames", "points", "scenes", "tables"]
+    );
 }

@@ -5,9 +5,12 @@
 //! checked and derived values are computed once. What later modules see is valid by construction;
 //! they never check again, and they never see a default that the file does not state.
 
+pub mod calibration;
+pub mod catalogue;
 mod design;
 mod error;
 mod explain;
+mod fill;
 mod lints;
 mod resolve;
 mod rules;
@@ -28,6 +31,7 @@ use domecast_optics::SensorOptics;
 pub use design::{Design, DesignWarning};
 pub use error::DesignError;
 pub use explain::{Explained, explain};
+pub use fill::{Filled, Filling, fill, read_filled};
 pub use schema::{design_schema, schema_of};
 pub use sections::DesignFile;
 pub use source::{parse as parse_json, read_text};
@@ -41,18 +45,39 @@ impl Design {
     /// # Errors
     /// The first fault of the file: see [`DesignError`].
     pub fn load(path: &Path) -> Result<Self, DesignError> {
-        read_text(path)?.parse().map_err(|error: DesignError| error.in_file(path))
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::from_text(&read_text(path)?, folder).map_err(|error| error.in_file(path))
     }
+
+    /// Resolves a design from its text; the paths in it are from `folder`.
+    ///
+    /// # Errors
+    /// The first fault of the text: see [`DesignError`].
+    pub fn from_text(text: &str, folder: &Path) -> Result<Self, DesignError> {
+        filled_design(text, Some(folder))
+    }
+}
+
+/// A design from its text, with what it takes from elsewhere; one that took something has a text of its own, complete
+/// in itself.
+fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, DesignError> {
+    let mut value = parse_json(text)?;
+    check_version(&value)?;
+    let filling = fill(&mut value, folder)?;
+    if filling.fields.is_empty() {
+        return resolve::resolve(from_value(&value)?, text);
+    }
+    let mut design = resolve::resolve(from_value(&value)?, &format!("{value:#}\n"))?;
+    design.warnings.extend(filling.warnings);
+    Ok(design)
 }
 
 impl std::str::FromStr for Design {
     type Err = DesignError;
 
-    /// Resolves a design from its text.
+    /// Resolves a design from its text, which lies in no folder: see [`Design::from_text`].
     fn from_str(text: &str) -> Result<Self, DesignError> {
-        let value = parse_json(text)?;
-        check_version(&value)?;
-        resolve::resolve(from_value(&value)?, text)
+        filled_design(text, None)
     }
 }
 
@@ -62,7 +87,7 @@ impl std::str::FromStr for Design {
 /// The first fault of those fields.
 pub fn load_optics(path: &Path) -> Result<SensorOptics, DesignError> {
     let text = read_text(path)?;
-    optics_from_text(&text).map_err(|error| error.in_file(path))
+    filled_optics(&text, path.parent()).map_err(|error| error.in_file(path))
 }
 
 /// [`load_optics`] on text.
@@ -70,10 +95,15 @@ pub fn load_optics(path: &Path) -> Result<SensorOptics, DesignError> {
 /// # Errors
 /// The first fault of those fields.
 pub fn optics_from_text(text: &str) -> Result<SensorOptics, DesignError> {
+    filled_optics(text, None)
+}
+
+fn filled_optics(text: &str, folder: Option<&Path>) -> Result<SensorOptics, DesignError> {
     let mut value = parse_json(text)?;
     if let Value::Object(map) = &mut value {
         map.retain(|key, _| OPTICS_FIELDS.contains(&key.as_str()));
     }
+    fill(&mut value, folder)?;
     let file: sections::OpticsFile = from_value(&value)?;
     resolve::optics(&file.camera, &file.optics, &file.dome)
 }

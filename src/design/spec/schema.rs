@@ -17,6 +17,16 @@ use super::sections::DesignFile;
 /// The JSON schema (draft 2020-12) of the design file.
 pub fn design_schema() -> &'static Value {
     static SCHEMA: OnceLock<Value> = OnceLock::new();
+    SCHEMA.get_or_init(|| {
+        let mut schema = strict_schema().clone();
+        super::fill::relax(&mut schema);
+        schema
+    })
+}
+
+/// The schema of a design in which what it takes from elsewhere is filled in.
+pub(super) fn strict_schema() -> &'static Value {
+    static SCHEMA: OnceLock<Value> = OnceLock::new();
     SCHEMA.get_or_init(schema_of::<DesignFile>)
 }
 

@@ -85,3 +85,67 @@ fn bad_lenses_are_named() {
     assert_eq!(fails(&|s| s.field_of_view_rad = 0.0), "field_of_view_rad");
     assert_eq!(fails(&|s| s.pupil_shift_mm = vec![f64::NAN]), "pupil_shift_mm[0]");
 }
+
+/// A lens with prism terms and tilt, from like published ones to absurd ones.
+fn prism_lens(r: &mut crate::numeric::SeededRandom) -> Option<Lens> {
+    let wild = if r.next_u64().is_multiple_of(3) { 10.0 } else { 1.0 };
+    let mut k = vec![r.between(-0.35, 0.1), r.between(-0.05, 0.12)];
+    k.extend((0..2).map(|_| wild * r.between(-0.003, 0.003)));
+    k.extend((0..4).map(|_| wild * r.between(-0.02, 0.02)));
+    k.extend((0..4).map(|_| wild * r.between(-0.005, 0.005)));
+    k.extend((0..2).map(|_| wild * r.between(-0.03, 0.03)));
+    Lens::new(LensSpec {
+        distortion: k,
+        field_of_view_rad: r.between(40.0, 175.0).to_radians(),
+        ..lens(LensModel::BrownConrady, &[0.0; 5], 90.0).spec().clone()
+    })
+    .ok()
+}
+
+#[test]
+fn random_prisms_are_inverted_in_all_of_their_domain() {
+    let mut r = crate::numeric::SeededRandom::new(21);
+    let (mut lenses, mut rays) = (0, 0);
+    while lenses < 500 {
+        let Some(lens) = prism_lens(&mut r) else { continue };
+        lenses += 1;
+        let end = lens.max_field_angle_rad();
+        for _ in 0..40 {
+            let (theta, phi) = (end * (1.0 - 1e-7) * r.uniform().sqrt(), r.between(-3.2, 3.2));
+            let ray = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+            let pixel = lens.project(ray).unwrap();
+            let solved =
+                lens.unproject_solved(pixel).unwrap_or_else(|e| panic!("{e}: {:?} {theta}", lens.spec()));
+            let (_, slope) = lens.unproject_with_jacobian(pixel).unwrap();
+            let allowed = 1e-10_f64.max(8.0 * f64::EPSILON * slope.norm() * pixel.length());
+            assert!(solved.ray.cross(ray).length() <= allowed, "{:?} at {theta}", lens.spec());
+            assert!(solved.iterations <= Lens::MAX_UNPROJECT_ITERATIONS);
+            rays += 1;
+            // Any pixel has an answer by name.
+            let spread = 1.2 * lens.max_radius_px().min(5000.0);
+            let any = pixel + DVec2::new(r.between(-spread, spread), r.between(-spread, spread));
+            if let Err(limit) = lens.unproject(any) {
+                assert_eq!(limit, lens.end_limit(), "{:?} at {any}", lens.spec());
+            }
+        }
+    }
+    assert_eq!(rays, 20_000);
+}
+
+#[test]
+fn a_tilted_sensor_keeps_the_principal_point_and_squashes_one_side() {
+    let k = |tau_x: f64| {
+        let mut k = vec![0.0; 14];
+        k[12] = tau_x;
+        k
+    };
+    let tilted = lens(LensModel::BrownConrady, &k(0.1), 90.0);
+    let [up, down] = [-0.5, 0.5].map(|y| tilted.project(DVec3::new(0.0, y, 1.0)).unwrap().y - 239.5);
+    // By hand: y''' = y R33 / (R33 - sin(tau_x) y / cos(tau_x)) with R33 = cos(tau_x), tau_y = 0.
+    for (y, seen) in [(-0.5, up), (0.5, down)] {
+        let (sin, cos) = 0.1_f64.sin_cos();
+        let by_hand = (cos * cos * y + sin * sin * y) / (-sin * y + cos);
+        assert!((seen - 230.5 * by_hand).abs() < 1e-10, "{seen} {by_hand}");
+    }
+    assert_eq!(tilted.project(DVec3::Z), Ok(DVec2::new(319.5, 239.5)));
+}

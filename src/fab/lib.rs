@@ -6,5 +6,6 @@ pub mod chart;
 pub mod compare;
 pub mod constants;
 pub mod html;
+pub mod light;
 pub mod numbers;
 pub mod report;

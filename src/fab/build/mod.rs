@@ -32,6 +32,7 @@ use std::fmt;
 use crate::artwork;
 use crate::artwork::{FilmLabel, RenderError};
 use crate::constants;
+use crate::light::LightCheck;
 use crate::report;
 use domecast_design::layout::report::LayoutReport;
 use domecast_design::layout::{Layout, LayoutError, LayoutSpec};
@@ -171,13 +172,18 @@ fn make(
     let constants = constants::with_springs(design, &layout, &springs)?;
     tree.add("constants/constants.json", constants.to_json().into_bytes());
     // four pieces of work that share nothing but what they read, on as many threads as there are
-    step("drawing the artwork, making the parts, driving the loads to their limits");
+    step("drawing the artwork, making the parts, lighting the sensor, driving the loads to their limits");
     let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
     let draw = || artwork::files(&spec, &layout, &label);
     let judge = || LayoutReport::new(design, &spec, &layout);
     let make_parts = || make_parts(design, &layout, &springs);
-    let load = || constants::force_report(design, &springs);
-    let ((films, judged), (parts, forces)) =
+    // What a frame resolves hangs on how the markers stand out in it.
+    let load = || {
+        let light = LightCheck::of(design)?;
+        let noise_px: Vec<f64> = light.report.markers.iter().map(|marker| marker.centroid_sd_px).collect();
+        Ok::<_, DesignError>((light, constants::force_report(design, &springs, &noise_px)?))
+    };
+    let ((films, judged), (parts, loaded)) =
         rayon::join(|| rayon::join(draw, judge), || rayon::join(make_parts, load));
     for file in films? {
         tree.add(file.path, file.bytes);
@@ -187,7 +193,10 @@ fn make(
     for file in files {
         tree.add(file.path, file.bytes);
     }
-    let forces = forces?;
+    let (light, forces) = loaded?;
+    for (path, bytes) in light.files() {
+        tree.add(path, bytes);
+    }
     for (path, text) in forces.files() {
         tree.add(path, text.into_bytes());
     }
@@ -200,7 +209,7 @@ fn make(
     for (path, text) in forms.files {
         tree.add(path, text.into_bytes());
     }
-    let warnings = warnings(design, &judged, forms.left_out);
+    let warnings = warnings(design, &judged, &light, forms.left_out);
 
     step("writing the page");
     let shown: Vec<(String, String)> =
@@ -211,6 +220,7 @@ fn make(
         judged: &judged,
         constants: &constants,
         forces: &forces,
+        light: &light.report,
         parts: &made,
         poses: &poses,
         warnings: &shown,
@@ -228,12 +238,18 @@ fn make(
 }
 
 /// The design's own warnings, then those of the constants' formats and of the pattern.
-fn warnings(design: &Design, judged: &LayoutReport, formats_left_out: Vec<String>) -> Vec<Warning> {
+fn warnings(
+    design: &Design,
+    judged: &LayoutReport,
+    light: &LightCheck,
+    formats_left_out: Vec<String>,
+) -> Vec<Warning> {
     let warning = |field: &str, message: String| Warning { field: field.into(), message };
     let own = design.warnings().iter().map(|own| warning(&own.field, own.message.clone()));
     let formats = formats_left_out.into_iter().map(|message| warning("constants", message));
     let pattern = judged.warnings.iter().map(|message| warning("pattern", message.clone()));
-    own.chain(formats).chain(pattern).collect()
+    let lit = light.warnings.iter().map(|(field, message)| warning(field, message.clone()));
+    own.chain(formats).chain(pattern).chain(lit).collect()
 }
 
 /// What a checker should find in a part's mesh.

@@ -7,5 +7,6 @@ pub mod compare;
 pub mod constants;
 mod hash;
 pub mod html;
+pub mod light;
 pub mod numbers;
 pub mod report;

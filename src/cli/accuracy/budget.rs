@@ -13,6 +13,7 @@ use domecast_design::layout::report::LayoutReport;
 use domecast_design::settings::{TolerancedOptics, toleranced_optics};
 use domecast_design::{claims_of, suspension_of};
 use domecast_fab::constants::{markers_of, resolution_at};
+use domecast_fab::light::marker_noise_px;
 use domecast_fab::numbers::significant;
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
@@ -138,7 +139,7 @@ pub fn of_force(design: &Design, constants: &Constants, sweeps: &[Sweep]) -> Opt
     let pose = case.equilibrium.as_ref().ok()?.pose;
     let optics = design.optics();
     let markers = markers_of(design);
-    let noise_px = sections.noise.white_centroid_px;
+    let noise_px = marker_noise_px(design).ok()?;
     let at_mm = suspension.at_mm();
     let stiffness = matrix_of(&constants.springs.as_ref()?.stiffness);
     // the gate is wide: what is off by a tolerance shall be read, not refused
@@ -162,9 +163,9 @@ pub fn of_force(design: &Design, constants: &Constants, sweeps: &[Sweep]) -> Opt
     {
         add("pose solver", "sweep pose", true, sample.rms_error);
     }
-    if let Some(found) = resolution_at(optics, &markers, noise_px, &suspension, &pose) {
+    if let Some(found) = resolution_at(optics, &markers, &noise_px, &suspension, &pose) {
         let sd = found.wrench_sd[..3].iter().map(|sd| sd * sd).sum::<f64>().sqrt();
-        add("centroid noise of one frame", "noise.white_centroid_px", false, sd);
+        add("centroid noise of one frame", "exposure.pixel_noise_levels", false, sd);
     }
     let t = &sections.tolerances;
     for TolerancedOptics { what, field, sensors } in toleranced_optics(optics, t) {

@@ -12,6 +12,7 @@ use domecast_design::parts::{Measures, Part, PartError, build};
 use domecast_design::settings::{Setting, Settings};
 use domecast_design::{Design, DesignError, claims_of, suspension_of};
 use domecast_fab::constants;
+use domecast_fab::light::marker_noise_px;
 use domecast_runtime::constants::Constants;
 use domecast_sim::Scene;
 
@@ -196,7 +197,7 @@ fn frames_to_average(design: &Design) -> Option<u32> {
     let suspension = suspension_of(design).ok()?;
     let held = claims_of(design, &suspension);
     let poses: Vec<_> = held.iter().filter_map(|case| Some(case.equilibrium.as_ref().ok()?.pose)).collect();
-    constants::frames_to_average(design, &suspension, &poses)
+    constants::frames_to_average(design, &marker_noise_px(design).ok()?, &suspension, &poses)
 }
 
 fn setting_records(settings: &Settings) -> Vec<SettingRecord> {

@@ -31,6 +31,7 @@ use std::fmt;
 use crate::artwork;
 use crate::artwork::RenderError;
 use crate::constants;
+use crate::light::LightCheck;
 use crate::report;
 use domecast_design::layout::report::LayoutReport;
 use domecast_design::layout::{Layout, LayoutError, LayoutSpec};
@@ -170,12 +171,17 @@ fn make(
     let constants = constants::with_springs(design, &layout, &springs)?;
     tree.add("constants/constants.json", constants.to_json().into_bytes());
     // four pieces of work that share nothing but what they read, on as many threads as there are
-    step("drawing the artwork, making the parts, driving the loads to their limits");
+    step("drawing the artwork, making the parts, lighting the sensor, driving the loads to their limits");
     let draw = || artwork::files(&spec, &layout);
     let judge = || LayoutReport::new(design, &spec, &layout);
     let make_parts = || make_parts(design, &layout, &springs);
-    let load = || constants::force_report(design, &springs);
-    let ((films, judged), (parts, forces)) =
+    // What a frame resolves hangs on how the markers stand out in it.
+    let load = || {
+        let light = LightCheck::of(design)?;
+        let noise_px: Vec<f64> = light.report.markers.iter().map(|marker| marker.centroid_sd_px).collect();
+        Ok::<_, DesignError>((light, constants::force_report(design, &springs, &noise_px)?))
+    };
+    let ((films, judged), (parts, loaded)) =
         rayon::join(|| rayon::join(draw, judge), || rayon::join(make_parts, load));
     for file in films? {
         tree.add(file.path, file.bytes);
@@ -185,7 +191,10 @@ fn make(
     for file in files {
         tree.add(file.path, file.bytes);
     }
-    let forces = forces?;
+    let (light, forces) = loaded?;
+    for (path, bytes) in light.files() {
+        tree.add(path, bytes);
+    }
     for (path, text) in forces.files() {
         tree.add(path, text.into_bytes());
     }
@@ -198,7 +207,7 @@ fn make(
     for (path, text) in forms.files {
         tree.add(path, text.into_bytes());
     }
-    let warnings = warnings(design, &checked.notes, &judged, forms.left_out);
+    let warnings = warnings(design, &checked.notes, &judged, &light, forms.left_out);
 
     step("writing the page");
     let shown: Vec<(String, String)> =
@@ -209,6 +218,7 @@ fn make(
         judged: &judged,
         constants: &constants,
         forces: &forces,
+        light: &light.report,
         parts: &made,
         assembly: &assembly,
         sight: &checked.sight,
@@ -227,18 +237,20 @@ fn make(
     Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines })
 }
 
-/// The design's own warnings, then those of the assembled parts, then those of the constants' formats and of the pattern.
+/// The design's own warnings, then those of the assembled parts, of the constants' formats, of the pattern and of the light.
 fn warnings(
     design: &Design,
     notes: &[DesignWarning],
     judged: &LayoutReport,
+    light: &LightCheck,
     formats_left_out: Vec<String>,
 ) -> Vec<Warning> {
     let warning = |field: &str, message: String| Warning { field: field.into(), message };
     let own = design.warnings().iter().chain(notes).map(|own| warning(&own.field, own.message.clone()));
     let formats = formats_left_out.into_iter().map(|message| warning("constants", message));
     let pattern = judged.warnings.iter().map(|message| warning("pattern", message.clone()));
-    own.chain(formats).chain(pattern).collect()
+    let lit = light.warnings.iter().map(|(field, message)| warning(field, message.clone()));
+    own.chain(formats).chain(pattern).chain(lit).collect()
 }
 
 /// What a checker should find in a part's mesh.

@@ -128,11 +128,16 @@ fn spring_choices(
     choices(suspension.spec(), limits, more, press).iter().map(json).collect()
 }
 
-/// Computes the report of a design; `springs` is what went into its constants.
+/// Computes the report of a design; `springs` is what went into its constants, `noise_px` the standard deviation of each
+/// white marker's centroid.
 ///
 /// # Errors
 /// [`DesignError`] where the springs cannot be.
-pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceReport, DesignError> {
+pub fn force_report(
+    design: &Design,
+    springs: &DesignSprings,
+    noise_px: &[f64],
+) -> Result<ForceReport, DesignError> {
     let suspension = suspension_of(design)?;
     let limits = limits_of(design);
     let sight = &springs.sight;
@@ -155,14 +160,13 @@ pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceRep
     let springs_that_hold =
         spring_choices(&suspension, &limits, &more, &hardest.filter(|h| h.force_n.z < 0.0).unwrap_or(press));
     let markers = markers_of(design);
-    let noise_px = design.sections().noise.white_centroid_px;
     let at_rest = resolution_at(design.optics(), &markers, noise_px, &suspension, &Rigid::identity());
     let pressed = paper
         .equilibrium
         .as_ref()
         .ok()
         .and_then(|e| resolution_at(design.optics(), &markers, noise_px, &suspension, &e.pose));
-    let frames_to_average = frames_to_average(design, &suspension, &poses);
+    let frames_to_average = frames_to_average(design, noise_px, &suspension, &poses);
     let plain = springs.plain.as_ref().map(|fit| {
         json!({
             "left": fit.left, "naive": fit.naive,
@@ -195,7 +199,8 @@ pub fn force_report(design: &Design, springs: &DesignSprings) -> Result<ForceRep
             "checks": paper.checks.iter().map(check_json).collect::<Vec<_>>(),
         },
         "spring_choices": springs_that_hold,
-        "centroid_noise_px": noise_px,
+        "centroid_noise_px": noise_px.iter().copied().fold(0.0, f64::max),
+        "centroid_noise_px_by_marker": noise_px,
         "resolution_at_rest": at_rest,
         "resolution_at_17_n": pressed,
         "frames_to_average": frames_to_average,

@@ -36,23 +36,24 @@ pub struct Resolution {
     pub weak_axes: Vec<&'static str>,
 }
 
-/// The bound at a pose; `None` where a marker is not seen or the pixels leave a direction open.
+/// The bound at a pose; `noise_px` is the standard deviation of each marker's centroid in an image axis. `None` where a
+/// marker is not seen, has no noise, or the pixels leave a direction open.
 pub fn resolution_at(
     optics: &SensorOptics,
     markers: &[Marker],
-    noise_px: f64,
+    noise_px: &[f64],
     suspension: &Suspension,
     pose: &Rigid,
 ) -> Option<Resolution> {
     let at_mm = suspension.at_mm();
     let placed = optics.at_pose(pose).ok()?;
     let mut normal = Matrix6::zeros();
-    for marker in markers {
+    for (index, marker) in markers.iter().enumerate() {
         let (_, motion) = marker.centroid_with_motion(&placed).ok()?;
-        normal += motion.transpose() * motion;
+        normal += motion.transpose() * motion / noise_px.get(index)?.powi(2);
     }
     let transfer = displacement_from_motion(pose, at_mm);
-    let covariance = transfer * normal.cholesky()?.inverse() * transfer.transpose() * noise_px.powi(2);
+    let covariance = transfer * normal.cholesky()?.inverse() * transfer.transpose();
     let displacement = Displacement::of_pose(pose, at_mm);
     let stiffness = suspension.tangent_at(&displacement).ok()?;
     let of_wrench = stiffness * covariance * stiffness.transpose();
@@ -108,7 +109,7 @@ pub struct DesignChoice {
 pub fn design_choices(
     optics: &SensorOptics,
     markers: &[Marker],
-    noise_px: f64,
+    noise_px: &[f64],
     suspension: &Suspension,
 ) -> Vec<DesignChoice> {
     let rest = Rigid::identity();
@@ -157,9 +158,14 @@ pub fn design_choices(
 ///
 /// The noise of frames is independent: the spread of a mean falls with the root of their number. What the constants
 /// are off by does not.
-pub fn frames_to_average(design: &Design, suspension: &Suspension, poses: &[Rigid]) -> Option<u32> {
+pub fn frames_to_average(
+    design: &Design,
+    noise_px: &[f64],
+    suspension: &Suspension,
+    poses: &[Rigid],
+) -> Option<u32> {
     let force_n = design.sections().accuracy.as_ref()?.force_n;
-    let (markers, noise_px) = (markers_of(design), design.sections().noise.white_centroid_px);
+    let markers = markers_of(design);
     let one_n = |pose: &Rigid| {
         let found = resolution_at(design.optics(), &markers, noise_px, suspension, pose)?;
         Some(found.wrench_sd[..3].iter().map(|sd| sd * sd).sum::<f64>().sqrt())

@@ -63,7 +63,7 @@ fn the_bound_names_the_weak_axes() {
     let design = thumb("thumb24.json");
     let suspension = suspension_of(&design).unwrap();
     let markers = markers_of(&design);
-    let found = resolution_at(design.optics(), &markers, 0.1, &suspension, &Rigid::identity()).unwrap();
+    let found = resolution_at(design.optics(), &markers, &[0.1; 4], &suspension, &Rigid::identity()).unwrap();
     // About the springs' middle, ten millimetres below the markers, a tilt that is not seen looks like a shift.
     assert_eq!(found.weak_axes, ["Fx", "Fy", "Mx", "My"]);
     // Without the tilt's part, which is that about the markers' own plane, the shift is known better than the depth.
@@ -73,9 +73,9 @@ fn the_bound_names_the_weak_axes() {
     assert!(found.pose_sd[2] > 1e-3 && found.pose_sd[2] < 0.01, "{:?}", found.pose_sd);
     assert!(found.pose_sd[5] > 0.005 && found.pose_sd[5] < 0.05);
     assert!(found.pose_correlation[0][4] < -0.5);
-    let half = resolution_at(design.optics(), &markers, 0.05, &suspension, &Rigid::identity()).unwrap();
+    let half = resolution_at(design.optics(), &markers, &[0.05; 4], &suspension, &Rigid::identity()).unwrap();
     assert!((half.wrench_sd[2] / found.wrench_sd[2] - 0.5).abs() < 1e-12);
-    let choices = design_choices(design.optics(), &markers, 0.1, &suspension);
+    let choices = design_choices(design.optics(), &markers, &[0.1; 4], &suspension);
     // A longer focal length resolves more, markers nearer to the middle resolve tilt less.
     let of =
         |name: &str| choices.iter().find(|c| c.change.contains(name)).unwrap().resolution.clone().unwrap();
@@ -122,7 +122,7 @@ fn noise_leaves_the_bound_on_every_design_and_claim() {
                 })
                 .collect();
             let truth = domecast_springs::Displacement::of_pose(&pose, at).to_array();
-            let bound = resolution_at(design.optics(), &markers, 0.1, &suspension, &pose).unwrap().pose_sd;
+            let bound = resolution_at(design.optics(), &markers, &[0.1; 4], &suspension, &pose).unwrap().pose_sd;
             let (mut squares, count) = ([0.0; 6], 2000);
             for _ in 0..count {
                 let mut seen = exact.clone();

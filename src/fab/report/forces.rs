@@ -160,7 +160,7 @@ pub(super) fn resolution(subject: &ReportSubject<'_>) -> Html {
         )
     });
     html!(
-        "<p>One standard deviation of a single frame, with white centroids known to {} px: no estimate from the centroids \
+        "<p>One standard deviation of a single frame, with white centroids known to {} px by their contrast in the lit frame: no estimate from the centroids \
          does better (Cramér-Rao).</p>\n{}{}<p>Weak axes: {}. Condition number {} (with a lever of {} mm).</p>\n{}{}",
         typeset(at(json, "/centroid_noise_px")),
         table("Wrench", &WRENCH, &rest_and_17_n("wrench_sd")),

@@ -13,6 +13,7 @@
 
 mod constants;
 mod forces;
+mod light;
 mod making;
 mod measured;
 mod page;

@@ -1,7 +1,7 @@
 //! The page: what is to be seen first, then a chapter for each subject.
 
 use super::subject::ReportSubject;
-use super::{constants, forces, making, measured, parts, pattern, section};
+use super::{constants, forces, light, making, measured, parts, pattern, section};
 use crate::html::{Html, base64, figure, html, table};
 use crate::numbers::{percent, typeset};
 
@@ -18,6 +18,7 @@ fn chapters(subject: &ReportSubject<'_>) -> Vec<Chapter> {
         chapter("sensor", "The sensor in section", sensor(subject)),
         chapter("dots", "Dots", pattern::dots(subject)),
         chapter("coverage", "What the camera covers", pattern::coverage(subject)),
+        chapter("light", "The lit sensor", light::chapter(subject)),
         chapter("parts", "Parts and assembly", parts::parts(subject)),
         chapter("fits", "Fits and interference", parts::fits(subject)),
         chapter("loads", "Springs and load envelope", forces::loads(subject)),

@@ -2,6 +2,7 @@
 
 use crate::constants::ForceReport;
 use crate::html::{Html, picture};
+use crate::light::LightReport;
 use domecast_design::Design;
 use domecast_design::layout::Layout;
 use domecast_design::layout::report::LayoutReport;
@@ -21,6 +22,8 @@ pub struct ReportSubject<'a> {
     pub constants: &'a Constants,
     /// Loads and resolution.
     pub forces: &'a ForceReport,
+    /// The lit frame at rest in numbers.
+    pub light: &'a LightReport,
     /// The parts.
     pub parts: &'a [Part],
     /// The parts and stand-ins, put together.

@@ -1,5 +1,10 @@
 //! What a user may choose.
 
+/// By how many levels of 255 the middle of a white marker must be brighter than what is around it to be a candidate: what
+/// quantisation and a small camera's noise leave of the mean of nine pixels is a tenth of it. Markers that only the dome's
+/// own light reaches rise by little more than ten.
+pub const MIN_MARKER_RISE_LEVELS: f64 = 4.0;
+
 /// The channel that marks are measured in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Channel {

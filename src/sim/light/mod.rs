@@ -16,6 +16,7 @@ pub mod lobe;
 pub mod parts;
 pub mod quadrature;
 pub mod radiosity;
+mod rest;
 pub mod setup;
 pub mod shade;
 pub mod shading;
@@ -26,4 +27,5 @@ mod tests;
 
 pub use cavity::Cavities;
 pub use parts::{LightUse, is_lit_by_leds};
+pub use rest::{DomeLight, RestLight};
 pub use shade::{ShadedDome, shading_of};

@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 
 pub use accuracy::AccuracySection;
 pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
-pub use light::{DiffuserSection, PowerRgb, ReflectanceRgb};
+pub use light::{DiffuserSection, ExposureSection, PowerRgb, ReflectanceRgb};
 pub use loads::{CentroidNoiseSection, LoadClaim, LoadsSection, WhiteMarkersSection};
 pub use making::{
     CouponSection, FillSection, JigSection, MeshSection, MouldSection, PinsSection, ProcessSection,
@@ -117,6 +117,9 @@ pub struct DesignFile {
     pub sheet: SheetSection,
     /// The lights.
     pub leds: LedsSection,
+    /// How the camera is exposed under them; may be left out.
+    #[serde(default)]
+    pub exposure: ExposureSection,
     /// The mould.
     pub mould: MouldSection,
     /// The pad-print jig.

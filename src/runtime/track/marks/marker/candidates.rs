@@ -4,12 +4,10 @@ use glam::DVec2;
 
 use super::view::MarkerView;
 use crate::track::frame::Plane;
+pub(super) use crate::track::options::MIN_MARKER_RISE_LEVELS as MIN_RISE;
 
 /// Steps from a place in a disc to its middle.
 const CENTER_STEPS: u32 = 6;
-/// Least difference between marker and ground, levels: what quantisation and a small camera's noise leave of the mean
-/// of nine pixels is a tenth of it. Markers that only the dome's own light reaches rise by little more than ten.
-pub(super) const MIN_RISE: f64 = 4.0;
 /// Searches farther than this look at every other pixel, px: markers are wider than that.
 const COARSE_REACH_PX: i32 = 24;
 

@@ -1,0 +1,51 @@
+//! The lit sensor on the page.
+
+use super::subject::ReportSubject;
+use crate::html::{Html, figure, html, table};
+use crate::light::MarkerLevels;
+use crate::numbers::{percent, typeset};
+
+/// The frame, how even the dome is, and how the markers stand out.
+pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
+    let report = subject.light;
+    let dome = &report.dome;
+    let [red, green, blue] = dome.median_rgb.map(typeset);
+    let rows: Vec<Vec<Html>> = [
+        ("median", typeset(dome.median_level)),
+        ("one place in twenty is darker than", typeset(dome.percentile_5_level)),
+        ("one place in twenty is brighter than", typeset(dome.percentile_95_level)),
+        ("median of red / green / blue", format!("{red} / {green} / {blue}")),
+        ("in the platform's shadow", percent(dome.shadow_share)),
+        ("cut off at full scale", percent(dome.saturated_share)),
+    ]
+    .map(|(name, value)| vec![name.into(), value.into()])
+    .into();
+    let marker = |marker: &MarkerLevels| {
+        vec![
+            html!("{}", marker.id),
+            typeset(marker.level).into(),
+            typeset(marker.contrast_levels).into(),
+            format!("{} px", typeset(marker.centroid_sd_px)).into(),
+        ]
+    };
+    let markers: Vec<Vec<Html>> = report.markers.iter().map(marker).collect();
+    html!(
+        "<div class=\"row\">\n{}{}</div>\n<p>Exposure and gain: level {} for each mW/mm² on a white surface{}.</p>\n{}{}",
+        figure(
+            &subject.shown("report/light-frame.png", "The sensor at rest under its own lights"),
+            "The frame at rest, with every effect of light.",
+        ),
+        figure(
+            &subject.shown("report/light-map.png", "How even the light on the dome is"),
+            "Grey level over its median: blue is darker, white the median, red twice as bright.",
+        ),
+        typeset(report.level_per_mw_mm2),
+        if report.is_exposure_at_limit { ", the camera's largest" } else { "" },
+        table("Grey level of the dome in view, of 255", &["", "value"], &rows),
+        table(
+            "White markers, levels of 255",
+            &["marker", "level", "above what is around", "centroid known to"],
+            &markers,
+        ),
+    )
+}

@@ -122,7 +122,8 @@ fn noise_leaves_the_bound_on_every_design_and_claim() {
                 })
                 .collect();
             let truth = domecast_springs::Displacement::of_pose(&pose, at).to_array();
-            let bound = resolution_at(design.optics(), &markers, &[0.1; 4], &suspension, &pose).unwrap().pose_sd;
+            let bound =
+                resolution_at(design.optics(), &markers, &[0.1; 4], &suspension, &pose).unwrap().pose_sd;
             let (mut squares, count) = ([0.0; 6], 2000);
             for _ in 0..count {
                 let mut seen = exact.clone();

@@ -35,11 +35,7 @@ pub(super) fn frame(scene: &Scene) -> Result<Vec<u8>, DesignError> {
 }
 
 /// Grey level of the dome over its median: dark blue is no light, white the median, red twice the median and more.
-pub(super) fn map(
-    design: &Design,
-    light: &RestLight,
-    report: &LightReport,
-) -> Result<Vec<u8>, DesignError> {
+pub(super) fn map(design: &Design, light: &RestLight, report: &LightReport) -> Result<Vec<u8>, DesignError> {
     let lens = design.optics().lens().spec();
     let mut picture =
         Pixmap::new(lens.width, lens.height).ok_or_else(|| picture_fault("the map has no size"))?;

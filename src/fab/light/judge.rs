@@ -95,7 +95,10 @@ pub(super) fn warnings(design: &Design, report: &LightReport) -> Vec<(String, St
     if dome.saturated_share > MAX_SHARE {
         warn(
             "exposure.level_per_mw_mm2",
-            format!("a colour is cut off at full scale over {} of the dome in view", percent(dome.saturated_share)),
+            format!(
+                "a colour is cut off at full scale over {} of the dome in view",
+                percent(dome.saturated_share)
+            ),
         );
     }
     let contrast = |pick: fn(f64, f64) -> f64, start: f64| {

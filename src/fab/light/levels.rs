@@ -69,8 +69,11 @@ fn percentile(sorted: &[f64], part: f64) -> f64 {
 
 /// Levels of the dome with an exposure; `light` is that for an exposure of 1.
 pub(super) fn dome_levels(light: &RestLight, exposure: f64, section: &ExposureSection) -> DomeLevels {
-    let rgb: Vec<[f64; 3]> =
-        light.dome.iter().map(|place| place.level.map(|v| FULL * (exposure * v + section.stray_level))).collect();
+    let rgb: Vec<[f64; 3]> = light
+        .dome
+        .iter()
+        .map(|place| place.level.map(|v| FULL * (exposure * v + section.stray_level)))
+        .collect();
     let sorted = |value: &dyn Fn(&[f64; 3]) -> f64| {
         let mut values: Vec<f64> = rgb.iter().map(value).collect();
         values.sort_unstable_by(f64::total_cmp);

@@ -29,8 +29,8 @@ use domecast_sim::light::RestLight;
 use domecast_sim::scene::SceneFile;
 use domecast_sim::{Scene, SimError};
 
-use levels::{dome_levels, marker_levels};
 pub use levels::{DomeLevels, MarkerLevels};
+use levels::{dome_levels, marker_levels};
 
 /// Places of the image at which the dome's light is looked at are this far apart, px.
 const STEP_PX: u32 = 4;
@@ -82,8 +82,7 @@ impl LightCheck {
         };
         let brightest = light.dome.iter().flat_map(|place| place.level).fold(0.0, f64::max);
         let wanted = exposure.brightest_level / brightest;
-        let level_per_mw_mm2 =
-            exposure.level_per_mw_mm2.unwrap_or(wanted).min(exposure.max_level_per_mw_mm2);
+        let level_per_mw_mm2 = exposure.level_per_mw_mm2.unwrap_or(wanted).min(exposure.max_level_per_mw_mm2);
         let report = LightReport {
             level_per_mw_mm2,
             is_exposure_at_limit: exposure.level_per_mw_mm2.is_none()
@@ -136,7 +135,9 @@ fn scene(design: &Design, level_per_mw_mm2: f64, stray_level: f64) -> Result<Sce
             },
         },
     }))
-    .map_err(|error| DesignError::at("exposure", "", error.to_string(), "an exposure as the schema has it"))?;
+    .map_err(|error| {
+        DesignError::at("exposure", "", error.to_string(), "an exposure as the schema has it")
+    })?;
     Scene::new(file, Path::new(""), design.clone()).map_err(fault)
 }
 

@@ -70,7 +70,9 @@ pub use error::TrackError;
 pub use frame::{CameraFrame, FrameFault, Undistorted};
 pub use identities::MAX_FALSE_DOTS;
 pub use marks::MarkState;
-pub use options::{Channel, FollowMethod, MIN_MARKER_RISE_LEVELS, Reference, Steps, Thresholds, TrackOptions};
+pub use options::{
+    Channel, FollowMethod, MIN_MARKER_RISE_LEVELS, Reference, Steps, Thresholds, TrackOptions,
+};
 pub use report::{
     CSV_HEADER, DOTS_CSV_HEADER, DotResult, MarkerResult, Problem, Problems, Tracked, write_csv,
     write_dots_csv, write_json,

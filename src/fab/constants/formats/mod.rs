@@ -84,7 +84,7 @@ mod tests {
             let written =
                 [Ok(opencv_yaml(constants)), Ok(camera_info_yaml(constants)), kalibr_yaml(constants)];
             let write =
-                [|c: &Constants| opencv_yaml(c), |c| camera_info_yaml(c), |c| kalibr_yaml(c).unwrap()];
+                [opencv_yaml, camera_info_yaml, |c: &Constants| kalibr_yaml(c).unwrap()];
             for (text, write) in written.into_iter().zip(write) {
                 let Ok(text) = text else { continue };
                 let read = CameraCalibration::parse(&text, &CalibrationHints::default()).unwrap();

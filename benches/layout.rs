@@ -9,7 +9,7 @@ use std::str::FromStr;
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use domecast::artwork::{FilmLabel, film, to_dxf, to_pdf, to_svg, to_tiff};
+use domecast::Films;
 use domecast::design;
 use domecast::layout::report::LayoutReport;
 use domecast::layout::{Layout, LayoutSpec};
@@ -55,20 +55,20 @@ fn peak_mb() -> Option<f64> {
     Some(kb / 1024.0)
 }
 
-fn write_films(layout: &Layout, label: &FilmLabel) -> usize {
-    let drawing = film(layout, 0, 1.3, label).expect("a drawing");
+fn write_films(layout: &Layout) -> usize {
+    let film = layout.film(0);
     let films = (
-        to_svg(&drawing),
-        to_pdf(&drawing).expect("PDF"),
-        to_dxf(&drawing, 0.0005),
-        to_tiff(&drawing, 2400).expect("TIFF"),
+        film.to_svg().expect("SVG"),
+        film.to_pdf().expect("PDF"),
+        film.to_dxf().expect("DXF"),
+        film.to_tiff().expect("TIFF"),
     );
     let films = black_box(films);
     films.0.len() + films.1.len() + films.2.len() + films.3.len()
 }
 
 /// One run of each size, with its memory.
-fn once(label: &FilmLabel) {
+fn once() {
     println!("pattern    dots    lay out s  write s  report s  us a dot  peak MB  films MB");
     for kind in ["hexagonal", "fill"] {
         for (count, scale) in SIZES {
@@ -78,7 +78,7 @@ fn once(label: &FilmLabel) {
             let began = Instant::now();
             let layout = Layout::new(&spec).expect("a layout");
             let laid_out = began.elapsed().as_secs_f64();
-            let bytes = write_films(&layout, label);
+            let bytes = write_films(&layout);
             let written = began.elapsed().as_secs_f64();
             black_box(LayoutReport::new(&design, &spec, &layout));
             let judged = began.elapsed().as_secs_f64();
@@ -96,8 +96,7 @@ fn once(label: &FilmLabel) {
 }
 
 fn lay_out_and_write(criterion: &mut Criterion) {
-    let label = FilmLabel { design: "bench".into(), hash: "0".repeat(64) };
-    once(&label);
+    once();
     for kind in ["hexagonal", "fill"] {
         let mut group = criterion.benchmark_group(kind);
         group.sample_size(10);
@@ -110,7 +109,7 @@ fn lay_out_and_write(criterion: &mut Criterion) {
             });
             let layout = Layout::new(&spec).expect("a layout");
             group.bench_with_input(BenchmarkId::new("write", count), &layout, |bench, layout| {
-                bench.iter(|| write_films(layout, &label));
+                bench.iter(|| write_films(layout));
             });
         }
         group.finish();

@@ -68,7 +68,7 @@ def of_ours(program, constants_path, frames, truth):
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / "track.jsonl"
         command = [program, "track", *map(str, frames), "--constants", constants_path, "--out", str(out), "--json"]
-        told = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+        printed = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
         lines = [json.loads(line) for line in out.read_text().splitlines()]
     dots, wrenches, sds, found, wanted, wrong = [], [], [], 0, 0, 0
     for line, true in zip(lines, truth):
@@ -83,7 +83,7 @@ def of_ours(program, constants_path, frames, truth):
         if line["wrench"]:
             wrenches.append(np.subtract(line["wrench"], true["wrench"]))
             sds.append(line["wrench_sd"])
-    return dots, wrenches, sds, told, found, wanted, wrong, {l["status"] for l in lines}
+    return dots, wrenches, sds, printed, found, wanted, wrong, {l["status"] for l in lines}
 
 
 def wrench_lines(name, errors):

@@ -16,7 +16,7 @@
 //! | read a design | [`Design::load`], or [`Design`] from a string; [`design`] for its fields |
 //! | turn pixels into points on the dome and back | [`Design::optics`]; [`optics`], over the lens models of [`camera`] |
 //! | lay out dots, judge their evenness, project them to the plate | [`Design::layout`]; [`layout`], [`transfer`] |
-//! | draw films | [`artwork`] |
+//! | draw films | [`Films::film`] of a layout; [`artwork`] |
 //! | make platforms, mould, jig | [`parts`], over the solids of [`mesh`] |
 //! | know what the springs carry | [`springs`] |
 //! | press an object against the dome | [`contact`] |
@@ -57,6 +57,7 @@ pub use domecast_runtime::{calibrate, frames, track};
 pub use domecast_sim as sim;
 pub use domecast_springs as springs;
 
+pub use artwork::{Film, Films};
 pub use constants::Constants;
 pub use design::Design;
 pub use error::Error;

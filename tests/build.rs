@@ -85,11 +85,11 @@ fn a_lattice_is_even_in_the_image() {
             others.map(|(_, other)| distance(places[at], *other)).fold(f64::INFINITY, f64::min)
         };
         let spacings: Vec<f64> = (0..places.len()).map(nearest).collect();
-        let (least, most) =
-            spacings.iter().fold((f64::INFINITY, 0.0_f64), |(least, most), s| (least.min(*s), most.max(*s)));
+        let (min, max) =
+            spacings.iter().fold((f64::INFINITY, 0.0_f64), |(min, max), s| (min.min(*s), max.max(*s)));
         let pitch_px = json(&design_path(name))["pattern"]["pitch_px"].as_f64().expect("a pitch");
-        assert!((most - least) / least < 1e-6, "{name}: {least} to {most} px");
-        assert!((least - pitch_px).abs() < 1e-6 * pitch_px, "{name}: {least} px instead of {pitch_px}");
+        assert!((max - min) / min < 1e-6, "{name}: {min} to {max} px");
+        assert!((min - pitch_px).abs() < 1e-6 * pitch_px, "{name}: {min} px instead of {pitch_px}");
     }
 }
 

@@ -5,8 +5,7 @@
 use std::fs;
 use std::path::Path;
 
-use domecast::Design;
-use domecast::artwork::{FilmLabel, film, to_svg};
+use domecast::{Design, Films};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -24,10 +23,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
 
     fs::create_dir_all(out)?;
-    let label = FilmLabel { design: design.name().to_owned(), hash: String::new() };
     for pass in 0..layout.passes.len() {
-        let drawing = film(&layout, pass, design.sections().print.pad_over_image, &label)?;
-        fs::write(Path::new(out).join(format!("film-{}.svg", pass + 1)), to_svg(&drawing))?;
+        fs::write(Path::new(out).join(format!("film-{}.svg", pass + 1)), layout.film(pass).to_svg()?)?;
     }
     Ok(())
 }

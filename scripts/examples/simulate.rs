@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [scene] = arguments.as_slice() else { return Err("usage: simulate SCENE".into()) };
 
     let scene = Scene::load(Path::new(scene))?;
-    // the effects that the scene calls for; what its tolerance can spare is left out
+    // the effects that the scene calls for; what is smaller than its tolerance is left out
     let renderer = Renderer::new(&scene, &Plan::of(&scene)?)?;
     let constants = constants::of(scene.design(), scene.layout())?;
     let mut tracker = Tracker::new(&constants, TrackOptions::default())?;

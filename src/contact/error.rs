@@ -63,7 +63,7 @@ pub enum ContactError {
         /// The element size that was asked for, mm.
         element_mm: f64,
         /// The smallest allowed, mm.
-        least_mm: f64,
+        min_mm: f64,
     },
 }
 
@@ -95,8 +95,8 @@ impl fmt::Display for ContactError {
             ),
             Self::Springs(error) => write!(f, "{error}"),
             Self::Factorisation(why) => write!(f, "the dome's stiffness has no factors: {why}"),
-            Self::TooFine { element_mm, least_mm } => {
-                write!(f, "elements of {element_mm} mm are too many, at least {least_mm:.3} mm is allowed")
+            Self::TooFine { element_mm, min_mm } => {
+                write!(f, "elements of {element_mm} mm are too many, at least {min_mm:.3} mm is allowed")
             }
         }
     }

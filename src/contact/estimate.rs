@@ -71,7 +71,7 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
 /// Of convex ones a plate presses most: Hertz' force on the dome's radius, and half as much again for the bonded base
 /// and large strain (measured: a quarter at R/10). A hollow one may hold the dome on all sides: a column of the dome's
 /// base that cannot give way sideways.
-pub fn most_force_n(elastomer: &Elastomer, indenter: &Indenter, depth_mm: f64) -> f64 {
+pub fn max_force_n(elastomer: &Elastomer, indenter: &Indenter, depth_mm: f64) -> f64 {
     let depth_mm = depth_mm.max(0.0).min(elastomer.dome_radius_mm);
     let (radius, nu) = (elastomer.dome_radius_mm, elastomer.poisson);
     let modulus = elastomer.young_mpa / (1.0 - nu * nu);

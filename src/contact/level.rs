@@ -43,8 +43,8 @@ pub(crate) fn elements_of(elastomer: &Elastomer, element_mm: f64) -> Result<usiz
     while arc_mm / elements as f64 > element_mm * (1.0 + 1e-6) {
         elements *= 2;
         if elements > MAX_ELEMENTS {
-            let least_mm = arc_mm / MAX_ELEMENTS as f64;
-            return Err(ContactError::TooFine { element_mm, least_mm });
+            let min_mm = arc_mm / MAX_ELEMENTS as f64;
+            return Err(ContactError::TooFine { element_mm, min_mm });
         }
     }
     Ok(elements)

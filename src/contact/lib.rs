@@ -46,7 +46,7 @@ pub use contact::Contact;
 pub use elastomer::{Elastomer, Indenter};
 pub use equilibrium::{PressStatus, Pressed};
 pub use error::ContactError;
-pub use estimate::{Estimate, estimate, most_force_n};
+pub use estimate::{Estimate, estimate, max_force_n};
 pub use level::Level;
 pub use object::{ContactSolid, Distance};
 pub use on_pole::OnPole;

@@ -5,6 +5,7 @@ pub mod build;
 pub mod chart;
 pub mod compare;
 pub mod constants;
+mod hash;
 pub mod html;
 pub mod numbers;
 pub mod report;

@@ -289,7 +289,7 @@ fn translation(map: &DAffine3) -> Option<DVec2> {
     plain.then(|| map.translation.truncate())
 }
 
-/// Whether a convex polygon covers a disc, with room to spare.
+/// Whether a convex polygon covers a disc, with a margin.
 fn covers(outline: &[DVec2], center: DVec2, radius: f64) -> bool {
     (0..outline.len()).all(|i| {
         let (a, b) = (outline[i], outline[(i + 1) % outline.len()]);

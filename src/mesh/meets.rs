@@ -71,7 +71,7 @@ impl RayTarget {
 /// Whether a plane parts two triangles: across a normal, or along an edge of each. (Two convex bodies are apart
 /// only if such a plane is; in one plane none of these is, and they count as touching.)
 fn are_apart(p: &[DVec3; 3], q: &[DVec3; 3]) -> bool {
-    let size = p.iter().chain(q).fold(0.0_f64, |most, corner| most.max(corner.abs().max_element()));
+    let size = p.iter().chain(q).fold(0.0_f64, |max, corner| max.max(corner.abs().max_element()));
     let parted = |axis: DVec3| {
         let range = |t: &[DVec3; 3]| {
             let [a, b, c] = t.map(|corner| corner.dot(axis));
@@ -82,7 +82,7 @@ fn are_apart(p: &[DVec3; 3], q: &[DVec3; 3]) -> bool {
     };
     let edges = |t: &[DVec3; 3]| [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
     let (mine, others) = (edges(p), edges(q));
-    // The axes first: most pairs that come this far are told apart by their boxes.
+    // The axes first: most pairs that come this far are separated by their boxes.
     DVec3::AXES.into_iter().any(parted)
         || parted(mine[0].cross(mine[1]))
         || parted(others[0].cross(others[1]))

@@ -96,7 +96,7 @@ impl TriMesh {
     }
 
     /// The length below which two `f32` coordinates of this mesh cannot be
-    /// told apart: the spacing of `f32` at its largest coordinate. This is the
+    /// distinct: the spacing of `f32` at its largest coordinate. This is the
     /// rounding epsilon, and has nothing to do with the chord tolerance.
     pub fn rounding_mm(&self) -> f64 {
         let largest = self.vertices_mm.iter().fold(0.0_f64, |m, v| m.max(v.abs().max_element()));

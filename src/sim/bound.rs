@@ -14,7 +14,7 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// An effect that the scene's tolerance can never spare.
+    /// An effect that no tolerance of a scene leaves out.
     pub const UNBOUNDED: Self = Self { px: f64::INFINITY, grey: f64::INFINITY };
 
     /// A bound on the place alone.

@@ -65,7 +65,7 @@ effect_names! {
     SheetMotion = sheet_motion,
     /// The air gap changes with the platform, and the bend with it.
     GapChange = gap_change,
-    /// Objects dent the dome.
+    /// Objects deform the dome.
     Contact = contact,
     /// The dots, with the ink's soft edge.
     Dots = dots,

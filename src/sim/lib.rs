@@ -1,8 +1,8 @@
 //! What the sensor will see: only the effects that a scene calls for.
 //!
 //! A [`Scene`] says what happens; [`Plan::of`] asks each [`Effect`] whether the scene calls for it, how large it
-//! can be and what it costs, and leaves out what the scene's tolerance can spare; the used effects put their
-//! parts into a [`Pipeline`], and a renderer draws frames and tells the exact truth about them.
+//! can be and what it costs, and leaves out what is smaller than the scene's tolerance; the used effects put their
+//! parts into a [`Pipeline`], and a renderer draws frames and writes the exact truth about them.
 //!
 //! Each stage is a folder and knows those before it only:
 //!

@@ -126,12 +126,12 @@ fn the_truth_is_what_is_drawn() {
             let image = drawn.image.unwrap();
             let mut seen = 0;
             for dot in &drawn.truth.black_dots {
-                for (channel, told) in dot.centroid_rgb_px.unwrap().into_iter().enumerate() {
-                    let told = told.unwrap();
-                    let found = measured(&image, channel, told, 153.0);
+                for (channel, reported) in dot.centroid_rgb_px.unwrap().into_iter().enumerate() {
+                    let reported = reported.unwrap();
+                    let found = measured(&image, channel, reported, 153.0);
                     assert!(
-                        (found - DVec2::from(told)).length() < 0.02,
-                        "{name} {frame} {} {found} {told:?}",
+                        (found - DVec2::from(reported)).length() < 0.02,
+                        "{name} {frame} {} {found} {reported:?}",
                         dot.id
                     );
                     seen += 1;
@@ -231,7 +231,7 @@ fn bound_coils_are_said_and_the_rest_runs() {
     let status: Vec<&str> = truth.iter().map(|t| t.status.as_str()).collect();
     assert_eq!(status, ["ok", "ok", "coil_bind", "coil_bind"]);
     assert!(truth[3].note.as_ref().is_some_and(|note| note.contains("spring")));
-    // The world's load is told whole; the platform goes no further.
+    // The world's load is reported whole; the platform goes no further.
     assert_eq!(truth[3].wrench[2], -45.0);
     assert!((truth[2].pose[2][3] - truth[3].pose[2][3]).abs() < 1e-9 && truth[2].pose[2][3] < -1.0);
 }
@@ -280,8 +280,8 @@ fn truth_tells_how_the_contact_was_solved() {
     let (truth, faults) = contact_told("closed_form", bar, &[16.0, 16.0, 13.2, 16.0, 13.0]);
     let status: Vec<_> = truth.iter().map(|line| line["contact"]["status"].as_str().unwrap()).collect();
     assert_eq!(status, ["free", "free", "not_applicable", "free", "not_applicable"]);
-    let told: Vec<_> = faults.iter().map(|fault| (fault.status, fault.frames, fault.first)).collect();
-    assert_eq!(told, [("not_applicable", 2, 2)]);
+    let reported: Vec<_> = faults.iter().map(|fault| (fault.status, fault.frames, fault.first)).collect();
+    assert_eq!(reported, [("not_applicable", 2, 2)]);
     assert_eq!(truth[2]["contact"]["note"].as_str(), Some(faults[0].note.as_str()));
     // Without an object there is no contact to tell of.
     let still = scene("still.json");
@@ -301,13 +301,13 @@ fn a_contact_at_its_bound_is_told_with_what_is_left() {
     let mut pressed = contact.press(&ball, still.suspension(), &at, None).expect("pressed");
     pressed.state.status = Status::BoundReached;
     (pressed.state.residual_mm, pressed.state.penetration_mm) = (3.2e-3, 1.5e-2);
-    let told = ContactTruth::of(&pressed);
-    assert_eq!((told.status, told.residual_mm), ("not_converged", Some(3.2e-3)));
-    let note = told.note.expect("a note");
+    let reported = ContactTruth::of(&pressed);
+    assert_eq!((reported.status, reported.residual_mm), ("not_converged", Some(3.2e-3)));
+    let note = reported.note.expect("a note");
     assert!(note.contains("3.2e-3 mm") && note.contains("1.5e-2 mm"), "{note}");
     pressed.state.residual_mm = f64::INFINITY;
-    let told = ContactTruth::of(&pressed);
-    assert!(told.residual_mm.is_none() && told.note.is_some_and(|note| note.contains("no step")));
+    let reported = ContactTruth::of(&pressed);
+    assert!(reported.residual_mm.is_none() && reported.note.is_some_and(|note| note.contains("no step")));
 }
 
 #[test]

@@ -37,7 +37,7 @@ pub(super) fn close(a: f64, b: f64, tolerance: f64) {
     assert!((a - b).abs() <= tolerance, "{a} is not {b} to {tolerance}");
 }
 
-// Figures worked out by hand from G d^4 / (8 D^3 n), (n + 2) d and Wahl's factor at C = 9.
+// Figures computed by hand from G d^4 / (8 D^3 n), (n + 2) d and Wahl's factor at C = 9.
 #[test]
 fn spring_figures() {
     let four = Spring::new(music_wire(4.0)).unwrap();

@@ -6,7 +6,7 @@ use crate::tokens::{tokens, without_tests};
 use crate::{assert_none, crates, rust_files, short, text, workspace};
 
 /// Words of our own for what has a name in the field, and that name; with a capital they are those of types alone.
-const WORDS: [(&str, &str); 18] = [
+const WORDS: &[(&str, &str)] = &[
     ("Lit", "shading, shaded"),
     ("Surplus", "residual scale"),
     ("beaten", "dominated"),
@@ -20,11 +20,45 @@ const WORDS: [(&str, &str); 18] = [
     ("glance", "exposure statistics"),
     ("ladder", "sweep"),
     ("ladders", "sweep"),
+    ("dented", "deformed"),
     ("rests", "interpolation error"),
+    ("reckoned", "computed"),
+    ("reckoning", "computation"),
     ("rung", "sample, level"),
+    ("rungs", "samples, levels"),
+    ("settled", "converged; for a tile: classified"),
+    ("spare", "padding, scratch, redundancy, candidate for omission"),
     ("suspicion", "lint"),
     ("suspicions", "lints"),
     ("told", "interpolated, predicted; or say what is written"),
+    ("whites", "white markers"),
+    ("blacks", "black dots"),
+];
+
+/// What comments and pages say of it, in words that a reader knows without asking.
+const PROSE: &[(&str, &str)] = &[
+    ("beaten", "dominated"),
+    ("dent", "deform; displacement map"),
+    ("dented", "deformed"),
+    ("dents", "deforms"),
+    ("dice", "seeded generator"),
+    ("foreseen", "predicted"),
+    ("foretold", "predicted"),
+    ("ladder", "sweep"),
+    ("ladders", "sweeps"),
+    ("reckon", "compute"),
+    ("reckoned", "computed"),
+    ("reckoning", "computation, plan"),
+    ("rung", "sample, level"),
+    ("rungs", "samples, levels"),
+    ("settle", "converge; classify"),
+    ("settled", "converged; classified"),
+    ("settles", "converges; classifies"),
+    ("spare", "leave out; margin, padding"),
+    ("spared", "left out"),
+    ("told", "written, reported, computed, distinguished"),
+    ("whites", "white markers"),
+    ("worked out", "computed"),
 ];
 
 /// Each of these opens with an example that the doc tests run: the public modules of the library.
@@ -101,13 +135,15 @@ fn bounds_are_called_min_and_max() {
     let mut faults = BTreeSet::new();
     for path in rust_files(&["src", "tests", "benches"]) {
         for token in tokens(&text(&path)) {
-            if ["MOST_", "LEAST_"].iter().any(|start| token.text.starts_with(start)) {
+            let words = words_of(&token.text.to_lowercase());
+            let ends = [words.first(), words.last()].into_iter().flatten();
+            if token.is_name() && ends.into_iter().any(|word| word == "most" || word == "least") {
                 faults.insert(format!("  {}: {}", short(&path), token.text));
             }
         }
     }
     let faults: Vec<String> = faults.into_iter().collect();
-    assert_none(&faults, "a bound is MAX_ or MIN_, not MOST_ or LEAST_");
+    assert_none(&faults, "a bound is max_ or min_ (in capitals for constants), not most_ or least_");
 }
 
 #[test]
@@ -132,4 +168,37 @@ fn names_are_the_fields_words() {
     let faults: Vec<String> =
         faults.into_iter().map(|(fault, times)| format!("{fault} ({times}x)")).collect();
     assert_none(&faults, "things that have a name in the field carry it");
+}
+
+/// The comments of a Rust source, or all of a page, line by line.
+fn prose(path: &std::path::Path) -> Vec<String> {
+    let text = text(path);
+    let is_rust = path.extension().is_some_and(|extension| extension == "rs");
+    let comment =
+        |line: &str| line.split_once("//").map(|(_, comment)| comment.to_owned()).unwrap_or_default();
+    text.lines().map(|line| if is_rust { comment(line) } else { line.to_owned() }).collect()
+}
+
+#[test]
+fn comments_and_pages_use_plain_words() {
+    let mut pages = rust_files(&["src", "benches", "scripts/examples"]);
+    pages.extend(["README.md", "CHANGELOG.md"].map(|name| workspace().join(name)));
+    let guide = std::fs::read_dir(workspace().join("src/guide")).expect("the guide");
+    pages.extend(guide.map(|entry| entry.expect("an entry").path()));
+    let mut faults = Vec::new();
+    for path in pages {
+        for (number, line) in (1..).zip(prose(&path)) {
+            // names of data that other programs read stand in backquotes
+            let plain = line.split('`').step_by(2).collect::<Vec<_>>().join(" ").to_lowercase();
+            let words: Vec<&str> =
+                plain.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+            let spaced = format!(" {} ", words.join(" "));
+            for &(word, say) in PROSE {
+                if spaced.contains(&format!(" {word} ")) {
+                    faults.push(format!("  {}:{number}: {word}: say {say}", short(&path)));
+                }
+            }
+        }
+    }
+    assert_none(&faults, "comments and pages are in words that anyone in the field knows");
 }

@@ -159,3 +159,17 @@ fn stages_know_only_those_before_them() {
     }
     assert_none(&faults, "data runs one way: a stage knows only the types of those before it");
 }
+
+#[test]
+fn the_runtime_builds_fewer_than_fifty_crates() {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let wanted =
+        ["tree", "--offline", "--locked", "-p", "domecast-runtime", "-e", "normal", "--prefix", "none"];
+    let tree =
+        std::process::Command::new(cargo).args(wanted).current_dir(workspace()).output().expect("cargo");
+    assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
+    let text = String::from_utf8_lossy(&tree.stdout).into_owned();
+    let crates: BTreeSet<&str> = text.lines().map(|line| line.trim_end_matches(" (*)")).collect();
+    assert!(crates.len() < 50, "{} crates:\n{crates:#?}", crates.len());
+    assert!(!crates.iter().any(|name| name.starts_with("tiny-skia")), "drawing is a feature");
+}

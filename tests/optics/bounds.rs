@@ -42,7 +42,7 @@ pub struct Seen {
     pub checks: u64,
     pub ok: u64,
     pub limits: u64,
-    pub most: Iterations,
+    pub max: Iterations,
 }
 
 /// The largest numbers of iterations met.
@@ -60,10 +60,10 @@ impl Seen {
             checks: self.checks + o.checks,
             ok: self.ok + o.ok,
             limits: self.limits + o.limits,
-            most: Iterations {
-                lens: self.most.lens.max(o.most.lens),
-                climb: self.most.climb.max(o.most.climb),
-                pupil: self.most.pupil.max(o.most.pupil),
+            max: Iterations {
+                lens: self.max.lens.max(o.max.lens),
+                climb: self.max.climb.max(o.max.climb),
+                pupil: self.max.pupil.max(o.max.pupil),
             },
         }
     }

@@ -114,7 +114,7 @@ impl Run<'_> {
         self.seen.checks += 1;
         match self.lens().unproject_solved(pixel) {
             Ok(found) => {
-                self.seen.most.lens = self.seen.most.lens.max(found.iterations);
+                self.seen.max.lens = self.seen.max.lens.max(found.iterations);
                 assert_eq!(self.lens().unproject(pixel), Ok(found.ray), "seed {seed}");
                 self.ray_is_right(pixel, found.ray, "unproject");
             }
@@ -225,7 +225,7 @@ impl Run<'_> {
                 Ok(back) => back,
                 Err(limit) => panic!("seed {seed}: {limit} for {pixel} at {inside} of the domain"),
             };
-            self.seen.most.lens = self.seen.most.lens.max(back.iterations);
+            self.seen.max.lens = self.seen.max.lens.max(back.iterations);
             let error = distance(v3(back.ray), unit(v3(ray)));
             let allowed = (pixel_ulps(self.lens(), pixel) + by_lens) * condition(&slope, ray.length());
             assert!(
@@ -282,8 +282,8 @@ impl Run<'_> {
         match self.optics.project_solved(point) {
             Ok(solved) => {
                 assert_eq!(solved.pixel, pixel, "seed {seed}");
-                self.seen.most.climb = self.seen.most.climb.max(solved.newton_iterations);
-                self.seen.most.pupil = self.seen.most.pupil.max(solved.pupil_iterations);
+                self.seen.max.climb = self.seen.max.climb.max(solved.newton_iterations);
+                self.seen.max.pupil = self.seen.max.pupil.max(solved.pupil_iterations);
             }
             Err(limit) => panic!("seed {seed}: {limit} at {point}"),
         }
@@ -356,11 +356,11 @@ fn first_seed(default: u64) -> u64 {
     std::env::var("DOMECAST_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(default)
 }
 
-fn within_the_stated_iterations(most: &Iterations) {
+fn within_the_stated_iterations(max: &Iterations) {
     let stated = [
-        (most.lens, Lens::MAX_UNPROJECT_ITERATIONS),
-        (most.climb, SensorOptics::MAX_NEWTON_ITERATIONS),
-        (most.pupil, SensorOptics::MAX_PUPIL_ITERATIONS),
+        (max.lens, Lens::MAX_UNPROJECT_ITERATIONS),
+        (max.climb, SensorOptics::MAX_NEWTON_ITERATIONS),
+        (max.pupil, SensorOptics::MAX_PUPIL_ITERATIONS),
     ];
     for (met, bound) in stated {
         assert!(met > 0 && met <= bound, "{met} iterations, {bound} stated");
@@ -371,12 +371,12 @@ fn within_the_stated_iterations(most: &Iterations) {
 fn random_optics_agree_with_the_reference() {
     let seen = fuzz(600, 24, first_seed(1));
     assert!(seen.ok > seen.checks / 4 && seen.limits > seen.checks / 20);
-    within_the_stated_iterations(&seen.most);
+    within_the_stated_iterations(&seen.max);
 }
 
 #[test]
 fn long_a_million_random_optics() {
     let seen = fuzz(42_000, 24, first_seed(1_000_000));
     assert!(seen.checks >= 1_000_000);
-    within_the_stated_iterations(&seen.most);
+    within_the_stated_iterations(&seen.max);
 }

@@ -20,11 +20,11 @@ fn missing_and_false_dots_are_named() {
     let between = |id: usize| {
         let at = |id: usize| DVec2::from_array(dots[id].image_px);
         let beside: Vec<DVec2> = dots[id].neighbors.iter().map(|n| at(*n) - at(id)).collect();
-        let most = |along: DVec2| {
+        let largest = |along: DVec2| {
             let best = beside.iter().copied().max_by(|a, b| along.dot(*a).total_cmp(&along.dot(*b)));
             best.expect("a neighbour")
         };
-        at(id) + 0.5 * (most(DVec2::X) + most(DVec2::Y))
+        at(id) + 0.5 * (largest(DVec2::X) + largest(DVec2::Y))
     };
     let extra = [(between(0), 3.4), (between(70), 3.0)];
     let mut tracker = tracker(TrackOptions::default());

@@ -240,8 +240,8 @@ fn long_everything_at_once_is_tracked() {
         assert!(told.rms_px() < 0.05 && told.worst_px < 1.0, "{}", told.line());
         assert!(told.dots as f64 > 0.99 * told.wanted as f64, "{}", told.line());
         for (axis, [mean, sd, said]) in told.wrench().into_iter().enumerate() {
-            let most = if axis < 3 { 0.02 } else { 0.2 };
-            assert!(mean.abs() < most && sd < 1.5 * said, "axis {axis}: {mean} {sd} {said}");
+            let limit = if axis < 3 { 0.02 } else { 0.2 };
+            assert!(mean.abs() < limit && sd < 1.5 * said, "axis {axis}: {mean} {sd} {said}");
         }
     }
 }

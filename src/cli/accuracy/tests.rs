@@ -86,8 +86,8 @@ fn orders_fronts_and_choices_follow_from_the_samples() {
     let mut short = cubic.clone();
     short.asked = Some(1e-9);
     assert_eq!(short.finish().meets, None);
-    let (most, rms, failed) = sizes([3.0, f64::NAN, 4.0].into_iter());
-    assert_eq!((most, failed), (4.0, 1));
+    let (max, rms, failed) = sizes([3.0, f64::NAN, 4.0].into_iter());
+    assert_eq!((max, failed), (4.0, 1));
     assert!((rms - 12.5_f64.sqrt()).abs() < 1e-12);
 }
 
@@ -304,7 +304,7 @@ fn long_chosen_settings_keep_what_is_asked_over_the_sweep_of_the_parts() {
 
 /// Whether the design can be laid out; where it can, its chosen settings must keep what is asked: dots mm, image px,
 /// meshes mm. Drawn sensors are tried up to `most` at a time.
-fn keeps_what_is_asked(design: &Design, asked: [f64; 3], most: usize) -> bool {
+fn keeps_what_is_asked(design: &Design, asked: [f64; 3], max: usize) -> bool {
     let Ok(spec) = LayoutSpec::of_design(design) else { return false };
     let Ok(layout) = Layout::new(&spec) else { return false };
     let settings = design.settings();
@@ -325,7 +325,7 @@ fn keeps_what_is_asked(design: &Design, asked: [f64; 3], most: usize) -> bool {
     }
     // the drawn sensors' mean is as certain as asked: by batches of that size
     let count = settings.samples.value as usize;
-    if count <= most {
+    if count <= max {
         let tolerances = &design.sections().tolerances;
         let shifts = domecast_design::layout::tolerances::drawn_shifts_px(
             &spec,

@@ -22,7 +22,7 @@ pub fn of(design: &Design) -> Result<Scene, SimError> {
             place.as_array_mut().into_iter().flatten().for_each(|value| scaled(value, scale));
         }
     }
-    // elements of a tenth of the radius: a few pixels of the dent's edge are not what is measured here
+    // elements of a tenth of the radius: a few pixels of the contact's edge are not what is measured here
     if let Some(element) = file.pointer_mut("/contact/element_mm") {
         *element = (0.1 * design.sections().dome.radius_mm).into();
     }

@@ -7,7 +7,6 @@ use serde_json::json;
 
 use super::output::{Failure, Output};
 use domecast_design::DesignError;
-use domecast_files::WriteError;
 use domecast_sim::run;
 use domecast_sim::run::{ContactFault, RunError};
 use domecast_sim::{Plan, Scene, SimError};
@@ -73,8 +72,7 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
     output.steps_done();
     let summary = drawn.map_err(|error| match error {
         RunError::Scene(error) => in_file(error),
-        RunError::Io { doing, path, source } => Failure::Write(WriteError::Io { doing, path, source }),
-        RunError::NotOurs { path, foreign } => Failure::Write(WriteError::NotOurs { path, foreign }),
+        RunError::Write(error) => Failure::Write(error),
     })?;
     for (frame, note) in &summary.notes {
         output.warn(&format!("frame {frame}: {note}"));
@@ -112,7 +110,7 @@ fn explain(output: &Output, scene: &Scene, plan: &Plan) -> Result<(), Failure> {
         let size = if bound.px.is_finite() && bound.grey.is_finite() {
             format!("<= {:.2e} px, {:.2e} grey", bound.px, bound.grey)
         } else {
-            "cannot be spared".into()
+            "is always used".into()
         };
         let mark = if entry.used { "used" } else { "left out" };
         output.say(&format!(

@@ -87,8 +87,8 @@ impl Solves<'_> {
                 let elastomer = task.contact.elastomer();
                 // Displacements, by the stiffness of a contact of a tenth of the dome.
                 let stiffness = 0.2 * elastomer.dome_radius_mm * elastomer.plane_strain_mpa();
-                let settled_mm = off_n.map_or(0.0, |off_n| CLOSER * off_n / stiffness);
-                solver.solve(sensor_from_object, settled_mm, off_n.is_none())
+                let tolerance_mm = off_n.map_or(0.0, |off_n| CLOSER * off_n / stiffness);
+                solver.solve(sensor_from_object, tolerance_mm, off_n.is_none())
             }),
         }
     }

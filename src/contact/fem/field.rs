@@ -9,7 +9,7 @@ use super::compliance::Compliance;
 use super::element::quadratic;
 use crate::outcome::Extent;
 
-/// The displacement under given forces; worked out when it is first asked for.
+/// The displacement under given forces; computed when it is first asked for.
 #[derive(Debug, Clone)]
 pub(crate) struct SurfaceField {
     compliance: Arc<Compliance>,
@@ -119,11 +119,11 @@ impl SurfaceField {
     /// The whole dome moves: the bound is the sum of all amplitudes, which no point can pass, over the whole dome.
     pub fn extent(&self) -> Extent {
         let amplitudes = self.amplitudes();
-        let at_most = |p: usize| {
+        let largest_beyond = |p: usize| {
             let size = |a: &[f64; 6]| a.iter().map(|v| v * v).sum::<f64>().sqrt();
             amplitudes.iter().map(|nodes| size(&nodes[p])).sum::<f64>()
         };
-        let beyond_mm = (0..self.surface()).map(at_most).fold(0.0, f64::max);
+        let beyond_mm = (0..self.surface()).map(largest_beyond).fold(0.0, f64::max);
         Extent { direction: DVec3::Z, angle_rad: FRAC_PI_2, beyond_mm }
     }
 

@@ -39,8 +39,8 @@ pub(crate) fn drag(elastomer: &Elastomer, disc: &Disc, now: &Rigid, before: Opti
     let shear = elastomer.shear_mpa() / disc.sharing;
     let sideways = 8.0 * disc.radius_mm * shear / (2.0 - elastomer.poisson);
     let torsional = 16.0 / 3.0 * shear * disc.radius_mm.powi(3);
-    let most_n = elastomer.friction * disc.force_n;
-    let most_nmm = 3.0 * std::f64::consts::PI / 16.0 * most_n * disc.radius_mm;
+    let max_n = elastomer.friction * disc.force_n;
+    let max_nmm = 3.0 * std::f64::consts::PI / 16.0 * max_n * disc.radius_mm;
     let (mut force, mut torsion) = (DVec3::ZERO, 0.0);
     if let Some(history) = before
         && let Some(then) = &history.sensor_from_object
@@ -54,16 +54,16 @@ pub(crate) fn drag(elastomer: &Elastomer, disc: &Disc, now: &Rigid, before: Opti
         torsion = history.torsion_nmm + turn * torsional;
     }
     let wanted = force.length();
-    let sticks = wanted < most_n && torsion.abs() < most_nmm;
-    if wanted > most_n {
-        force *= most_n / wanted;
+    let sticks = wanted < max_n && torsion.abs() < max_nmm;
+    if wanted > max_n {
+        force *= max_n / wanted;
     }
-    torsion = torsion.clamp(-most_nmm, most_nmm);
+    torsion = torsion.clamp(-max_nmm, max_nmm);
     // Partial slip: the displacement that goes with a force below the limit.
     let share = |part: f64| 1.5 * (1.0 - (1.0 - part.clamp(0.0, 1.0)).powf(2.0 / 3.0));
     let size = force.length();
     let shift_mm = if size > 0.0 && sideways > 0.0 {
-        force * (most_n * share(size / most_n) / (sideways * size))
+        force * (max_n * share(size / max_n) / (sideways * size))
     } else {
         DVec3::ZERO
     };

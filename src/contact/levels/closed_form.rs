@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 
+use super::approach::Approach;
 use super::drag::share_out;
 use super::geometric::geometric;
 use crate::elastomer::{Elastomer, Indenter};
 use crate::error::ContactError;
 use crate::field::{Field, Sunk};
-use crate::half_space::{Disc, Patch, axes, cone, drag, ellipse, held};
-use crate::level::DEEPEST;
-use crate::object::{Feature, Placed, deepest, feature_at};
+use crate::half_space::{Disc, Patch, axes, cone, drag, ellipse};
+use crate::object::{Feature, deepest, feature_at};
 use crate::outcome::{History, Status, TouchedNode};
 use crate::state::ContactState;
 use domecast_optics::numeric::{Rigid, bracketed_newton};
@@ -21,16 +21,14 @@ pub(crate) fn closed_form(
     sensor_from_object: &Rigid,
     before: Option<&History>,
 ) -> Result<ContactState, ContactError> {
-    let radius = elastomer.dome_radius_mm;
-    let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
-    let (at_mm, distance_mm, queries) = deepest(&placed, radius);
+    let approach = Approach::new(elastomer, indenter, sensor_from_object);
+    let (radius, sharing, modulus) = (approach.radius_mm, approach.sharing, approach.modulus_mpa);
+    let (at_mm, distance_mm, queries) = deepest(&approach.placed, radius);
     let depth_mm = -distance_mm;
     if depth_mm <= 0.0 {
         return Ok(ContactState { work: 30.0 * queries as f64, ..ContactState::free(sensor_from_object) });
     }
-    if depth_mm > DEEPEST * radius {
-        return Err(ContactError::TooDeep { depth_mm, limit_mm: DEEPEST * radius });
-    }
+    approach.check_depth(depth_mm, true)?;
     let instead = |why: &'static str| {
         let mut state = geometric(elastomer, indenter, sensor_from_object, before)?;
         if state.status == Status::Solved {
@@ -38,15 +36,12 @@ pub(crate) fn closed_form(
         }
         Ok(state)
     };
-    let feature = match feature_at(&placed, at_mm) {
+    let feature = match feature_at(&approach.placed, at_mm) {
         Ok(feature) => feature,
         Err(why) => return instead(why),
     };
-    let sharing = 1.0 + indenter.yield_ratio(elastomer);
-    let modulus = elastomer.plane_strain_mpa() / sharing;
     let normal = at_mm / radius;
-    let polar = normal.z.clamp(-1.0, 1.0).acos();
-    let back = held(elastomer, polar) / (elastomer.plane_strain_mpa() * radius);
+    let back = approach.held_mm_per_n(at_mm);
     let (first, patch_at) = patches(&feature, normal, radius, modulus);
     // Half-space approach d with d - back F(d) = depth: the finite body's approach.
     let law = |d: f64| {

@@ -6,14 +6,13 @@
 //! that it changes smoothly: then a ball gets Hertz' force exactly (its push-out is a paraboloid of radius
 //! sqrt(2 Re d)), a cone Sneddon's to 5 %, a flat punch its own to 19 %.
 
+use super::approach::Approach;
 use super::drag::share_out;
 use super::overlap::{FOUNDATION, Overlap, nodes_of, overlap};
 use crate::elastomer::{Elastomer, Indenter};
 use crate::error::ContactError;
 use crate::field::{Field, PushedOut};
-use crate::half_space::{Disc, drag, held};
-use crate::level::DEEPEST;
-use crate::object::Placed;
+use crate::half_space::{Disc, drag};
 use crate::outcome::History;
 use crate::state::ContactState;
 use domecast_optics::numeric::{Rigid, bracketed_newton};
@@ -25,25 +24,20 @@ pub(crate) fn geometric(
     sensor_from_object: &Rigid,
     before: Option<&History>,
 ) -> Result<ContactState, ContactError> {
-    let radius = elastomer.dome_radius_mm;
-    let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
-    let found = overlap(&placed, radius);
+    let approach = Approach::new(elastomer, indenter, sensor_from_object);
+    let (radius, sharing, modulus) = (approach.radius_mm, approach.sharing, approach.modulus_mpa);
+    let found = overlap(&approach.placed, radius);
     let depth_mm = -found.distance_mm;
-    if depth_mm > DEEPEST * radius || !found.all_out {
-        return Err(ContactError::TooDeep { depth_mm, limit_mm: DEEPEST * radius });
-    }
+    approach.check_depth(depth_mm, found.all_out)?;
     let mut state = ContactState::free(sensor_from_object);
     state.work = 30.0 * found.queries as f64;
     if found.samples.is_empty() {
         return Ok(state);
     }
-    let sharing = 1.0 + indenter.yield_ratio(elastomer);
-    let modulus = elastomer.plane_strain_mpa() / sharing;
     let radius_mm = (found.area_mm2 / std::f64::consts::PI).sqrt();
     // Half-space foundation first; the finite body then stiffens it by what its base holds back.
     let soft: f64 = normal_force(&found, FOUNDATION * modulus / radius_mm);
-    let polar = (found.deepest_mm.z / radius).clamp(-1.0, 1.0).acos();
-    let back = held(elastomer, polar) / (elastomer.plane_strain_mpa() * radius);
+    let back = approach.held_mm_per_n(found.deepest_mm);
     let stiffening = stiffen(soft, depth_mm, back);
     state.nodes = nodes_of(&found, FOUNDATION * modulus / radius_mm * stiffening);
     state.contact_radius_mm = radius_mm;
@@ -54,7 +48,7 @@ pub(crate) fn geometric(
     let drag = drag(elastomer, &disc, sensor_from_object, before);
     share_out(&mut state, &disc, &drag);
     state.field = Field::PushedOut(PushedOut {
-        placed,
+        placed: approach.placed,
         dome_radius_mm: radius,
         axis: normal,
         angle_rad: (found.angle_rad * 1.1).min(std::f64::consts::PI),
@@ -78,9 +72,9 @@ fn stiffen(force_n: f64, depth_mm: f64, back_mm_per_n: f64) -> f64 {
         (x - base.powf(1.5), 1.0 - 1.5 * lever * base.sqrt())
     };
     // Beyond the first stationary point the law has run away from the small-contact theory.
-    let most = if lever > 0.0 { ((1.5 * lever).powi(-2) - 1.0) / lever } else { 2.0 };
-    if most.is_nan() || most <= 1.0 {
+    let limit = if lever > 0.0 { ((1.5 * lever).powi(-2) - 1.0) / lever } else { 2.0 };
+    if limit.is_nan() || limit <= 1.0 {
         return 1.5;
     }
-    bracketed_newton(law, 0.0, most.min(4.0), 1.0).map_or(1.5, |root| root.value.clamp(0.2, 4.0))
+    bracketed_newton(law, 0.0, limit.min(4.0), 1.0).map_or(1.5, |root| root.value.clamp(0.2, 4.0))
 }

@@ -1,5 +1,6 @@
 //! The two levels without equations to solve: geometric and closed form.
 
+mod approach;
 mod closed_form;
 mod drag;
 mod geometric;

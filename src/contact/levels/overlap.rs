@@ -140,8 +140,8 @@ fn pressed_middle(placed: &Placed, radius: f64) -> DVec3 {
     const SOFTNESS: f64 = 0.02;
     let looks: Vec<(f64, DVec3)> =
         first_looks().map(|d| (placed.distance(d * radius).0 / (SOFTNESS * radius), d)).collect();
-    let least = looks.iter().map(|look| look.0).fold(f64::INFINITY, f64::min);
-    let mean: DVec3 = looks.iter().map(|(value, d)| *d * (least - value).exp()).sum();
+    let smallest = looks.iter().map(|look| look.0).fold(f64::INFINITY, f64::min);
+    let mean: DVec3 = looks.iter().map(|(value, d)| *d * (smallest - value).exp()).sum();
     mean.normalize_or(DVec3::Z) * radius
 }
 

@@ -23,7 +23,7 @@ pub(crate) struct Node {
 
 /// How the sweeps ended.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Settled {
+pub(crate) struct SweepOutcome {
     pub sweeps: u32,
     /// The most that the last sweep over all nodes moved one by its own force, mm.
     pub change_mm: f64,
@@ -130,15 +130,15 @@ pub(crate) fn sweeps(
     friction: f64,
     forces: &mut [f64],
     wanted_mm: f64,
-    most: u32,
-) -> Settled {
+    max_sweeps: u32,
+) -> SweepOutcome {
     let width = forces.len();
     let rows = |i: usize| &blocks[3 * i * width..3 * (i + 1) * width];
     let owns: Vec<Own> =
         nodes.iter().enumerate().map(|(i, n)| own(rows(i), width, 3 * i, n.normal)).collect();
-    let mut ended = Settled { sweeps: 0, change_mm: f64::INFINITY, work: 0.0 };
+    let mut ended = SweepOutcome { sweeps: 0, change_mm: f64::INFINITY, work: 0.0 };
     let (mut bearing, mut few_blocks, mut few_forces): (Vec<usize>, Vec<f64>, Vec<f64>) = Default::default();
-    while ended.change_mm > wanted_mm && ended.sweeps < most {
+    while ended.change_mm > wanted_mm && ended.sweeps < max_sweeps {
         ended.sweeps += 1;
         ended.work += (width * width) as f64;
         ended.change_mm = 0.0;
@@ -168,7 +168,7 @@ pub(crate) fn sweeps(
             }
         }
         let (mut change_mm, mut count) = (f64::INFINITY, 0);
-        while change_mm > wanted_mm && count < SWEEPS_OF_FEW && ended.sweeps < most {
+        while change_mm > wanted_mm && count < SWEEPS_OF_FEW && ended.sweeps < max_sweeps {
             change_mm = 0.0;
             count += 1;
             ended.sweeps += 1;

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::candidate::Candidate;
-use super::gauss_seidel::{Node, Settled, displacement, sweeps};
+use super::gauss_seidel::{Node, SweepOutcome, displacement, sweeps};
 use crate::elastomer::Elastomer;
 use crate::object::Placed;
 use crate::outcome::{NodeMemory, Status, TouchedNode, sum};
@@ -16,7 +16,7 @@ use crate::state::ContactState;
 /// Rounds of planes and sweeps.
 const MAX_ROUNDS: u32 = 160;
 /// Rounds are over when no node moves by more than this part of the radius.
-pub(crate) const SETTLED: f64 = 1e-8;
+pub(crate) const MIN_TOLERANCE: f64 = 1e-8;
 /// A node may be left this part of the radius inside the object.
 pub(crate) const PENETRATION: f64 = 1e-6;
 /// What the first planes are taken to move by, as a part of the radius.
@@ -48,7 +48,7 @@ pub(crate) struct Touch<'a> {
 pub(crate) struct Rounds {
     pub count: u32,
     pub moved_mm: f64,
-    pub settled: bool,
+    pub converged: bool,
 }
 
 impl<'a> Touch<'a> {
@@ -89,39 +89,39 @@ impl<'a> Touch<'a> {
         self.work += 160.0 * self.candidates.len() as f64;
     }
 
-    /// Solves until no node moves by more than `settled_mm`, from the forces that the candidates have.
-    pub fn run(&mut self, settled_mm: f64) -> Rounds {
+    /// Solves until no node moves by more than `tolerance_mm`, from the forces that the candidates have.
+    pub fn run(&mut self, tolerance_mm: f64) -> Rounds {
         let radius = self.elastomer.dome_radius_mm;
-        let settled_mm = settled_mm.max(SETTLED * radius);
+        let tolerance_mm = tolerance_mm.max(MIN_TOLERANCE * radius);
         if self.candidates.iter().any(|c| c.force_n != DVec3::ZERO) {
             self.displace();
             self.lay_planes(1.0);
         }
         let mut moved_mm = FIRST_ROUND * radius;
         // Planes on an edge may flip between its faces; turned in part, they come to rest between.
-        let (mut part, mut least_mm, mut stalled) = (1.0, f64::INFINITY, 0);
+        let (mut part, mut min_mm, mut stalled) = (1.0, f64::INFINITY, 0);
         for count in 1..=MAX_ROUNDS {
             // A round is solved as closely as the planes deserve: within what they still move.
-            let swept = self.sweep((CLOSENESS * moved_mm).max(0.1 * settled_mm));
+            let swept = self.sweep((CLOSENESS * moved_mm).max(0.1 * tolerance_mm));
             moved_mm = self.displace();
-            let settled = moved_mm <= settled_mm && swept.change_mm <= settled_mm;
+            let converged = moved_mm <= tolerance_mm && swept.change_mm <= tolerance_mm;
             // Planes that the final forces were found on stay theirs.
-            self.lay_planes(if settled { 0.0 } else { part });
-            if settled {
-                return Rounds { count, moved_mm, settled: true };
+            self.lay_planes(if converged { 0.0 } else { part });
+            if converged {
+                return Rounds { count, moved_mm, converged: true };
             }
             stalled += 1;
-            if moved_mm < SHRINKS * least_mm {
-                (least_mm, stalled) = (moved_mm, 0);
+            if moved_mm < SHRINKS * min_mm {
+                (min_mm, stalled) = (moved_mm, 0);
             } else if stalled == STALLED {
                 (part, stalled) = (f64::max(0.6 * part, MIN_PART), 0);
             }
         }
-        Rounds { count: MAX_ROUNDS, moved_mm, settled: false }
+        Rounds { count: MAX_ROUNDS, moved_mm, converged: false }
     }
 
     /// Pressures and friction for the planes.
-    fn sweep(&mut self, wanted_mm: f64) -> Settled {
+    fn sweep(&mut self, wanted_mm: f64) -> SweepOutcome {
         let mut forces = self.forces();
         let nodes: Vec<Node> = self
             .candidates
@@ -146,13 +146,13 @@ impl<'a> Touch<'a> {
                 continue;
             }
             let friction_n = (candidate.force_n - candidate.normal * pressure_n).length();
-            let most_n = self.elastomer.friction * pressure_n;
+            let max_n = self.elastomer.friction * pressure_n;
             state.nodes.push(TouchedNode {
                 at_mm: candidate.at_mm,
                 area_mm2: candidate.area_mm2,
                 force_n: candidate.force_n,
                 pressure_mpa: pressure_n / candidate.area_mm2,
-                sticks: friction_n < most_n * (1.0 - 1e-9),
+                sticks: friction_n < max_n * (1.0 - 1e-9),
             });
             state.history.nodes.push(NodeMemory {
                 node: candidate.node as u32,
@@ -165,7 +165,7 @@ impl<'a> Touch<'a> {
         state.peak_pressure_mpa = state.nodes.iter().map(|n| n.pressure_mpa).fold(0.0, f64::max);
         state.iterations = ended.count;
         state.residual_mm = ended.moved_mm;
-        let good = ended.settled && state.penetration_mm <= PENETRATION * radius;
+        let good = ended.converged && state.penetration_mm <= PENETRATION * radius;
         state.status = match (state.nodes.is_empty(), good) {
             (_, false) => Status::BoundReached,
             (true, true) => Status::Free,

@@ -61,15 +61,15 @@ impl<'a> Solver<'a> {
         Self { elastomer, compliance, before, touch, looked: None, fine: None }
     }
 
-    /// The contact at a pose, until nothing moves by more than `settled_mm`. Only with `whole` are nodes looked for
+    /// The contact at a pose, until nothing moves by more than `tolerance_mm`. Only with `whole` are nodes looked for
     /// that were pressed in beside the candidates.
     pub fn solve(
         &mut self,
         sensor_from_object: &Rigid,
-        settled_mm: f64,
+        tolerance_mm: f64,
         whole: bool,
     ) -> Result<ContactState, ContactError> {
-        let solved = self.solve_at(sensor_from_object, settled_mm, whole);
+        let solved = self.solve_at(sensor_from_object, tolerance_mm, whole);
         if solved.is_err() {
             // Nodes that were chosen halfway have no compliance: the next pose starts anew.
             self.looked = None;
@@ -81,7 +81,7 @@ impl<'a> Solver<'a> {
     fn solve_at(
         &mut self,
         sensor_from_object: &Rigid,
-        settled_mm: f64,
+        tolerance_mm: f64,
         whole: bool,
     ) -> Result<ContactState, ContactError> {
         self.touch.placed.move_to(*sensor_from_object);
@@ -101,11 +101,11 @@ impl<'a> Solver<'a> {
             let chosen = self.choose();
             self.add(&chosen, &way)?;
         }
-        let mut ended = self.touch.run(settled_mm);
+        let mut ended = self.touch.run(tolerance_mm);
         if near && self.touch.candidates.iter().all(|c| c.force_n == DVec3::ZERO) {
             // Lost, or met elsewhere.
             self.looked = None;
-            return self.solve_at(sensor_from_object, settled_mm, whole);
+            return self.solve_at(sensor_from_object, tolerance_mm, whole);
         }
         if !whole {
             // A trial's forces are all that its balance looks at: no field.
@@ -122,10 +122,10 @@ impl<'a> Solver<'a> {
                 break;
             }
             self.add(&missed, &way)?;
-            ended = self.touch.run(settled_mm);
+            ended = self.touch.run(tolerance_mm);
             field = self.field();
             // The last ones were not looked at again.
-            ended.settled &= look + 1 < MAX_LOOKS;
+            ended.converged &= look + 1 < MAX_LOOKS;
         }
         let state = self.state(state, ended, field);
         if state.status == Status::Free {
@@ -210,8 +210,8 @@ impl<'a> Solver<'a> {
             candidate.face = None;
         }
         let depth_mm = -self.touch.placed.distance(deepest_mm).0;
-        let most_mm = 0.25 * spacing - 0.45 * depth_mm;
-        let mut chosen = self.nearer_than(most_mm);
+        let max_mm = 0.25 * spacing - 0.45 * depth_mm;
+        let mut chosen = self.nearer_than(max_mm);
         if let Some(before) = self.before {
             chosen.extend(before.history.nodes.iter().map(|memory| memory.node as usize));
         }
@@ -225,7 +225,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Nodes of the undeformed dome nearer to the object than a distance.
-    fn nearer_than(&mut self, most_mm: f64) -> Vec<usize> {
+    fn nearer_than(&mut self, max_mm: f64) -> Vec<usize> {
         let grid = &self.compliance.grid;
         let mut near = Vec::new();
         for ring in 0..grid.elements {
@@ -236,12 +236,12 @@ impl<'a> Solver<'a> {
                 let number = grid.first[ring] + k;
                 let (distance, _) = self.touch.placed.distance(grid.place(grid.node(number)));
                 self.touch.work += 30.0;
-                if distance < most_mm {
+                if distance < max_mm {
                     near.push(number);
                     k += 1;
                 } else {
                     // No node nearer than the distance's excess can be closer to the object.
-                    k += if step_mm > 0.0 { (((distance - most_mm) / step_mm) as usize).max(1) } else { 1 };
+                    k += if step_mm > 0.0 { (((distance - max_mm) / step_mm) as usize).max(1) } else { 1 };
                 }
             }
         }
@@ -361,7 +361,7 @@ impl<'a> Solver<'a> {
 
     /// Nodes beside the candidates that were pressed into the object.
     fn missed(&mut self, field: &SurfaceField) -> Vec<usize> {
-        let most = PENETRATION * self.elastomer.dome_radius_mm;
+        let max_mm = PENETRATION * self.elastomer.dome_radius_mm;
         // A node beside moves less than the most moved candidate.
         let reach_mm = self.touch.candidates.iter().map(|c| c.u_mm.length()).fold(0.0, f64::max);
         let mut near = self.nearer_than(reach_mm);
@@ -370,7 +370,7 @@ impl<'a> Solver<'a> {
         touch.work += 60.0 * near.len() as f64;
         near.retain(|number| {
             let at = grid.place(grid.node(*number));
-            touch.placed.distance(at + field.at(at) * touch.sharing).0 < -most
+            touch.placed.distance(at + field.at(at) * touch.sharing).0 < -max_mm
         });
         near
     }

@@ -50,12 +50,12 @@ impl Placed {
     }
 
     /// Where a walk from inside the object along a direction leaves it: the way walked (mm), and the object's
-    /// outward direction there; `None` if it does not within `most_mm`. Zero for a point outside.
+    /// outward direction there; `None` if it does not within `max_mm`. Zero for a point outside.
     ///
     /// Newton's steps along the way; where the surface turns away, the distance itself is a safe step, since no
     /// point of the surface is nearer than that.
-    pub fn walk_out(&self, from_mm: DVec3, along: DVec3, most_mm: f64) -> Option<(f64, DVec3)> {
-        self.walk_on(self.distance(from_mm), from_mm, along, most_mm)
+    pub fn walk_out(&self, from_mm: DVec3, along: DVec3, max_mm: f64) -> Option<(f64, DVec3)> {
+        self.walk_on(self.distance(from_mm), from_mm, along, max_mm)
     }
 
     /// [`Self::walk_out`] from where the distance is known.
@@ -64,7 +64,7 @@ impl Placed {
         (mut value, mut outward): (f64, DVec3),
         from_mm: DVec3,
         along: DVec3,
-        most_mm: f64,
+        max_mm: f64,
     ) -> Option<(f64, DVec3)> {
         if value >= 0.0 {
             return Some((0.0, outward));
@@ -74,9 +74,9 @@ impl Placed {
             let b = from_center.dot(along);
             let way = (b * b + radius_mm * radius_mm - from_center.length_squared()).max(0.0).sqrt() - b;
             let outward = (from_center + along * way) / radius_mm;
-            return (way <= most_mm).then_some((way, outward));
+            return (way <= max_mm).then_some((way, outward));
         }
-        let tiny = 1e-10 * most_mm;
+        let tiny = 1e-10 * max_mm;
         let (mut inside, mut way) = (0.0, 0.0_f64);
         for _ in 0..MAX_STEPS {
             let slope = outward.dot(along);
@@ -90,7 +90,7 @@ impl Placed {
             };
             let next = (way + step).max(0.5 * (inside + way));
             way = next;
-            if way > most_mm {
+            if way > max_mm {
                 return None;
             }
             (value, outward) = self.distance(from_mm + along * way);
@@ -99,6 +99,6 @@ impl Placed {
             }
         }
         // A crease met at a grazing angle: the point is as near as the last steps brought it.
-        (value.abs() <= 1e-4 * most_mm).then_some((way, outward))
+        (value.abs() <= 1e-4 * max_mm).then_some((way, outward))
     }
 }

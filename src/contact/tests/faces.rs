@@ -71,6 +71,6 @@ fn a_needle_between_the_nodes_is_said() {
     let contact = smooth(1.0);
     let needle = Indenter::rigid(ContactSolid::cylinder(0.05, 6.0).unwrap());
     let pose = Rigid::from_translation(DVec3::new(0.29, 0.17, 12.0));
-    let told = contact.solve(&needle, &pose, None).unwrap_err();
-    assert!(matches!(told, ContactError::Unseen { .. }), "{told}");
+    let reported = contact.solve(&needle, &pose, None).unwrap_err();
+    assert!(matches!(reported, ContactError::Unseen { .. }), "{reported}");
 }

@@ -124,7 +124,7 @@ fn forces_and_fields_of_the_local_levels_stay_within_their_estimates() {
                         let part = found.wrench.force_n.length() / exact.wrench.force_n.length() - 1.0;
                         assert!(off < bound.displacement_mm && part.abs() < bound.force_part);
                         let off_n = found.wrench.force_n.length() - exact.wrench.force_n.length();
-                        let bound_n = bound.force_part * most_force_n(&elastomer, &object, depth);
+                        let bound_n = bound.force_part * max_force_n(&elastomer, &object, depth);
                         assert!(off_n.abs() < bound_n && bound_n < 1e3);
                     }
                 }
@@ -145,8 +145,8 @@ fn no_object_presses_harder_than_is_said() {
             (rigid(ContactSolid::sphere(60.0).unwrap()), raised(60.0)),
         ] {
             let force_n = contact.solve(&object, &pose, None).unwrap().wrench.force_n.length();
-            let most_n = most_force_n(&silicone(), &object, depth);
-            assert!(force_n < most_n && force_n > 0.05 * most_n, "{force_n} {most_n}");
+            let max_n = max_force_n(&silicone(), &object, depth);
+            assert!(force_n < max_n && force_n > 0.05 * max_n, "{force_n} {max_n}");
         }
     }
 }

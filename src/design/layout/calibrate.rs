@@ -241,7 +241,7 @@ fn choose<'a>(
         }
         misses.sort_by(f64::total_cmp);
         let middle = misses.get(misses.len() / 2).copied().unwrap_or(0.0);
-        if best.as_ref().is_none_or(|(least, _)| middle < *least) {
+        if best.as_ref().is_none_or(|(lowest, _)| middle < *lowest) {
             best = Some((middle, marks));
         }
     }

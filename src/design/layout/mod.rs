@@ -50,4 +50,4 @@ pub use error::LayoutError;
 pub use lost::{LostDot, Reason, Rule, Zone};
 pub use passes::PrintPass;
 pub use plan::Layout;
-pub use spec::{LayoutSpec, Mask};
+pub use spec::{LayoutOrigin, LayoutSpec, Mask};

@@ -13,10 +13,10 @@ use super::lost::{LostDot, Rule};
 use super::neighbors::neighbors;
 use super::passes::{self, PrintPass};
 use super::pattern::{Pattern, PatternError};
-use super::spec::LayoutSpec;
+use super::spec::{LayoutOrigin, LayoutSpec};
 use super::{gaps, zones};
 use crate::spec::Design;
-use crate::spec::sections::{OnLost, PatternKind, PrintPasses};
+use crate::spec::sections::{OnLost, PatternKind, PrintPasses, PrintSection};
 use crate::transfer::TransferMap;
 
 /// Delaunay edges up to this multiple of the nearest distance count as neighbours: below the diagonal of a
@@ -46,6 +46,9 @@ pub struct Layout {
     pub transfer: TransferMap,
     /// What a person should know, in words.
     pub warnings: Vec<String>,
+    /// How the dots are printed. Not to be changed: the films' scale and sheet follow from it.
+    print: PrintSection,
+    origin: LayoutOrigin,
 }
 
 impl Design {
@@ -74,6 +77,16 @@ impl Layout {
     /// be seen or printed.
     pub fn new(spec: &LayoutSpec) -> Result<Self, LayoutError> {
         lay_out(spec)
+    }
+
+    /// The print section that the dots were laid out with, and that their films are drawn with.
+    pub fn print(&self) -> &PrintSection {
+        &self.print
+    }
+
+    /// The design that the layout was made from.
+    pub fn origin(&self) -> &LayoutOrigin {
+        &self.origin
     }
 }
 
@@ -144,7 +157,8 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
             dots.len() + lost.len()
         ));
     }
-    Ok(Layout { dots, lost, passes, pitch_px, size, center_px, edge, transfer, warnings })
+    let (print, origin) = (spec.print.clone(), spec.origin.clone());
+    Ok(Layout { dots, lost, passes, pitch_px, size, center_px, edge, transfer, warnings, print, origin })
 }
 
 /// The print passes that the dots of the pattern need, those that the lens does not see left out.

@@ -35,6 +35,17 @@ pub struct LayoutSpec {
     pub pattern: PatternSection,
     /// The design's print.
     pub print: PrintSection,
+    /// The design's name and text, which its films carry.
+    pub origin: LayoutOrigin,
+}
+
+/// The design that a layout was made from.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct LayoutOrigin {
+    /// The design's name.
+    pub name: String,
+    /// The design's text, of which films state the hash.
+    pub text: String,
 }
 
 impl LayoutSpec {
@@ -65,6 +76,7 @@ impl LayoutSpec {
             white_markers: markers.map(|(id, position_mm)| Marker { id, position_mm, diameter_mm }).collect(),
             pattern: sections.pattern.clone(),
             print: sections.print.clone(),
+            origin: LayoutOrigin { name: design.name().to_owned(), text: design.text().to_owned() },
         })
     }
 

@@ -98,14 +98,14 @@ fn rings_of(
 /// Narrowest gap between two marks on the plate, mm, by the circles around their outlines.
 fn narrowest_gap_mm(marks: &[TargetMark]) -> f64 {
     let half: Vec<f64> = marks.iter().map(|mark| 0.5 * mark.outline.widths().1).collect();
-    let mut least = f64::INFINITY;
+    let mut smallest = f64::INFINITY;
     for (i, (a, half_a)) in marks.iter().zip(&half).enumerate() {
         for (b, half_b) in marks[..i].iter().zip(&half) {
             // Only neighbours along a ring or from ring to ring can be near.
-            if a.ring - b.ring <= 1 && a.plate_mm.distance(b.plate_mm) - half_a - half_b < least {
-                least = least.min(super::zones::gap(&a.outline.polygon(4), &b.outline.polygon(4)));
+            if a.ring - b.ring <= 1 && a.plate_mm.distance(b.plate_mm) - half_a - half_b < smallest {
+                smallest = smallest.min(super::zones::gap(&a.outline.polygon(4), &b.outline.polygon(4)));
             }
         }
     }
-    least
+    smallest
 }

@@ -118,12 +118,12 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
     Ok(b)
 }
 
-/// The pad-printing jig for one hit: it holds sheet and dome rigidly from
-/// below, tilted so that the hit's direction points up into the pad's stroke.
+/// The pad-printing jig for one print pass: it holds sheet and dome rigidly from
+/// below, tilted so that the pass's direction points up into the pad's stroke.
 ///
-/// Frame: top of the base plate z = 0, register pins on the x axis, the hit's
+/// Frame: top of the base plate z = 0, register pins on the x axis, the pass's
 /// direction through the dome's centre is the z axis.
-pub(super) fn jig(m: &Measures, name: &str, hit: &PrintPass) -> Result<Blueprint, PartError> {
+pub(super) fn jig(m: &Measures, name: &str, pass: &PrintPass) -> Result<Blueprint, PartError> {
     let j = &m.jig;
     let mut b =
         Blueprint::new(name, "pad-printing jig: holds sheet and dome under the pad; printed", m.chord);
@@ -136,7 +136,7 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &PrintPass) -> Result<Blueprint
     let grip = 0.6 * m.sheet_thickness_mm;
     let (seat, top) = (-m.sheet_thickness_mm, -m.sheet_thickness_mm + grip);
 
-    let turn = hit.pass_from_sensor;
+    let turn = pass.pass_from_sensor;
     let lowest = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)]
         .map(|(x, y)| (turn * DVec3::new(x * block.x, y * block.y, seat)).z)
         .into_iter()
@@ -183,8 +183,8 @@ pub(super) fn jig(m: &Measures, name: &str, hit: &PrintPass) -> Result<Blueprint
         );
         b.genus += 1;
     }
-    // The block of a tilted hit may hang over a hole, which then goes through it once more: whether it does
+    // The block of a tilted pass may hang over a hole, which then goes through it once more: whether it does
     // is a question of angles, and the mesh answers it.
-    b.genus_is_min = hit.tilt_rad != 0.0;
+    b.genus_is_min = pass.tilt_rad != 0.0;
     Ok(b)
 }

@@ -55,7 +55,7 @@ pub(crate) struct Blueprint {
     pub cut: Vec<Feature>,
     /// Kinds of cuts that are meant to run into each other.
     pub may_meet: &'static [(&'static str, &'static str)],
-    /// Handles, by the count of holes.
+    /// Number of holes through the part.
     pub genus: i64,
     /// Whether there may be more holes through the part than that, which the mesh then tells.
     pub genus_is_min: bool,

@@ -187,11 +187,11 @@ pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
 }
 
 /// Makes all parts, in a fixed order, and checks each against the process. One
-/// pad-printing jig is made for each hit.
+/// pad-printing jig is made for each print pass.
 ///
 /// # Errors
 /// Why parts cannot be made: the first fault of each, in that order.
-pub fn build(m: &Measures, hits: &[PrintPass]) -> Result<Vec<Part>, PartError> {
+pub fn build(m: &Measures, passes: &[PrintPass]) -> Result<Vec<Part>, PartError> {
     let makers: [Maker; 7] = [
         upper::blueprint,
         lower::blueprint,
@@ -202,10 +202,10 @@ pub fn build(m: &Measures, hits: &[PrintPass]) -> Result<Vec<Part>, PartError> {
         accessories::coupon,
     ];
     let jig = |i: usize| {
-        let name = if hits.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") };
-        hits.get(i).map(|hit| accessories::jig(m, &name, hit))
+        let name = if passes.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") };
+        passes.get(i).map(|pass| accessories::jig(m, &name, pass))
     };
-    let results: Vec<Result<Part, PartError>> = (0..makers.len() + hits.len())
+    let results: Vec<Result<Part, PartError>> = (0..makers.len() + passes.len())
         .into_par_iter()
         .filter_map(|i| makers.get(i).map(|make| make(m)).or_else(|| jig(i - makers.len())))
         .map(|blueprint| blueprint?.build(m))

@@ -88,11 +88,11 @@ pub(super) fn base(m: &Measures) -> Result<Blueprint, PartError> {
     let r = 0.5 * pins.diameter_mm;
     let chamfer = pins.chamfer_mm;
     if chamfer >= r.min(pins.height_mm) {
-        let most = r.min(pins.height_mm);
+        let limit_mm = r.min(pins.height_mm);
         return Err(b.infeasible(
             "chamfer of the pins, less than their radius and height",
             chamfer,
-            most,
+            limit_mm,
             "mould.pins.chamfer_mm",
         ));
     }

@@ -48,7 +48,7 @@ impl MarkerView {
         }
     }
 
-    /// How much of lens and mask the worst marker uses at a pose; `on_ray` is told every ray, with the optics at
+    /// How much of lens and mask the worst marker uses at a pose; `on_ray` gets every ray, with the optics at
     /// the pose. A point that the lens cannot see uses twice what there is.
     pub fn checks(&self, pose: &Rigid, mut on_ray: impl FnMut(&SensorOptics, EdgeRay)) -> Vec<Check> {
         let far = self.optics.lens().max_field_angle_rad();

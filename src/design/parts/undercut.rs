@@ -26,7 +26,7 @@ pub(super) struct Undercut {
 
 /// Looks for material that meets a body which leaves the solid straight along `way` (+1: up, -1: down): for every
 /// triangle that faces against it, whether the solid goes on behind the gap that it bounds. Of several the widest
-/// is told.
+/// is returned.
 pub(super) fn undercut(mesh: &TriMesh, way: f64) -> Option<Undercut> {
     let bounds = mesh.bounds()?;
     let size = bounds.size_mm().length();

@@ -18,9 +18,9 @@ pub struct CheckedSensor {
 ///
 /// # Errors
 /// All faults of the seats, and those of the parts that cannot be made.
-pub fn build_seated(design: &Design, m: &Measures, hits: &[PrintPass]) -> Result<Vec<Part>, PartError> {
+pub fn build_seated(design: &Design, m: &Measures, passes: &[PrintPass]) -> Result<Vec<Part>, PartError> {
     let mut faults = seats::faults(design, m);
-    let made = build(m, hits);
+    let made = build(m, passes);
     if let Err(fault) = &made {
         // A wall's thickness alone does not tell where its neighbours should be.
         faults.extend(openings::faults(design, m));

@@ -91,12 +91,12 @@ impl Correction {
             for k in 0..azimuth_steps {
                 let at = Polar::new(polar_rad, TAU * f64::from(k) / f64::from(azimuth_steps));
                 let image = self.unit_plate(nominal, &at);
-                let least = image.d_radial_d_polar.min(image.area_ratio());
-                if least < MIN_SLOPE {
+                let smallest = image.d_radial_d_polar.min(image.area_ratio());
+                if smallest < MIN_SLOPE {
                     return Err(TransferError {
                         field: "measured".into(),
                         value: format!(
-                            "a map whose slope is {least:.4} at {:.1} deg",
+                            "a map whose slope is {smallest:.4} at {:.1} deg",
                             polar_rad.to_degrees()
                         ),
                         problem: "the map does not grow outwards there: it folds".into(),

@@ -1,4 +1,4 @@
-//! The film of one hit: dots, registration and notes on a sheet at 1:1.
+//! The film of one print pass: dots, registration and notes on a sheet at 1:1.
 //!
 //! Two transfers (plate to pad, pad to part) cancel: the plate seen from above reads like the part seen from
 //! outside, and nothing is mirrored. The camera, inside, sees the mirror image of both.
@@ -6,10 +6,15 @@
 use glam::DVec2;
 
 use super::drawing::{Anchor, Drawing, InkedPath, Item, Layer, NotFinite, Path, PathInk};
+use super::dxf_file::to_dxf;
+use super::error::RenderError;
+use super::pdf_file::to_pdf;
+use super::svg_file::to_svg;
+use super::tiff_file::to_tiff;
+use crate::hash::sha256_hex;
 use domecast_design::layout::Layout;
 use domecast_design::layout::outline::Outline;
-use domecast_design::layout::target::TargetMark;
-use domecast_design::transfer::TransferMap;
+use domecast_design::layout::target::{TargetMark, print_target};
 
 /// Half the length of a registration cross, mm.
 const CROSS_ARM_MM: f64 = 1.5;
@@ -28,13 +33,97 @@ const TEXT_LINE_MM: f64 = 1.9;
 const NOTES_WIDTH_MM: f64 = 40.0;
 const NOTES_CHARACTERS: usize = 40;
 
+/// The films of a layout; for [`Layout`] only, whose scale, sheet and notes they take.
+pub trait Films {
+    /// The film of one print pass, counted from 0.
+    fn film(&self, pass: usize) -> Film<'_>;
+
+    /// The film of the test target by which the pad's map is measured.
+    fn target_film(&self) -> Film<'_>;
+}
+
+impl Films for Layout {
+    fn film(&self, pass: usize) -> Film<'_> {
+        Film { layout: self, picture: Picture::Pass(pass) }
+    }
+
+    fn target_film(&self) -> Film<'_> {
+        Film { layout: self, picture: Picture::Target }
+    }
+}
+
+/// A film for the pad printer, 1:1 in mm: dots, registration, notes. Its size follows from the layout alone.
+#[derive(Debug, Clone, Copy)]
+pub struct Film<'a> {
+    layout: &'a Layout,
+    picture: Picture,
+}
+
+/// What a film prints.
+#[derive(Debug, Clone, Copy)]
+enum Picture {
+    Pass(usize),
+    Target,
+}
+
+impl Film<'_> {
+    /// The film as a drawing, before any format.
+    ///
+    /// # Errors
+    /// [`RenderError::NoSuchPass`]; a coordinate is not finite.
+    pub fn drawing(&self) -> Result<Drawing, RenderError> {
+        let layout = self.layout;
+        let label = FilmLabel {
+            design: layout.origin().name.clone(),
+            hash: sha256_hex(layout.origin().text.as_bytes()),
+        };
+        match self.picture {
+            Picture::Pass(pass) => pass_drawing(layout, pass, &label),
+            Picture::Target => {
+                let marks = print_target(&layout.transfer, layout.print());
+                Ok(target_drawing(layout, &marks, &label)?)
+            }
+        }
+    }
+
+    /// The film as SVG.
+    ///
+    /// # Errors
+    /// As [`Self::drawing`].
+    pub fn to_svg(&self) -> Result<Vec<u8>, RenderError> {
+        Ok(to_svg(&self.drawing()?))
+    }
+
+    /// The film as PDF.
+    ///
+    /// # Errors
+    /// As [`Self::drawing`].
+    pub fn to_pdf(&self) -> Result<Vec<u8>, RenderError> {
+        to_pdf(&self.drawing()?)
+    }
+
+    /// The film as DXF, its outlines divided to the design's tolerance.
+    ///
+    /// # Errors
+    /// As [`Self::drawing`].
+    pub fn to_dxf(&self) -> Result<Vec<u8>, RenderError> {
+        Ok(to_dxf(&self.drawing()?, self.layout.print().outline_mm()))
+    }
+
+    /// The film as TIFF, in the design's resolution.
+    ///
+    /// # Errors
+    /// As [`Self::drawing`], or a picture that is too large.
+    pub fn to_tiff(&self) -> Result<Vec<u8>, RenderError> {
+        to_tiff(&self.drawing()?, self.layout.print().dpi)
+    }
+}
+
 /// What the notes of a film say beside what the layout knows.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FilmLabel {
-    /// The design's name.
-    pub design: String,
-    /// The design's hash, in hexadecimal digits.
-    pub hash: String,
+struct FilmLabel {
+    design: String,
+    /// In hexadecimal digits.
+    hash: String,
 }
 
 impl FilmLabel {
@@ -44,61 +133,41 @@ impl FilmLabel {
     }
 }
 
-/// The film of one hit of a layout.
-///
-/// `pad_over_image` is the pad's footprint over the picture's diameter.
-///
-/// # Errors
-/// A coordinate is not finite.
-pub fn film(
-    layout: &Layout,
-    hit: usize,
-    pad_over_image: f64,
-    label: &FilmLabel,
-) -> Result<Drawing, NotFinite> {
-    let dots = layout.dots.iter().filter(|dot| dot.pass == hit);
+fn pass_drawing(layout: &Layout, pass: usize, label: &FilmLabel) -> Result<Drawing, RenderError> {
+    let films = layout.passes.len();
+    let Some(print_pass) = layout.passes.get(pass) else {
+        return Err(RenderError::NoSuchPass { pass, passes: films });
+    };
+    let dots = layout.dots.iter().filter(|dot| dot.pass == pass);
     let marks: Vec<Mark<'_>> =
         dots.map(|dot| Mark { id: dot.id, plate_mm: dot.plate_mm, outline: &dot.plate_outline }).collect();
-    let films = layout.passes.len();
-    let (tilt_deg, azimuth_deg) = layout
-        .passes
-        .get(hit)
-        .map_or((0.0, 0.0), |hit| (hit.tilt_rad.to_degrees(), hit.azimuth_rad.to_degrees()));
+    let (tilt_deg, azimuth_deg) = (print_pass.tilt_rad.to_degrees(), print_pass.azimuth_rad.to_degrees());
     let jig = if tilt_deg == 0.0 {
         "pole upright".to_owned()
     } else {
         format!("jig {tilt_deg:.2} deg: the dome's azimuth {azimuth_deg:.2} deg is tilted up to the pad")
     };
-    Film {
-        name: format!("film {} of {films}", hit + 1),
+    let content = FilmContent {
+        name: format!("film {} of {films}", pass + 1),
         shape: "dot",
-        first_note: format!("film {} of {films}: {} dots, {jig}", hit + 1, marks.len()),
+        first_note: format!("film {} of {films}: {} dots, {jig}", pass + 1, marks.len()),
         marks,
         facts: vec![
-            ("film".into(), format!("{} of {films}", hit + 1)),
+            ("film".into(), format!("{} of {films}", pass + 1)),
             ("tilt-deg".into(), tilt_deg.to_string()),
             ("azimuth-deg".into(), azimuth_deg.to_string()),
         ],
         further_notes: Vec::new(),
-    }
-    .drawing(&layout.transfer, pad_over_image, label)
+    };
+    Ok(content.drawing(layout, label)?)
 }
 
-/// The film of the test target by which a pad's map is measured.
-///
-/// # Errors
-/// A coordinate is not finite.
-pub fn target_film(
-    target: &[TargetMark],
-    transfer: &TransferMap,
-    pad_over_image: f64,
-    label: &FilmLabel,
-) -> Result<Drawing, NotFinite> {
+fn target_drawing(layout: &Layout, target: &[TargetMark], label: &FilmLabel) -> Result<Drawing, NotFinite> {
     let marks = target
         .iter()
         .map(|mark| Mark { id: mark.id, plate_mm: mark.plate_mm, outline: &mark.outline })
         .collect();
-    Film {
+    FilmContent {
         name: "print target".to_owned(),
         shape: "mark",
         marks,
@@ -111,7 +180,7 @@ pub fn target_film(
                 .to_owned(),
         ],
     }
-    .drawing(transfer, pad_over_image, label)
+    .drawing(layout, label)
 }
 
 /// A mark of a film.
@@ -122,7 +191,7 @@ struct Mark<'a> {
 }
 
 /// What differs from film to film.
-struct Film<'a> {
+struct FilmContent<'a> {
     name: String,
     shape: &'static str,
     marks: Vec<Mark<'a>>,
@@ -131,13 +200,9 @@ struct Film<'a> {
     further_notes: Vec<String>,
 }
 
-impl Film<'_> {
-    fn drawing(
-        self,
-        transfer: &TransferMap,
-        pad_over_image: f64,
-        label: &FilmLabel,
-    ) -> Result<Drawing, NotFinite> {
+impl FilmContent<'_> {
+    fn drawing(self, layout: &Layout, label: &FilmLabel) -> Result<Drawing, NotFinite> {
+        let transfer = &layout.transfer;
         let mut layer = Layer::new("dots");
         for mark in &self.marks {
             layer.items.push(Item::Path(InkedPath {
@@ -151,7 +216,8 @@ impl Film<'_> {
                 ink: PathInk::Fill,
             }));
         }
-        let footprint_mm = pad_over_image * picture_radius_mm(self.marks.iter().map(|mark| mark.outline));
+        let footprint_mm =
+            layout.print().pad_over_image * picture_radius_mm(self.marks.iter().map(|mark| mark.outline));
         let map = match transfer.correction() {
             None => transfer.nominal().as_str().to_owned(),
             Some(_) => format!("{}, corrected by measurement", transfer.nominal().as_str()),

@@ -1,18 +1,17 @@
 //! What a print shop gets: films as drawings, their writers, and pictures of the result.
 //!
-//! A [`Drawing`] is a resolved tree in millimetres, y up; [`film`] makes one for each hit of a layout, and
-//! each writer spells it in its format without deciding anything.
+//! A [`Film`] belongs to a layout and takes its scale, its sheet and its notes from it: [`Films::film`] has one for
+//! each print pass. A [`Drawing`] is the same as a resolved tree in millimetres, y up; each writer spells it in its format
+//! without deciding anything.
 //!
 //! ```
 //! use domecast_design::Design;
-//! use domecast_fab::artwork::{FilmLabel, film, to_svg};
+//! use domecast_fab::artwork::Films;
 //!
 //! let design: Design = include_str!("../../../designs/thumb24.json").parse()?;
-//! let label = FilmLabel { design: design.name().into(), hash: "0123456789ab".into() };
-//! let pad_over_image = design.sections().print.pad_over_image;
-//! let svg = to_svg(&film(&design.layout()?, 0, pad_over_image, &label).expect("finite dots"));
+//! let svg = design.layout()?.film(0).to_svg()?;
 //! assert!(svg.starts_with(b"<"));
-//! # Ok::<(), domecast_design::DesignError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod camera_view;
@@ -33,13 +32,12 @@ pub use camera_view::camera_view;
 pub use drawing::Drawing;
 pub use dxf_file::to_dxf;
 pub use error::RenderError;
-pub use film::{FilmLabel, film, target_film};
+pub use film::{Film, Films};
 pub use outside_view::outside_view;
 pub use pdf_file::to_pdf;
 pub use svg_file::to_svg;
 pub use tiff_file::to_tiff;
 
-use domecast_design::layout::target::print_target;
 use domecast_design::layout::{Layout, LayoutSpec};
 
 /// A file of the artwork.
@@ -51,41 +49,40 @@ pub struct ArtworkFile {
     pub bytes: Vec<u8>,
 }
 
-/// Path of the film of a hit in a build, for a kind of file (`svg`): `artwork/dots.svg` for the first hit,
+/// Path of the film of a print pass in a build, for a kind of file (`svg`): `artwork/dots.svg` for the first pass,
 /// `artwork/dots-2.svg` for the second.
-pub fn film_path(hit: usize, kind: &str) -> String {
-    if hit == 0 { format!("artwork/dots.{kind}") } else { format!("artwork/dots-{}.{kind}", hit + 1) }
+pub fn film_path(pass: usize, kind: &str) -> String {
+    if pass == 0 { format!("artwork/dots.{kind}") } else { format!("artwork/dots-{}.{kind}", pass + 1) }
 }
 
 /// All artwork of a layout, in a fixed order.
 ///
 /// # Errors
 /// See [`RenderError`].
-pub fn files(spec: &LayoutSpec, layout: &Layout, label: &FilmLabel) -> Result<Vec<ArtworkFile>, RenderError> {
+pub fn files(spec: &LayoutSpec, layout: &Layout) -> Result<Vec<ArtworkFile>, RenderError> {
     let mut files = Vec::new();
-    for hit in 0..layout.passes.len() {
-        let drawing = film(layout, hit, spec.print.pad_over_image, label)?;
-        files.extend(film_files(&drawing, |kind| film_path(hit, kind), spec)?);
+    for pass in 0..layout.passes.len() {
+        files.extend(film_files(layout, &layout.film(pass), |kind| film_path(pass, kind))?);
     }
-    let target = print_target(&layout.transfer, &spec.print);
-    let drawing = target_film(&target, &layout.transfer, spec.print.pad_over_image, label)?;
-    files.extend(film_files(&drawing, |kind| format!("artwork/print-target.{kind}"), spec)?);
+    let target = layout.target_film();
+    files.extend(film_files(layout, &target, |kind| format!("artwork/print-target.{kind}"))?);
     files.push(ArtworkFile { path: "artwork/camera-view.png".into(), bytes: camera_view(spec, layout)? });
     files.push(ArtworkFile { path: "artwork/outside-view.png".into(), bytes: outside_view(layout)? });
     Ok(files)
 }
 
-/// One film in every format.
+/// One film in every format; it is drawn once.
 fn film_files(
-    drawing: &Drawing,
+    layout: &Layout,
+    film: &Film<'_>,
     path: impl Fn(&str) -> String,
-    spec: &LayoutSpec,
 ) -> Result<[ArtworkFile; 4], RenderError> {
     let file = |kind: &str, bytes: Vec<u8>| ArtworkFile { path: path(kind), bytes };
+    let drawing = film.drawing()?;
     Ok([
-        file("svg", to_svg(drawing)),
-        file("pdf", to_pdf(drawing)?),
-        file("dxf", to_dxf(drawing, spec.print.outline_mm())),
-        file("tif", to_tiff(drawing, spec.print.dpi)?),
+        file("svg", to_svg(&drawing)),
+        file("pdf", to_pdf(&drawing)?),
+        file("dxf", to_dxf(&drawing, layout.print().outline_mm())),
+        file("tif", to_tiff(&drawing, layout.print().dpi)?),
     ])
 }

@@ -17,8 +17,8 @@ const DOME_PX: f64 = 380.0;
 const GROUND: [u8; 3] = [245, 245, 243];
 const MEMBRANE: [u8; 3] = [205, 205, 200];
 const LINE: [u8; 3] = [120, 120, 120];
-/// The first hit's dots are black, those of the others coloured, so that the shares can be told apart.
-const HITS: [[u8; 3]; 6] =
+/// The first pass's dots are black, those of the others coloured, so that the shares can be distinguished.
+const PASS_COLORS: [[u8; 3]; 6] =
     [[10, 10, 10], [160, 30, 30], [25, 90, 160], [30, 120, 50], [140, 80, 10], [110, 40, 130]];
 
 /// The dome from above, y up, as a PNG: the dots where the pad lays them by the design's map.
@@ -40,8 +40,8 @@ pub fn outside_view(layout: &Layout) -> Result<Vec<u8>, RenderError> {
         stroke(&mut picture, &circle(radius_mm * polar_deg.to_radians().sin()), true, 1.0, LINE);
     }
     for dot in &layout.dots {
-        let Some(hit) = layout.passes.get(dot.pass) else { continue };
-        let sensor_from_pass = hit.pass_from_sensor.transpose();
+        let Some(pass) = layout.passes.get(dot.pass) else { continue };
+        let sensor_from_pass = pass.pass_from_sensor.transpose();
         let corners: Option<Vec<DVec2>> = dot
             .plate_outline
             .polygon(6)
@@ -51,7 +51,7 @@ pub fn outside_view(layout: &Layout) -> Result<Vec<u8>, RenderError> {
             .collect();
         // Every dot of a layout came over the map and goes back.
         if let Some(corners) = corners {
-            fill(&mut picture, &corners, HITS[dot.pass % HITS.len()]);
+            fill(&mut picture, &corners, PASS_COLORS[dot.pass % PASS_COLORS.len()]);
         }
     }
     let mut words = |text: &str, at: DVec2, height_px: f64| {

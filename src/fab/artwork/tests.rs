@@ -6,18 +6,17 @@ use super::*;
 use domecast_design;
 use domecast_design::layout::Layout;
 
-fn thumb24() -> (LayoutSpec, Layout, FilmLabel) {
+fn thumb24() -> (LayoutSpec, Layout) {
     let design = domecast_design::Design::from_str(include_str!("../../../designs/thumb24.json")).unwrap();
     let spec = LayoutSpec::of_design(&design).unwrap();
     let layout = Layout::new(&spec).unwrap();
-    let label = FilmLabel { design: design.name().into(), hash: "0123456789abcdef".repeat(4) };
-    (spec, layout, label)
+    (spec, layout)
 }
 
 #[test]
 fn svg_read_again_maps_back_to_the_dome() {
-    let (_, layout, label) = thumb24();
-    let drawing = film(&layout, 0, 1.3, &label).unwrap();
+    let (_, layout) = thumb24();
+    let drawing = layout.film(0).drawing().unwrap();
     let text = String::from_utf8(to_svg(&drawing)).unwrap();
     let mut layers = Vec::new();
     let mut dots = 0;
@@ -27,7 +26,10 @@ fn svg_read_again_maps_back_to_the_dome() {
         let get = |key: &str| attributes.get(key).map(|value| value.to_string());
         if name == "svg" && size.is_none() {
             size = Some((get("width").unwrap(), get("height").unwrap(), get("viewBox").unwrap()));
-            assert_eq!(get("data-design-sha256").unwrap(), label.hash);
+            assert_eq!(
+                get("data-design-sha256").unwrap(),
+                crate::hash::sha256_hex(layout.origin().text.as_bytes())
+            );
         }
         if get("inkscape:groupmode").as_deref() == Some("layer") {
             layers.push(get("inkscape:label").unwrap());
@@ -60,10 +62,33 @@ fn svg_read_again_maps_back_to_the_dome() {
 }
 
 #[test]
+fn a_film_has_the_scale_of_its_own_design() {
+    let text = include_str!("../../../designs/thumb24.json");
+    let other = text.replace("\"pad_over_image\": 1.3", "\"pad_over_image\": 1.5");
+    assert_ne!(text, other);
+    let widths = [text, &other].map(|text| {
+        let layout = domecast_design::Design::from_str(text).unwrap().layout().unwrap();
+        let drawing = layout.film(0).drawing().unwrap();
+        let footprint = drawing.facts.iter().find(|(name, _)| name == "pad-footprint-radius-mm").unwrap();
+        footprint.1.parse::<f64>().unwrap()
+    });
+    assert!((widths[1] / widths[0] - 1.5 / 1.3).abs() < 1e-12, "{widths:?}");
+}
+
+#[test]
+fn a_pass_that_is_not_there_has_no_film() {
+    let (_, layout) = thumb24();
+    let error = layout.film(1).to_svg().unwrap_err();
+    assert_eq!(error.to_string(), "film 1: the layout has 1 print passes; allowed: 0 to 0");
+    assert!(layout.target_film().to_svg().is_ok());
+}
+
+#[test]
 fn registration_stays_off_the_pad() {
-    let (_, layout, label) = thumb24();
-    let drawing = film(&layout, 0, 1.3, &label).unwrap();
-    let footprint_mm = 1.3 * film::picture_radius_mm(layout.dots.iter().map(|dot| &dot.plate_outline));
+    let (_, layout) = thumb24();
+    let drawing = layout.film(0).drawing().unwrap();
+    let footprint_mm = layout.print().pad_over_image
+        * film::picture_radius_mm(layout.dots.iter().map(|dot| &dot.plate_outline));
     for layer in &drawing.layers[1..] {
         for item in &layer.items {
             match item {
@@ -92,7 +117,7 @@ fn registration_stays_off_the_pad() {
 
 #[test]
 fn camera_view_shows_each_dot_where_it_is() {
-    let (spec, layout, _) = thumb24();
+    let (spec, layout) = thumb24();
     let png = camera_view(&spec, &layout).unwrap();
     let picture = tiny_skia::Pixmap::decode_png(&png).unwrap();
     assert_eq!((picture.width(), picture.height()), (640, 480));
@@ -121,8 +146,8 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
     let make = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let (spec, layout, label) = thumb24();
-            files(&spec, &layout, &label).unwrap()
+            let (spec, layout) = thumb24();
+            files(&spec, &layout).unwrap()
         })
     };
     assert_eq!(make(1), make(4));
@@ -132,8 +157,8 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
 #[ignore = "writes files to look at; set DOMECAST_LOOK to a folder"]
 fn look() {
     let folder = std::path::PathBuf::from(std::env::var("DOMECAST_LOOK").unwrap());
-    let (spec, layout, label) = thumb24();
-    for file in files(&spec, &layout, &label).unwrap() {
+    let (spec, layout) = thumb24();
+    for file in files(&spec, &layout).unwrap() {
         let path = folder.join(&file.path);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, file.bytes).unwrap();

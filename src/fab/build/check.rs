@@ -14,8 +14,9 @@ use std::str::FromStr;
 
 use glam::{DVec2, DVec3};
 
-use super::manifest::{DESIGN_NAME, MANIFEST_NAME, Manifest, PartRecord, sha256_hex};
+use super::manifest::{DESIGN_NAME, MANIFEST_NAME, Manifest, PartRecord};
 use crate::artwork;
+use crate::hash::sha256_hex;
 use domecast_design::layout::Layout;
 use domecast_design::{Design, DesignError};
 use domecast_files::list_files;

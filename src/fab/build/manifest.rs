@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Component, Path};
 
+use crate::hash::sha256_hex;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use domecast_design::DesignError;
 
@@ -147,9 +147,4 @@ impl Manifest {
         }
         Ok(manifest)
     }
-}
-
-/// SHA-256 of `bytes`, hexadecimal.
-pub fn sha256_hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

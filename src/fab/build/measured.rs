@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use super::manifest::{DESIGN_NAME, Manifest, sha256_hex};
+use super::manifest::{DESIGN_NAME, Manifest};
+use crate::hash::sha256_hex;
 use crate::report::MEASURED;
 use domecast_design::{Design, DesignError};
 

@@ -20,17 +20,16 @@ mod manifest;
 mod measured;
 mod tree;
 
+pub use crate::hash::sha256_hex;
 pub use domecast_files::{WriteError, list_files};
-pub use manifest::{
-    DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning, sha256_hex,
-};
+pub use manifest::{DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning};
 pub use measured::Measured;
 pub use tree::Tree;
 
 use std::fmt;
 
 use crate::artwork;
-use crate::artwork::{FilmLabel, RenderError};
+use crate::artwork::RenderError;
 use crate::constants;
 use crate::report;
 use domecast_design::layout::report::LayoutReport;
@@ -172,8 +171,7 @@ fn make(
     tree.add("constants/constants.json", constants.to_json().into_bytes());
     // four pieces of work that share nothing but what they read, on as many threads as there are
     step("drawing the artwork, making the parts, driving the loads to their limits");
-    let label = FilmLabel { design: design.name().to_owned(), hash: sha256.clone() };
-    let draw = || artwork::files(&spec, &layout, &label);
+    let draw = || artwork::files(&spec, &layout);
     let judge = || LayoutReport::new(design, &spec, &layout);
     let make_parts = || make_parts(design, &layout, &springs);
     let load = || constants::force_report(design, &springs);

@@ -319,6 +319,6 @@ fn spans_plane(four: &[DVec2; 4]) -> bool {
     let area = |i: usize, j: usize, k: usize| (four[j] - four[i]).perp_dot(four[k] - four[i]).abs();
     let areas = [area(0, 1, 2), area(0, 1, 3), area(0, 2, 3), area(1, 2, 3)];
     let largest = areas.iter().copied().fold(0.0, f64::max);
-    let least = areas.iter().copied().fold(f64::INFINITY, f64::min);
-    least > 1e-4 * largest && largest > 0.0
+    let smallest = areas.iter().copied().fold(f64::INFINITY, f64::min);
+    smallest > 1e-4 * largest && largest > 0.0
 }

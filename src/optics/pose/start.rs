@@ -63,8 +63,8 @@ fn basis(points: &[DVec3; 4]) -> Option<DMat3> {
     // Rays of a narrow view have small determinants all round: compare them with each other.
     let volumes = [spread(0, 1, 2), spread(0, 1, 3), spread(0, 2, 3), spread(1, 2, 3)];
     let largest = volumes.iter().copied().fold(0.0, f64::max);
-    let least = volumes.iter().copied().fold(f64::INFINITY, f64::min);
-    if !(largest > 1e-12 * size && least > MIN_AREA * largest) {
+    let smallest = volumes.iter().copied().fold(f64::INFINITY, f64::min);
+    if !(largest > 1e-12 * size && smallest > MIN_AREA * largest) {
         return None;
     }
     let weights = m.inverse() * points[3];

@@ -193,7 +193,7 @@ fn swapped_markers_are_told() {
     }
 }
 
-// Far away and noisy, a plane's tilt cannot be told from its mirror: both poses, and the word.
+// Far away and noisy, a plane's tilt cannot be distinguished from its mirror: both poses, and the word.
 #[test]
 fn a_far_plane_is_ambiguous() {
     let base = thumb(LensModel::KannalaBrandt);

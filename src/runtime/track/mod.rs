@@ -72,8 +72,10 @@ pub use identities::MAX_FALSE_DOTS;
 pub use marks::MarkState;
 pub use options::{Channel, FollowMethod, Reference, Steps, Thresholds, TrackOptions};
 pub use report::{
-    CSV_HEADER, DOTS_CSV_HEADER, DotResult, MarkerResult, OverlayError, Problem, Problems, Tracked,
-    overlay_png, write_csv, write_dots_csv, write_json,
+    CSV_HEADER, DOTS_CSV_HEADER, DotResult, MarkerResult, Problem, Problems, Tracked, write_csv,
+    write_dots_csv, write_json,
 };
+#[cfg(feature = "overlay")]
+pub use report::{OverlayError, overlay_png};
 pub use tracker::Tracker;
 pub use wrench::Springs;

@@ -77,7 +77,7 @@ impl Between {
     }
 
     /// Whether the membrane is out of shape.
-    pub fn is_dented(&self) -> bool {
+    pub fn is_deformed(&self) -> bool {
         self.parts().into_iter().any(|(_, weight)| weight > 0.0)
     }
 

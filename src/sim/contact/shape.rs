@@ -1,6 +1,6 @@
 //! The touched dome at the many times at which one frame gathers light.
 //!
-//! Between frames the membrane's displacement is linear in time, so it is worked out for the frame and its two neighbours
+//! Between frames the membrane's displacement is linear in time, so it is computed for the frame and its two neighbours
 //! only, over one set of places; at any time between it is their mean.
 
 use glam::DVec3;
@@ -24,7 +24,7 @@ pub struct SkinShape {
 impl SkinShape {
     /// At one time; its map has nodes no further apart than `map_step_mm`, where that is given.
     pub fn of(touch: Option<Between>, radius_mm: f64, map_step_mm: Option<f64>, work: &mut Work) -> Self {
-        let map = touch.as_ref().filter(|between| between.is_dented()).and_then(|between| {
+        let map = touch.as_ref().filter(|between| between.is_deformed()).and_then(|between| {
             let (map, nodes) = DisplacementMap::new(between, radius_mm, map_step_mm?)?;
             work.add(EffectName::Contact, nodes * NODE_UNITS);
             Some(map)
@@ -78,7 +78,7 @@ impl<'a> Shapes<'a> {
     /// At a time of so many frames after the frame.
     pub fn at(&self, frames: f64) -> SkinShape {
         let touch = self.around.at(frames);
-        if !touch.is_dented() {
+        if !touch.is_deformed() {
             return SkinShape { touch: Some(touch), ..SkinShape::default() };
         }
         let [before, now, after] = &self.known;

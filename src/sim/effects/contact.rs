@@ -1,4 +1,4 @@
-//! Objects dent the dome, and press the platform on its springs.
+//! Objects deform the dome, and press the platform on its springs.
 
 use crate::bound::Bound;
 use crate::contact::level::{level_named, level_of};
@@ -8,7 +8,7 @@ use crate::raster::spots::Points;
 use crate::scene::file::LevelName;
 use crate::scene::object::Hold;
 use crate::{Pipeline, Scene, SimError};
-use domecast_contact::{estimate, most_force_n};
+use domecast_contact::{estimate, max_force_n};
 
 /// See the module.
 pub struct ContactEffect;
@@ -42,13 +42,13 @@ pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
     let Some(depth_mm) = deepest_mm(scene) else { return Vec::new() };
     let Some(object) = scene.objects().first() else { return Vec::new() };
     let elastomer = crate::elastomer_of(scene.design());
-    let hardest_n = most_force_n(&elastomer, &object.indenter, depth_mm);
+    let hardest_n = max_force_n(&elastomer, &object.indenter, depth_mm);
     let errors = |name| {
         let found = estimate(level_named(scene, name), &elastomer, &object.indenter, depth_mm);
         found.applies.then_some((found.displacement_mm, found.force_part * hardest_n))
     };
     let Some((own_mm, own_n)) = errors(best) else { return Vec::new() };
-    let most_n = scene.file().tolerance.force_n.unwrap_or(f64::INFINITY);
+    let max_n = scene.file().tolerance.force_n.unwrap_or(f64::INFINITY);
     let px_per_mm = largest_px_per_mm(scene);
     let own_work = per_frame(scene, best);
     [LevelName::Geometric, LevelName::ClosedForm]
@@ -58,7 +58,7 @@ pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
             // Both are within their bounds of the reference.
             let (error_mm, error_n) = errors(name)?;
             let px = (error_mm + own_mm) * px_per_mm;
-            (error_n + own_n <= most_n).then_some((name, px, own_work.saturating_sub(per_frame(scene, name))))
+            (error_n + own_n <= max_n).then_some((name, px, own_work.saturating_sub(per_frame(scene, name))))
         })
         .filter(|(_, _, saved)| *saved > 0)
         .collect()

@@ -17,8 +17,8 @@ pub struct MotionBlur;
 /// an even smear by less than an eighth of its height.
 const STEP_PX: f64 = 0.5;
 
-/// Most pictures that are averaged.
-const MOST: f64 = 48.0;
+/// Largest number of pictures that are averaged.
+const MAX_PICTURES: f64 = 48.0;
 
 /// Work of one more picture, a pixel.
 const PICTURE_UNITS: u64 = 5;
@@ -61,5 +61,5 @@ fn smear_px(scene: &Scene) -> f64 {
 }
 
 fn samples(scene: &Scene) -> u32 {
-    (smear_px(scene) / STEP_PX).ceil().clamp(2.0, MOST) as u32
+    (smear_px(scene) / STEP_PX).ceil().clamp(2.0, MAX_PICTURES) as u32
 }

@@ -15,7 +15,7 @@ pub struct Pipeline {
     pub geometry: Geometry,
     /// Which effects of light take part; [`crate::light::shading`] makes the shading of them.
     pub light: LightUse,
-    /// How contact is worked out; `None`: nothing touches the dome.
+    /// How contact is computed; `None`: nothing touches the dome.
     pub contact: Option<Level>,
     /// What the dots look like.
     pub ink: Ink,

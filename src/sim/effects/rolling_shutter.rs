@@ -1,6 +1,6 @@
 //! The rows are exposed one after the other, and what moves is sheared or stretched.
 //!
-//! The sensor is worked out at the times of some slices of rows. Each point of a dot or marker is seen where its way in
+//! The sensor is computed at the times of some slices of rows. Each point of a dot or marker is seen where its way in
 //! the image meets the row that is exposed just then, exactly; the brightness of the membrane is that of the slice's
 //! middle row. There are as many slices as keep the motion within one below 0.1 px and below half of the scene's
 //! tolerance, [`MAX_SLICES`] at most.
@@ -18,7 +18,7 @@ pub struct RollingShutter;
 /// Largest motion in a slice, px.
 const STEP_PX: f64 = 0.1;
 
-/// Most slices: each holds its own tables of the dented membrane. What moves by more than `MAX_SLICES * STEP_PX`
+/// Most slices: each holds its own tables of the deformed membrane. What moves by more than `MAX_SLICES * STEP_PX`
 /// during the readout has its shadows and creases, not its dots, up to half a slice's motion out of place.
 const MAX_SLICES: f64 = 64.0;
 

@@ -1,23 +1,13 @@
-//! The lens darkens towards the edge: brightness falls as a power of the cosine of the field angle.
-
-use glam::DVec2;
+//! The lens darkens towards the edge; the pass is [`crate::electronics::vignetting`].
 
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
-use crate::electronics::pass::{Pass, PassContext, Stage};
-use crate::raster::frame::Frame;
-use crate::{Pipeline, Scene, SimError, Work};
-use domecast_optics::camera::Lens;
+use crate::electronics::vignetting::{Darkening, FACTOR_UNITS, PIXELS_PER_UNIT, fall};
+use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct Vignetting;
-
-/// Work of one pixel's factor, once.
-const FACTOR_UNITS: u64 = 80;
-
-/// Pixels of a plane that are darkened in one unit of work.
-const PIXELS_PER_UNIT: u64 = 3;
 
 impl Effect for Vignetting {
     fn name(&self) -> EffectName {
@@ -50,51 +40,7 @@ impl Effect for Vignetting {
     }
 
     fn apply(&self, scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
-        let (width, height) = scene.image_size();
-        let power = scene.file().electronics.vignetting_exponent;
-        let lens = scene.optics().lens();
-        let edge = fall(lens.max_field_angle_rad(), power);
-        let factor = |at: usize| {
-            let pixel = DVec2::new((at % width) as f64, (at / width) as f64);
-            // Beyond what the lens shows, the picture is as dark as at its edge.
-            lens.unproject(pixel).map_or(edge, |ray| fall(Lens::field_angle_rad(ray), power)) as f32
-        };
-        let factors = (0..width * height).map(factor).collect();
-        pipeline.passes.push(Box::new(Darkening { factors, counted: false.into() }));
+        pipeline.passes.push(Box::new(Darkening::of(scene)));
         Ok(())
-    }
-}
-
-/// Beyond a right angle there is no light; the power of the cosine up to there.
-fn fall(field_angle_rad: f64, power: f64) -> f64 {
-    field_angle_rad.cos().max(0.0).powf(power)
-}
-
-struct Darkening {
-    factors: Vec<f32>,
-    /// Whether the work of making the factors has been told.
-    counted: std::sync::atomic::AtomicBool,
-}
-
-impl Pass for Darkening {
-    fn effect(&self) -> EffectName {
-        EffectName::Vignetting
-    }
-
-    fn stage(&self) -> Stage {
-        Stage::Vignetting
-    }
-
-    fn run(&self, frame: &mut Frame, _context: &PassContext, work: &mut Work) {
-        let mut units = (self.factors.len() * frame.planes.len()) as u64 / PIXELS_PER_UNIT;
-        if !self.counted.swap(true, std::sync::atomic::Ordering::Relaxed) {
-            units += self.factors.len() as u64 * FACTOR_UNITS;
-        }
-        for plane in &mut frame.planes {
-            for (value, factor) in plane.iter_mut().zip(&self.factors) {
-                *value *= factor;
-            }
-        }
-        work.add(EffectName::Vignetting, units);
     }
 }

@@ -92,7 +92,7 @@ impl LightBounds {
             // Half of the membrane's light meets the dome again; the rest meets the underside, which may send it back.
             let comes_back = if has_faces(&ways.optics[c]) { albedo } else { 0.5 * albedo };
             let more = 1.0 / (1.0 - comes_back);
-            let own = comes_back * more * found.membrane.most;
+            let own = comes_back * more * found.membrane.max;
             let index = |beside: bool| setup::index_at(&ways.optics[c], beside).powi(2);
             let white = sections.white_markers.reflectance / index(true);
             for (part, gain, own_share) in
@@ -105,11 +105,11 @@ impl LightBounds {
                 };
                 let hidden = 1.0 - sections.leds.through_platform.clamp(0.0, 1.0);
                 // Where the platform throws shadows, the tape moves their edges.
-                let by_tape = |part: Part| if shaded && part.tape > 0.0 { part.most } else { part.tape };
-                raise(&mut out.brightest, with_own(part.most, found.membrane.most) + light.stray_level);
-                raise(&mut out.falloff, with_own(part.most, found.membrane.most));
+                let by_tape = |part: Part| if shaded && part.tape > 0.0 { part.max } else { part.tape };
+                raise(&mut out.brightest, with_own(part.max, found.membrane.max) + light.stray_level);
+                raise(&mut out.falloff, with_own(part.max, found.membrane.max));
                 raise(&mut out.diffuser, with_own(by_tape(part), by_tape(found.membrane)));
-                raise(&mut out.platform_shadow, with_own(hidden * part.most, hidden * found.membrane.most));
+                raise(&mut out.platform_shadow, with_own(hidden * part.max, hidden * found.membrane.max));
                 raise(&mut out.interreflection, level(own));
                 // Without the faces there is more light, and less of it comes back.
                 raise(
@@ -127,8 +127,8 @@ pub fn grey(scene: &Scene, change: f64) -> Bound {
     Bound::grey(grey_of_change(scene.file().electronics.gamma, change))
 }
 
-fn raise(most: &mut f64, value: f64) {
-    *most = most.max(value);
+fn raise(bound: &mut f64, value: f64) {
+    *bound = bound.max(value);
 }
 
 fn has_faces(optics: &SensorOptics) -> bool {
@@ -169,7 +169,7 @@ struct Samples {
 /// Largest light, and changes of it, of one channel, 1/mm^2 times mW.
 #[derive(Debug, Clone, Copy, Default)]
 struct Part {
-    most: f64,
+    max: f64,
     tape: f64,
     faces: f64,
 }
@@ -199,8 +199,8 @@ impl Samples {
         let mut places = Vec::new();
         for direction in directions(&cases[0]) {
             // The rim is bonded: a point moves by less than it stands above the sheet.
-            let least = 1.0 - direction.z;
-            places.extend(shells.iter().map(|p| (cases[0].point(direction, p.max(least)), direction)));
+            let lowest = 1.0 - direction.z;
+            places.extend(shells.iter().map(|p| (cases[0].point(direction, p.max(lowest)), direction)));
         }
         let membrane = places
             .into_par_iter()
@@ -211,14 +211,14 @@ impl Samples {
     }
 
     fn channel(&self, c: usize, seen: &[f64], still: bool) -> Found {
-        let most = |samples: &[Sample]| {
+        let largest = |samples: &[Sample]| {
             samples.iter().map(|sample| sample.part(c, seen, still)).fold(Part::default(), |a, b| Part {
-                most: a.most.max(b.most),
+                max: a.max.max(b.max),
                 tape: a.tape.max(b.tape),
                 faces: a.faces.max(b.faces),
             })
         };
-        Found { membrane: most(&self.membrane), markers: most(&self.markers) }
+        Found { membrane: largest(&self.membrane), markers: largest(&self.markers) }
     }
 }
 
@@ -229,7 +229,7 @@ impl Sample {
         let size = |v: DVec3| MARGIN * self.normal.map_or(v.length(), |normal| v.dot(normal).abs());
         let leaving = if still { self.leaving[c] } else { 0.0 };
         Part {
-            most: light.iter().map(|v| size(*v)).fold(0.0, f64::max),
+            max: light.iter().map(|v| size(*v)).fold(0.0, f64::max),
             tape: size(light[2] - light[0]).max(size(light[3] - light[1])),
             faces: size(light[0] - light[1] * leaving).max(size(light[2] - light[3] * leaving)),
         }

@@ -186,7 +186,7 @@ impl Hollow {
 }
 
 /// Where `a s^2 + 2 b s + c <= 0` and the radius is not negative, within a span. The frustum is convex, so it
-/// is one interval; the other nappe of its cone is told by the radius.
+/// is one interval; the radius excludes the other nappe of its cone.
 fn quadratic_span(
     a: f64,
     b: f64,
@@ -237,7 +237,7 @@ fn convex_parts(shape: &Shape) -> Vec<Convex> {
                 (normal, normal.dot(corner))
             };
             let sides = outline_mm.iter().enumerate().map(side).collect();
-            let reach = outline_mm.iter().fold(DVec2::ZERO, |most, corner| most.max(corner.abs()));
+            let reach = outline_mm.iter().fold(DVec2::ZERO, |max, corner| max.max(corner.abs()));
             vec![Convex::Faces { sides, bottom: *bottom_z_mm, top: *top_z_mm, reach }]
         }
         Shape::Turned { profile, .. } => {

@@ -2,13 +2,13 @@
 //!
 //! Directions from the dome's centre are mapped to a disc of radius 1 by the equal-area map
 //! `(x, y) / sqrt(1 + z)` (Lambert's azimuthal projection): smooth over the whole hemisphere, the rim included,
-//! and one square root to compute. The disc lies in a square grid with some cells to spare all round.
+//! and one square root to compute. The disc lies in a square grid with some cells of padding all round.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 /// Cells beyond the disc on each side, so that a bicubic look-up at the rim stays inside.
-const SPARE: usize = 3;
+const PADDING: usize = 3;
 
 /// The grid over the disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,12 +20,12 @@ pub struct DomeGrid {
 impl DomeGrid {
     /// A grid with so many cells from rim to rim, at least 8.
     pub fn with_cells(cells: usize) -> Self {
-        Self { nodes: cells.max(8) + 2 * SPARE + 1 }
+        Self { nodes: cells.max(8) + 2 * PADDING + 1 }
     }
 
     /// Cells from rim to rim.
     pub fn cells(&self) -> usize {
-        self.nodes - 2 * SPARE - 1
+        self.nodes - 2 * PADDING - 1
     }
 
     /// Width of a cell in the disc of radius 1.
@@ -35,7 +35,7 @@ impl DomeGrid {
 
     /// Place of a node in the disc's plane.
     pub fn place(&self, column: usize, row: usize) -> DVec2 {
-        let at = |i: usize| (i as f64 - SPARE as f64) * self.cell() - 1.0;
+        let at = |i: usize| (i as f64 - PADDING as f64) * self.cell() - 1.0;
         DVec2::new(at(column), at(row))
     }
 
@@ -46,7 +46,7 @@ impl DomeGrid {
 
     /// Grid coordinates of a place in the disc's plane.
     pub fn coordinates_of_disc(&self, disc: DVec2) -> DVec2 {
-        (disc + 1.0) * (0.5 * self.cells() as f64) + SPARE as f64
+        (disc + 1.0) * (0.5 * self.cells() as f64) + PADDING as f64
     }
 
     /// Values at all nodes, row by row, of a function of the direction; rows are shared among threads.

@@ -89,7 +89,7 @@ pub enum Underside {
 }
 
 impl DomeRoom {
-    /// Works out how the underside mirrors the dome.
+    /// Computes how the underside mirrors the dome.
     pub fn new(optics: &SensorOptics, rings: Rings, underside: Underside) -> Self {
         let radius_mm = optics.dome_radius_mm();
         let mut mirror = vec![0.0; rings.rings * rings.rings * rings.patches];

@@ -59,7 +59,7 @@ pub struct ShadedDome {
 }
 
 impl ShadedDome {
-    /// Works out the light of a scene.
+    /// Computes the light of a scene.
     ///
     /// # Errors
     /// Lights that do not fit the design, or a platform that cannot be made.
@@ -118,10 +118,10 @@ impl ShadedDome {
             .collect();
         let wide = |[r, g, b]: Channels| Vec4::new(r as f32, g as f32, b as f32, 0.0);
         // From there on nothing leaves, in any channel.
-        let most_sine_squared = 1.0 / in_dome.into_iter().fold(f64::INFINITY, f64::min);
+        let max_sine_squared = 1.0 / in_dome.into_iter().fold(f64::INFINITY, f64::min);
         let leaving = used.fresnel.then(|| {
             let at = |i: usize| {
-                let sine_squared = i as f64 / LEAVING as f64 * most_sine_squared;
+                let sine_squared = i as f64 / LEAVING as f64 * max_sine_squared;
                 wide(std::array::from_fn(|c| {
                     leaves(&optics[c], (sine_squared * in_dome[c]).sqrt().min(1.0), false)
                 }))
@@ -135,7 +135,7 @@ impl ShadedDome {
             gain: wide(gain),
             stray: light.stray_level as f32,
             leaving,
-            leaving_scale: (LEAVING as f64 / most_sine_squared) as f32,
+            leaving_scale: (LEAVING as f64 / max_sine_squared) as f32,
             markers,
         }))
     }

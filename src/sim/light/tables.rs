@@ -1,4 +1,4 @@
-//! Each light's own tables over the dome, for a flux of one: worked out once for a design, whatever its lights are
+//! Each light's own tables over the dome, for a flux of one: computed once for a design, whatever its lights are
 //! driven with, and kept for the next scene of the same design.
 
 use std::sync::{Arc, OnceLock};
@@ -95,11 +95,11 @@ pub struct Tables {
     pub sources: Vec<Vec<Node>>,
     /// Largest error seen in the probes, as a part of the source's largest value.
     pub error: f64,
-    /// Points at which one source was worked out exactly.
+    /// Points at which one source was computed exactly.
     pub evaluations: u64,
 }
 
-/// All that is worked out once for a design and a choice of effects.
+/// All that is computed once for a design and a choice of effects.
 #[derive(Debug, Default)]
 pub struct Prepared {
     dome: OnceLock<Tables>,
@@ -144,8 +144,8 @@ fn dome_tables(ways: &Ways) -> Tables {
             let exact = ways.still(source, direction, &rule);
             (exact, (found - exact).abs())
         });
-        let most = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
-        let (largest, off) = probes.reduce(|| (f64::MIN_POSITIVE, 0.0), most);
+        let larger = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
+        let (largest, off) = probes.reduce(|| (f64::MIN_POSITIVE, 0.0), larger);
         off / largest
     };
     let error = ways.sources.iter().zip(&made.sources).map(off).fold(0.0, f64::max);

@@ -2,7 +2,9 @@
 
 use std::fmt;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use domecast_files::WriteError;
 
 use crate::SimError;
 
@@ -11,22 +13,8 @@ use crate::SimError;
 pub enum RunError {
     /// The scene is at fault.
     Scene(SimError),
-    /// The system refused.
-    Io {
-        /// What was being done.
-        doing: &'static str,
-        /// Where.
-        path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
-    },
-    /// The folder holds something that no earlier sequence put there.
-    NotOurs {
-        /// The folder.
-        path: PathBuf,
-        /// What it holds.
-        foreign: String,
-    },
+    /// The files could not be written.
+    Write(WriteError),
 }
 
 impl From<SimError> for RunError {
@@ -35,14 +23,17 @@ impl From<SimError> for RunError {
     }
 }
 
+impl From<WriteError> for RunError {
+    fn from(error: WriteError) -> Self {
+        Self::Write(error)
+    }
+}
+
 impl fmt::Display for RunError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Scene(error) => error.fmt(f),
-            Self::Io { doing, path, source } => write!(f, "{}: cannot {doing} ({source})", path.display()),
-            Self::NotOurs { path, foreign } => {
-                write!(f, "{}: holds \"{foreign}\", which no earlier sequence put there", path.display())
-            }
+            Self::Write(error) => error.fmt(f),
         }
     }
 }
@@ -51,6 +42,6 @@ impl std::error::Error for RunError {}
 
 /// The error of something that was being done at a place.
 pub(super) fn fault(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
-    let path = path.to_path_buf();
-    move |source| RunError::Io { doing, path, source }
+    let error = WriteError::io(doing, path);
+    move |source| RunError::Write(error(source))
 }

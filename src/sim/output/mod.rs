@@ -13,11 +13,12 @@ pub(crate) mod truth;
 mod video;
 mod writer;
 
-use std::fs;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError, mpsc};
 use std::time::Duration;
+
+use domecast_files::StagedFolder;
 
 use crate::SimError;
 use crate::contact::between::Around;
@@ -29,8 +30,7 @@ use crate::work::Work;
 
 use coded::CodedFrame;
 pub use error::RunError;
-use error::fault;
-use folder::Staging;
+use folder::foreign_entry;
 pub use parts::{ContactFault, PLAN_NAME, Summary, TRUTH_NAME, VIDEO_NAME};
 use parts::{Pending, Sent};
 use writer::Writer;
@@ -54,11 +54,11 @@ pub fn run(
     out: &Path,
     progress: &mut dyn FnMut(u32),
 ) -> Result<Summary, RunError> {
-    let staging = Staging::new(out)?;
+    let staged = StagedFolder::new(out, foreign_entry)?;
     let renderer = Renderer::new(scene, plan)?;
     let state = Pending::default();
     let (send, receive) = mpsc::channel();
-    let writer = Writer::new(scene, &staging.fresh)?;
+    let writer = Writer::new(scene, staged.path())?;
     let (solved, written) = std::thread::scope(|threads| {
         let state = &state;
         let written = threads.spawn(move || writer.write_all(&receive, state));
@@ -69,11 +69,10 @@ pub fn run(
     let mut summary = written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
     summary.work.merge(&solved?);
     summary.work.merge(renderer.setup());
-    let plan_path = staging.fresh.join(PLAN_NAME);
     // numbers, strings and lists only: nothing here can fail to be written
     let text = serde_json::to_string_pretty(plan).unwrap_or_default() + "\n";
-    fs::write(&plan_path, text).map_err(fault("write the plan", &plan_path))?;
-    staging.finish(out)?;
+    staged.write(PLAN_NAME, text.as_bytes())?;
+    staged.commit()?;
     Ok(summary)
 }
 
@@ -89,8 +88,8 @@ fn draw_all(
     let count = scene.frame_count();
     let mut work = Work::default();
     let mut stepper = renderer.stepper()?;
-    let rooms: Mutex<Vec<Scratch>> = Mutex::new(Vec::new());
-    let most = AHEAD_PER_THREAD * rayon::current_num_threads().max(1) as u32;
+    let buffers: Mutex<Vec<Scratch>> = Mutex::new(Vec::new());
+    let max_ahead = AHEAD_PER_THREAD * rayon::current_num_threads().max(1) as u32;
     let mut reported = 0;
     let mut wait = |until: u32| {
         loop {
@@ -119,16 +118,16 @@ fn draw_all(
                 }
             }
             let around = Around::of(&touches, (number - first) as usize);
-            wait(number.saturating_sub(most - 1));
+            wait(number.saturating_sub(max_ahead - 1));
             if state.stopped.load(Ordering::Acquire) {
                 break;
             }
             state.begun.store(number + 1, Ordering::Release);
-            let (rooms, send) = (&rooms, send.clone());
+            let (buffers, send) = (&buffers, send.clone());
             scope.spawn(move |_| {
-                let mut room = lock(rooms).pop().unwrap_or_default();
-                let coded = coded(scene, renderer, number, around.as_ref(), &mut room);
-                lock(rooms).push(room);
+                let mut scratch = lock(buffers).pop().unwrap_or_default();
+                let coded = coded(scene, renderer, number, around.as_ref(), &mut scratch);
+                lock(buffers).push(scratch);
                 // The writer that is gone has met a fault of its own.
                 let _ = send.send((number, coded));
             });
@@ -140,9 +139,9 @@ fn draw_all(
     solved.map(|()| work)
 }
 
-/// What a thread that panicked left is room only.
-fn lock(rooms: &Mutex<Vec<Scratch>>) -> std::sync::MutexGuard<'_, Vec<Scratch>> {
-    rooms.lock().unwrap_or_else(PoisonError::into_inner)
+/// A buffer that a thread left in a panic is only memory to reuse.
+fn lock(buffers: &Mutex<Vec<Scratch>>) -> std::sync::MutexGuard<'_, Vec<Scratch>> {
+    buffers.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn coded(
@@ -150,13 +149,13 @@ fn coded(
     renderer: &Renderer<'_>,
     number: u32,
     around: Option<&Around>,
-    room: &mut Scratch,
+    scratch: &mut Scratch,
 ) -> Result<CodedFrame, SimError> {
-    let drawn = renderer.frame_around(number, around, room)?;
+    let drawn = renderer.frame_around(number, around, scratch)?;
     let (coded, image) = CodedFrame::new(scene, drawn).map_err(|problem| SimError::Frame {
         frame: number,
         problem: format!("its files cannot be coded: {problem}"),
     })?;
-    image.into_iter().for_each(|image| room.give_back(image));
+    image.into_iter().for_each(|image| scratch.give_back(image));
     Ok(coded)
 }

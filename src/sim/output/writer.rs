@@ -42,7 +42,7 @@ impl Writer {
     /// Writes what comes, in the order of the frames, until no more can come.
     ///
     /// # Errors
-    /// The first fault by frame; then the others are told to stop.
+    /// The first fault by frame; then the others stop.
     pub fn write_all(mut self, frames: &mpsc::Receiver<Sent>, state: &Pending) -> Result<Summary, RunError> {
         let result = self.write_ordered(frames, state);
         if result.is_err() {

@@ -6,7 +6,7 @@ use crate::scene::Scene;
 const PART: f64 = 0.9;
 /// More than this, grey levels, the nodes of a square of the largest size would hardly tell.
 const MAX_GREY: f64 = 3.6;
-/// Light below which codes are not told apart, full scales: a tenth of the first code of a linear picture.
+/// Light below which codes are not distinguished, full scales: a tenth of the first code of a linear picture.
 const DARKEST: f64 = 0.0004;
 
 /// How far a pixel that is filled in may be from what its own ray shows, grey levels: nine tenths of the scene's

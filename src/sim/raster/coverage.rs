@@ -122,7 +122,7 @@ impl Coverage {
 
     /// The box's columns and rows inside a picture, ends excluded.
     pub fn bounds(&self, width: usize, height: usize) -> [usize; 4] {
-        let clamp = |value: i64, most: usize| usize::try_from(value).unwrap_or(0).min(most);
+        let clamp = |value: i64, max: usize| usize::try_from(value).unwrap_or(0).min(max);
         [
             clamp(self.left, width),
             clamp(self.top, height),

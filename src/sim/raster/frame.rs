@@ -104,7 +104,7 @@ const RUN: usize = 128;
 /// The value of a run that has but one.
 fn only(values: &[f32]) -> Option<f32> {
     let (first, last) = (values.first()?, values.last()?);
-    // Most others are told by their ends.
+    // Most others differ at their ends.
     let differs = |value: &f32| u32::from(value.to_bits() != first.to_bits());
     (differs(last) == 0 && values.iter().map(differs).sum::<u32>() == 0).then_some(*first)
 }

@@ -47,7 +47,7 @@ pub struct Rolled<'a> {
     slices: &'a [Slice<'a>],
     /// By slice, the points on the deformed dome.
     moved: Vec<Option<Vec<Followed<DVec3>>>>,
-    /// Pixels that were worked out.
+    /// Pixels that were computed.
     count: u64,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Rolled<'a> {
         Self { points, slices, moved, count: 0 }
     }
 
-    /// All images, and how many pixels of points were worked out for them; `now` is where they are about the same time:
+    /// All images, and how many pixels of points were computed for them; `now` is where they are about the same time:
     /// what has not moved from there by more than `moved_px` is found at once.
     pub fn see(mut self, scene: &Scene, now: &Spots, moved_px: f64) -> (Spots, u64) {
         let points = self.points;

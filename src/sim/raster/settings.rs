@@ -70,6 +70,6 @@ pub struct Exposure {
 pub struct Rolling {
     /// From the first row to the last, s; the middle of the picture is at the frame's time.
     pub readout_s: f64,
-    /// Slices of rows: the sensor is worked out at the time of each one's middle row.
+    /// Slices of rows: the sensor is computed at the time of each one's middle row.
     pub slices: u32,
 }

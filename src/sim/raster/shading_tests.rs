@@ -172,8 +172,8 @@ fn keeps_within(design: &str, level: &str, (name, object): (&str, &str), greys: 
             f64::from(worst) / grey
         );
         // What the plan counts on, a part of the tolerance.
-        let most = fill_grey(&pressed(design, level, object, *grey));
-        assert!(f64::from(worst) <= most, "{design} {name} {level} {grey}: {worst} at {at:?}");
+        let limit = fill_grey(&pressed(design, level, object, *grey));
+        assert!(f64::from(worst) <= limit, "{design} {name} {level} {grey}: {worst} at {at:?}");
     }
 }
 
@@ -280,12 +280,12 @@ fn long_random_dents_are_drawn_as_every_ray_shows_them() {
 /// that lack no more than rounding takes are none of the dot's.
 fn inked(image: &Image8, bare: &Image8, channel: usize, near: [f64; 2]) -> (DVec2, [f64; 2]) {
     let (x0, y0) = (near[0].round() as i64, near[1].round() as i64);
-    let (mut sum, mut moment, mut least, mut most) = (0.0, DVec2::ZERO, f64::INFINITY, 0.0_f64);
+    let (mut sum, mut moment, mut smallest, mut largest) = (0.0, DVec2::ZERO, f64::INFINITY, 0.0_f64);
     for y in y0 - REACH..=y0 + REACH {
         for x in x0 - REACH..=x0 + REACH {
             let at = (y as usize * image.width + x as usize) * image.channels + channel;
             let (value, ground) = (f64::from(image.bytes[at]), f64::from(bare.bytes[at]));
-            (least, most) = (least.min(ground), most.max(ground));
+            (smallest, largest) = (smallest.min(ground), largest.max(ground));
             if ground - value > 1.0 {
                 let part = 1.0 - value / ground;
                 sum += part;
@@ -293,7 +293,7 @@ fn inked(image: &Image8, bare: &Image8, channel: usize, near: [f64; 2]) -> (DVec
             }
         }
     }
-    (moment / sum, [least, most])
+    (moment / sum, [smallest, largest])
 }
 
 /// Pixels about a dot that are looked at: a dot is 7 px wide, and under the ball its neighbours come nearer than 18.

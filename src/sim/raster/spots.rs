@@ -185,7 +185,7 @@ impl Points {
 
     /// The points on the deformed dome; `None` where it is not. Markers stay on the sheet.
     pub(crate) fn moved(&self, instant: &SensorState) -> Option<Vec<Followed<DVec3>>> {
-        let between = instant.shape.touch.as_ref().filter(|between| between.is_dented())?;
+        let between = instant.shape.touch.as_ref().filter(|between| between.is_deformed())?;
         let worked_out;
         let displaced = match &instant.shape.displaced_mm {
             Some(known) => known,

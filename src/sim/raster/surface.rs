@@ -90,12 +90,12 @@ impl<'a> ShadedSurface<'a> {
             // Where a ray may meet the membrane more than once, what it shows may not depend on a neighbour.
             let near_mm = if map.may_fold() { Vec3A::ZERO } else { traced.near_mm };
             let met = map.meet(rest_mm, inside, near_mm);
-            traced.near_mm = met.map_or(Vec3A::ZERO, |(_, dented)| dented.displacement_mm);
-            if let Some((undeformed_mm, dented)) = met
-                && dented.displacement_mm.length_squared() > STILL_MM * STILL_MM
+            traced.near_mm = met.map_or(Vec3A::ZERO, |(_, deformed)| deformed.displacement_mm);
+            if let Some((undeformed_mm, deformed)) = met
+                && deformed.displacement_mm.length_squared() > STILL_MM * STILL_MM
             {
-                sample.point_mm = undeformed_mm + dented.displacement_mm;
-                sample.normal = dented.normal;
+                sample.point_mm = undeformed_mm + deformed.displacement_mm;
+                sample.normal = deformed.normal;
                 sample.is_moved = true;
             }
         }

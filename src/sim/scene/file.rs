@@ -43,7 +43,7 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 1))]
     pub objects: Vec<ObjectSection>,
-    /// How contact is worked out.
+    /// How contact is computed.
     #[serde(default)]
     pub contact: ContactSection,
     /// How bright things are; left out: evenly lit.
@@ -76,7 +76,7 @@ pub struct FramesSection {
     /// Frames a second; the first is at 0 s.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1e6))]
     pub rate_hz: f64,
-    /// Whether images are drawn, or only the truth is told.
+    /// Whether images are drawn, or only the truth is written.
     #[serde(default = "yes")]
     pub images: bool,
     /// Whether the images have colour.
@@ -110,7 +110,7 @@ pub struct ToleranceSection {
 pub enum MotionSection {
     /// Loads over time; the springs answer.
     Wrench(WrenchMotion),
-    /// Poses over time; the springs' load is told in the truth.
+    /// Poses over time; the springs' load stands in the truth.
     Pose(PoseMotion),
 }
 
@@ -162,7 +162,7 @@ pub struct PoseKey {
     pub rotation_deg: [f64; 3],
 }
 
-/// How contact is worked out.
+/// How contact is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactSection {

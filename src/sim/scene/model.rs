@@ -167,7 +167,7 @@ impl Scene {
         (spec.width as usize, spec.height as usize)
     }
 
-    /// Whether images are drawn; else only the truth is told, and no effect of brightness is called for.
+    /// Whether images are drawn; else only the truth is written, and no effect of brightness is called for.
     pub fn draws(&self) -> bool {
         self.file.frames.images
     }

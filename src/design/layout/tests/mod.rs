@@ -67,6 +67,7 @@ fn spec(model: LensModel, change: serde_json::Value) -> LayoutSpec {
         white_markers: vec![],
         pattern,
         print,
+        origin: LayoutOrigin::default(),
     }
 }
 
@@ -180,8 +181,8 @@ fn wanted_numbers_are_met() {
             let layout = Layout::new(&spec).unwrap();
             let off = layout.dots.len().abs_diff(wanted);
             // Lattices gain dots in groups of up to twelve.
-            let most = if kind == "rings" || kind == "fill" { 0 } else { 6.max(wanted / 50) };
-            assert!(off <= most, "{kind}: {} for {wanted}", layout.dots.len());
+            let limit = if kind == "rings" || kind == "fill" { 0 } else { 6.max(wanted / 50) };
+            assert!(off <= limit, "{kind}: {} for {wanted}", layout.dots.len());
         }
     }
 }

@@ -5,7 +5,7 @@ use super::*;
 fn complaint(change: impl Fn(&mut Measures)) -> String {
     let mut m = Measures::of(&thumb24()).unwrap();
     change(&mut m);
-    let parts = match build(&m, &hits()) {
+    let parts = match build(&m, &passes()) {
         Ok(parts) => parts,
         Err(error) => return error.to_string(),
     };

@@ -46,7 +46,7 @@ fn cavity_that_closes_over_the_cast_is_an_undercut() {
 
 #[test]
 fn both_halves_of_the_mould_open() {
-    let parts = build(&Measures::of(&thumb24()).unwrap(), &hits()).unwrap();
+    let parts = build(&Measures::of(&thumb24()).unwrap(), &passes()).unwrap();
     assert_eq!(undercut(&parts[2].mesh, 1.0), None);
     assert_eq!(undercut(&parts[3].mesh, -1.0), None);
 }
@@ -88,7 +88,7 @@ fn corners_of_the_envelope_are_checked() {
     let mut m = Measures::of(&thumb24()).unwrap();
     m.poses.retain(|p| p.name == "at rest" || p.name.contains("push at the pole"));
     m.camera_body.min_sheet_gap_mm = 8.15;
-    let parts = build(&m, &hits()).unwrap();
+    let parts = build(&m, &passes()).unwrap();
     let assembly = Assembly::of(&m, &parts).unwrap();
     let said = check_assembly(&m, &parts, &assembly).unwrap_err().to_string();
     assert!(said.contains("gap") && said.contains("end of the load envelope, push"), "{said}");

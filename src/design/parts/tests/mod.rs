@@ -19,7 +19,7 @@ fn thumb24() -> Design {
     Design::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json"))).unwrap()
 }
 
-fn hits() -> Vec<PrintPass> {
+fn passes() -> Vec<PrintPass> {
     vec![PrintPass::new(0.0, 0.0)]
 }
 
@@ -32,7 +32,7 @@ fn every_design_gives_sound_parts() {
     for entry in std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs")).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "json") {
-            let parts = build(&Measures::of(&Design::load(&path).unwrap()).unwrap(), &hits()).unwrap();
+            let parts = build(&Measures::of(&Design::load(&path).unwrap()).unwrap(), &passes()).unwrap();
             assert!(parts.len() >= 4);
             for part in &parts {
                 let found = part.inspect();
@@ -57,7 +57,7 @@ fn files_are_the_same_bytes_on_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let measures = Measures::of(&design).unwrap();
-            let parts = build(&measures, &hits()).unwrap();
+            let parts = build(&measures, &passes()).unwrap();
             let assembly = Assembly::of(&measures, &parts).unwrap();
             files(&design, &measures, &parts, &assembly).unwrap()
         })
@@ -74,7 +74,7 @@ fn files_are_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn window_lets_the_view_through() {
     let design = thumb24();
-    let parts = build(&Measures::of(&design).unwrap(), &hits()).unwrap();
+    let parts = build(&Measures::of(&design).unwrap(), &passes()).unwrap();
     let upper = RayTarget::new(&parts[0].mesh);
     let optics = design.optics();
     let marker_mm = design.sections().white_markers.diameter_mm;
@@ -107,7 +107,7 @@ fn window_lets_the_view_through() {
 fn purchased_parts_fit_their_seats() {
     let design = thumb24();
     let m = Measures::of(&design).unwrap();
-    let parts = build(&m, &hits()).unwrap();
+    let parts = build(&m, &passes()).unwrap();
     let chord = domecast_mesh::Chord::new(0.001).unwrap();
     let overlap = |part: &Part, shape: Shape| {
         let tool = Piece::new("stand-in", shape).solid(chord).unwrap();
@@ -142,7 +142,7 @@ fn purchased_parts_fit_their_seats() {
 fn mould_casts_the_dome() {
     let design = thumb24();
     let m = Measures::of(&design).unwrap();
-    let cavity = &build(&m, &hits()).unwrap()[2];
+    let cavity = &build(&m, &passes()).unwrap()[2];
     let radius = m.cavity_radius_mm();
     let expected = design.sections().dome.radius_mm / (1.0 - m.shrinkage) + m.mould.sealer_thickness_mm;
     assert!((radius - expected).abs() < 1e-12);
@@ -160,14 +160,14 @@ fn contradictions_name_the_field() {
     let good = Measures::of(&thumb24()).unwrap();
     let mut bad = good.clone();
     bad.sheet_size_mm *= 0.8;
-    let error = build(&bad, &hits()).map(|_| ()).unwrap_err().to_string();
+    let error = build(&bad, &passes()).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("sheet.size_mm"), "{error}");
 
     let mut bad = good.clone();
     bad.platforms.lower.clamp.azimuth_deg = vec![90.0];
-    assert!(build(&bad, &hits()).map(|_| ()).unwrap_err().to_string().contains("lower_platform"));
+    assert!(build(&bad, &passes()).map(|_| ()).unwrap_err().to_string().contains("lower_platform"));
 
     let mut bad = good;
     bad.mould.pins.chamfer_mm = 5.0;
-    assert!(build(&bad, &hits()).map(|_| ()).unwrap_err().to_string().contains("mould.pins.chamfer_mm"));
+    assert!(build(&bad, &passes()).map(|_| ()).unwrap_err().to_string().contains("mould.pins.chamfer_mm"));
 }

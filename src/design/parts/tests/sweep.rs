@@ -19,8 +19,8 @@ fn sweep(count: usize) -> (usize, Vec<String>) {
             }
         };
         let made = Measures::of(&design).and_then(|m| {
-            let hits = [PrintPass::new(0.0, 0.0), PrintPass::new(0.02 * (index % 40) as f64, index as f64)];
-            let parts = build_seated(&design, &m, &hits)?;
+            let passes = [PrintPass::new(0.0, 0.0), PrintPass::new(0.02 * (index % 40) as f64, index as f64)];
+            let parts = build_seated(&design, &m, &passes)?;
             let assembly = Assembly::of(&m, &parts)?;
             let checked = check_sensor(&design, &m, &parts, &assembly, &[])?;
             assert!(checked.sight.iter().flat_map(|pose| &pose.counts).all(|count| count.blocked == 0));
@@ -110,7 +110,7 @@ fn awkward_parts_are_sound_or_refused() {
         for (name, m) in &outcomes {
             let mut m = m.clone();
             m.process.min_wall_mm = limit;
-            match build(&m, &hits()) {
+            match build(&m, &passes()) {
                 Ok(parts) => parts.iter().for_each(|part| part.check().unwrap()),
                 Err(error) => error.faults().iter().for_each(|fault| match fault {
                     PartError::Infeasible { field, .. } => assert!(!field.is_empty(), "{name}"),
@@ -141,7 +141,7 @@ fn parts_of_a_millimetre_and_of_two_hundred_are_sound() {
         d["mesh"]["optical_chord_tolerance_mm"] = json!((0.03 * scale).max(1e-3));
         let design = crate::Design::from_str(&d.to_string()).unwrap();
         let m = Measures::of(&design).unwrap();
-        for part in build(&m, &hits()).unwrap() {
+        for part in build(&m, &passes()).unwrap() {
             part.check().unwrap();
         }
     }

@@ -35,13 +35,13 @@ impl FitProblem<'_> {
     pub fn inliers(&self) -> Result<Vec<bool>, FitError> {
         let mut best: Option<((bool, f64), Vec<bool>)> = None;
         let count = self.samples.len();
-        let most = self.max_radial().min(if count >= 40 { 4 } else { 3 });
+        let limit = self.max_radial().min(if count >= 40 { 4 } else { 3 });
         for nominal in Nominal::ALL {
-            for radial in most.saturating_sub(1).max(1)..=most {
+            for radial in limit.saturating_sub(1).max(1)..=limit {
                 let model = FitModel { nominal, radial, two_fold: count >= 24 };
                 let Ok((length, used)) = self.inliers_of(model) else { continue };
                 let rank = (self.folds(model, &used), length);
-                if best.as_ref().is_none_or(|(least, _)| rank < *least) {
+                if best.as_ref().is_none_or(|(lowest, _)| rank < *lowest) {
                     best = Some((rank, used));
                 }
             }

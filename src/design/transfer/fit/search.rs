@@ -113,18 +113,18 @@ fn fit_as_read(
         let floor = (MIN_SIGMA * dome_radius_mm).powi(2);
         let criterion = n * (squares / n + floor).ln() + model.parameters() as f64 * n.ln();
         if let Some(Err(error)) = made {
-            if folded.as_ref().is_none_or(|(least, _)| criterion < *least) {
+            if folded.as_ref().is_none_or(|(lowest, _)| criterion < *lowest) {
                 folded = Some((criterion, error));
             }
             continue;
         }
-        if best.as_ref().is_none_or(|(least, ..)| criterion < *least) {
+        if best.as_ref().is_none_or(|(lowest, ..)| criterion < *lowest) {
             best = Some((criterion, model, correction));
         }
     }
     match (best, folded) {
         (Some((usable, model, correction)), folded)
-            if folded.as_ref().is_none_or(|(least, _)| least + DECISIVE > usable) =>
+            if folded.as_ref().is_none_or(|(lowest, _)| lowest + DECISIVE > usable) =>
         {
             let found = problem.report(model, correction, &used, rejected);
             let (rms_mm, max_mm) = (found.residual_rms_mm, MAX_SCATTER * dome_radius_mm);

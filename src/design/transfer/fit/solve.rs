@@ -11,7 +11,7 @@ use crate::transfer::{Correction, Nominal, Polar, UnitPlate};
 
 /// Bound on the steps; the model is linear in all but the rotation, and three to five are taken.
 const MAX_STEPS: u32 = 12;
-/// Radii on the plate that differ by less, as a share of the dome's radius, cannot be told apart: the two-fold terms alone
+/// Radii on the plate that differ by less, as a share of the dome's radius, cannot be distinguished: the two-fold terms alone
 /// spread a ring by half of this.
 const RING_GAP: f64 = 0.08;
 /// Smallest slope by which a plate residual is projected to the dome: it bounds the weight of the rim.

@@ -27,7 +27,7 @@ fn scattered(at: DVec3, scatter_mm: f64, random: &mut SeededRandom) -> DVec3 {
 fn pad(random: &mut SeededRandom) -> TransferMap {
     loop {
         let nominal = Nominal::ALL[((random.uniform() * 3.0) as usize).min(2)];
-        let mut c = |most: f64| random.between(-most, most);
+        let mut c = |limit: f64| random.between(-limit, limit);
         let correction = Correction {
             radial: vec![c(0.05), c(0.05), c(0.03)],
             two_fold: [c(0.015), c(0.015)],

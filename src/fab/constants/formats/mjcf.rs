@@ -131,13 +131,13 @@ fn springs_of(stiffness: &Matrix6<f64>) -> (Springs, String) {
     let size =
         |i: usize, j: usize| (stiffness[(i, i)] * stiffness[(j, j)]).abs().sqrt().max(f64::MIN_POSITIVE);
     let relative = |m: &Matrix6<f64>| {
-        let mut most = 0.0_f64;
+        let mut largest = 0.0_f64;
         for i in 0..6 {
             for j in (0..6).filter(|j| *j != i) {
-                most = most.max(m[(i, j)].abs() / size(i, j));
+                largest = largest.max(m[(i, j)].abs() / size(i, j));
             }
         }
-        most
+        largest
     };
     let (coupled, skew) = (relative(&symmetric), relative(&(stiffness - symmetric)));
     let si = in_si(&symmetric);

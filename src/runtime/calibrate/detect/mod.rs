@@ -24,7 +24,7 @@ const WHITE_REACH: f64 = 0.45;
 const BLACK_REACH: f64 = 0.45;
 /// Candidates for each white marker that are tried.
 const CANDIDATES: usize = 4;
-/// What the nominal numbers may be off by in a white marker's place, px, when blobs are told apart by the fit.
+/// What the nominal numbers may be off by in a white marker's place, px, when the fit assigns blobs to markers.
 const NOMINAL_PX: f64 = 4.0;
 /// Rounds of matching the dots and fitting what is left of their places.
 const ROUNDS: usize = 4;
@@ -110,14 +110,14 @@ impl<'a> Detector<'a> {
             return Err(DetectError::Size { frame: [frame.width(), frame.height()], camera });
         }
         let smooth = frame.blurred(SMOOTHING_PX);
-        let (whites, pose) = self.whites(frame, &smooth)?;
-        let mut observations: Vec<Observation> = whites
+        let (white_markers, pose) = self.white_markers(frame, &smooth)?;
+        let mut observations: Vec<Observation> = white_markers
             .into_iter()
             .map(|(id, centroid_px)| Observation { frame: number, kind: Kind::White, id, centroid_px })
             .collect();
-        let blacks = self.blacks(frame, &smooth, &pose);
-        let black_missing = self.constants.black_dots.len() - blacks.len();
-        observations.extend(blacks.into_iter().map(|(id, centroid_px)| Observation {
+        let black_dots = self.black_dots(frame, &smooth, &pose);
+        let black_missing = self.constants.black_dots.len() - black_dots.len();
+        observations.extend(black_dots.into_iter().map(|(id, centroid_px)| Observation {
             frame: number,
             kind: Kind::Black,
             id,
@@ -127,7 +127,11 @@ impl<'a> Detector<'a> {
     }
 
     /// Each white marker's centroid, and the pose that fits them.
-    fn whites(&self, frame: &Gray, smooth: &Gray) -> Result<(Vec<(usize, DVec2)>, Rigid), DetectError> {
+    fn white_markers(
+        &self,
+        frame: &Gray,
+        smooth: &Gray,
+    ) -> Result<(Vec<(usize, DVec2)>, Rigid), DetectError> {
         let mut wanted = Vec::new();
         for marker in self.solver.markers() {
             let lost = DetectError::NoWhiteMarker { id: marker.id as usize };
@@ -169,7 +173,7 @@ impl<'a> Detector<'a> {
     }
 
     /// The black dots that are found at a pose.
-    fn blacks(&self, frame: &Gray, smooth: &Gray, pose: &Rigid) -> Vec<(usize, DVec2)> {
+    fn black_dots(&self, frame: &Gray, smooth: &Gray, pose: &Rigid) -> Vec<(usize, DVec2)> {
         let Ok(optics) = self.optics.at_pose(pose) else { return Vec::new() };
         let radius_mm = self.optics.dome_radius_mm();
         let seen = |dot: &crate::constants::BlackDot| {

@@ -34,7 +34,7 @@ pub fn fit(
     let x = &solution.x;
     let covariance = last.matrix.clone().cholesky().map(|c| c.inverse());
     let sd = |k: usize| covariance.as_ref().map_or(problem.priors[k], |c| c[(k, k)].max(0.0).sqrt());
-    let named = camera_numbers(problem.flat) + 2 * problem.whites.len();
+    let named = camera_numbers(problem.flat) + 2 * problem.white_markers.len();
     let parameters = (0..named)
         .map(|k| {
             let (name, nominal) = problem.name(k, constants);
@@ -162,15 +162,15 @@ fn start_poses(problem: &Problem, priors: &CalibrationPriors) -> Result<Vec<Rigi
     let slack =
         focal * (priors.white_marker_mm + priors.pupil_mm.iter().fold(0.0_f64, |m, v| m.max(*v))) / away;
     let noise_px = priors.white_centroid_px.hypot(3.0 * slack);
-    let solver =
-        PoseSolver::new(&optics, &problem.whites, PoseOptions::new(noise_px, 10.0 * away)).map_err(fault)?;
+    let solver = PoseSolver::new(&optics, &problem.white_markers, PoseOptions::new(noise_px, 10.0 * away))
+        .map_err(fault)?;
     let mut poses = vec![Rigid::identity(); problem.at_rest.min(problem.frames.len())];
     for (frame, seen) in problem.frames.iter().zip(&problem.seen).skip(problem.at_rest) {
         let sightings: Vec<Sighting> = seen
             .iter()
             .filter(|mark| mark.observation.kind == Kind::White)
             .map(|mark| Sighting {
-                id: problem.whites[mark.index].id,
+                id: problem.white_markers[mark.index].id,
                 centroid_px: mark.observation.centroid_px,
             })
             .collect();

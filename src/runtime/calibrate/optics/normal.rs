@@ -208,7 +208,7 @@ impl Problem<'_> {
         let (first, axes) = match mark.observation.kind {
             Kind::White => (camera_numbers(self.flat) + 2 * mark.index, [DVec3::X, DVec3::Y]),
             Kind::Black => {
-                let dot = &self.blacks[mark.index];
+                let dot = &self.black_dots[mark.index];
                 (self.black_number(mark.index), [dot.east, dot.north])
             }
         };

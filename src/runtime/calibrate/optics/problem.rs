@@ -12,8 +12,8 @@ use domecast_optics::{OpticsSpec, SensorOptics};
 /// of each layer, x and y of each white marker, two steps along the dome of each dot; as departures from nominal.
 pub(super) struct Problem<'a> {
     pub nominal: OpticsSpec,
-    pub whites: Vec<Marker>,
-    pub blacks: Vec<Black>,
+    pub white_markers: Vec<Marker>,
+    pub black_dots: Vec<Black>,
     pub priors: Vec<f64>,
     pub frames: Vec<usize>,
     pub seen: Vec<Vec<Seen<'a>>>,
@@ -57,21 +57,21 @@ impl<'a> Problem<'a> {
     ) -> Result<Self, OpticsFitError> {
         let nominal = constants.optics_spec().map_err(OpticsFitError::Constants)?;
         let flat = nominal.layers.len().saturating_sub(1);
-        let whites = constants.markers();
+        let white_markers = constants.markers();
         let black = |dot: &crate::constants::BlackDot| {
             let at_mm = DVec3::from_array(dot.surface_mm);
             let east = DVec3::new(-at_mm.y, at_mm.x, 0.0).try_normalize().unwrap_or(DVec3::X);
             let north = at_mm.cross(east).normalize_or_zero();
             Black { at_mm, radius_mm: 0.5 * dot.diameter_mm, east, north }
         };
-        let blacks: Vec<Black> = constants.black_dots.iter().map(black).collect();
+        let black_dots: Vec<Black> = constants.black_dots.iter().map(black).collect();
         let mut sds = Vec::new();
         sds.extend(priors.pupil_mm);
         sds.extend(priors.camera_rotation_rad);
         sds.extend(vec![priors.layer_thickness_mm; flat]);
         sds.extend(vec![priors.index; flat + 1]);
-        sds.extend(vec![priors.white_marker_mm; 2 * whites.len()]);
-        sds.extend(vec![priors.black_dot_mm; 2 * blacks.len()]);
+        sds.extend(vec![priors.white_marker_mm; 2 * white_markers.len()]);
+        sds.extend(vec![priors.black_dot_mm; 2 * black_dots.len()]);
         // A tolerance of zero holds a number to where it is.
         let priors = sds.into_iter().map(|sd: f64| sd.max(1e-9)).collect();
         let mut frames: Vec<usize> = observations.iter().map(|o| o.frame).collect();
@@ -93,7 +93,7 @@ impl<'a> Problem<'a> {
                 seen[frame].push(Seen { observation, index });
             }
         }
-        Ok(Self { nominal, whites, blacks, priors, frames, seen, flat, at_rest: at_rest.max(1) })
+        Ok(Self { nominal, white_markers, black_dots, priors, frames, seen, flat, at_rest: at_rest.max(1) })
     }
 
     pub fn numbers(&self) -> usize {
@@ -119,18 +119,18 @@ impl<'a> Problem<'a> {
 
     pub fn white(&self, x: &[f64], index: usize) -> Marker {
         let at = camera_numbers(self.flat) + 2 * index;
-        let mut marker = self.whites[index];
+        let mut marker = self.white_markers[index];
         marker.position_mm += DVec3::new(x[at], x[at + 1], 0.0);
         marker
     }
 
     pub fn black_number(&self, index: usize) -> usize {
-        camera_numbers(self.flat) + 2 * self.whites.len() + 2 * index
+        camera_numbers(self.flat) + 2 * self.white_markers.len() + 2 * index
     }
 
     pub fn black(&self, x: &[f64], index: usize) -> DVec3 {
         let at = self.black_number(index);
-        self.blacks[index].moved(DVec2::new(x[at], x[at + 1]), self.nominal.dome_radius_mm)
+        self.black_dots[index].moved(DVec2::new(x[at], x[at + 1]), self.nominal.dome_radius_mm)
     }
 
     pub fn place(&self, x: &[f64], seen: &Seen) -> DVec3 {
@@ -145,7 +145,7 @@ impl<'a> Problem<'a> {
         match seen.observation.kind {
             Kind::White => self.white(x, seen.index).centroid_offset_px(optics, center).ok(),
             Kind::Black => {
-                let dot = &self.blacks[seen.index];
+                let dot = &self.black_dots[seen.index];
                 let at = self.black(x, seen.index);
                 let radius = self.nominal.dome_radius_mm;
                 outline_centroid_offset(center, |cos, sin| {
@@ -181,7 +181,7 @@ impl<'a> Problem<'a> {
             n => {
                 let k = n - camera_numbers(flat);
                 let id = constants.white_markers.get(k / 2).map_or(0, |m| m.id);
-                let nominal = self.whites.get(k / 2).map_or(0.0, |m| m.position_mm[k % 2]);
+                let nominal = self.white_markers.get(k / 2).map_or(0.0, |m| m.position_mm[k % 2]);
                 (format!("white_markers[{id}].{}", axis[k % 2]), nominal)
             }
         }

@@ -65,7 +65,7 @@ fn extreme(width: usize, height: usize, from: &[u8], to: &mut [u8], pads: &mut P
 }
 
 /// Opening by a 3 x 3 square of a plane whose marks are non-zero: what is narrower than three pixels goes.
-pub fn open(width: usize, height: usize, plane: &mut [u8], spare: &mut [u8], pads: &mut Pads) {
-    extreme(width, height, plane, spare, pads, u8::min);
-    extreme(width, height, spare, plane, pads, u8::max);
+pub fn open(width: usize, height: usize, plane: &mut [u8], scratch: &mut [u8], pads: &mut Pads) {
+    extreme(width, height, plane, scratch, pads, u8::min);
+    extreme(width, height, scratch, plane, pads, u8::max);
 }

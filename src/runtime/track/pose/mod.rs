@@ -1,7 +1,7 @@
 //! Stage 4: the platform's pose from the white markers.
 //!
 //! In: [`MarkerIdentities`](super::identities::MarkerIdentities). Out: [`PoseEstimate`]. Candidates that could be a
-//! marker each are told apart here, by the pose that explains them best.
+//! marker each are assigned here, by the pose that explains them best.
 
 mod finder;
 mod refine;

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 /// By how much the markers' residuals scatter more than their own deviations say, as a factor of the variance: the
-/// usual a posteriori variance of unit weight, here over many frames, for one frame has few spare equations. Colour
+/// usual a posteriori variance of unit weight, here over many frames, for one frame has few redundant equations. Colour
 /// filters, compression and blur make edges rougher than flats, where a marker's own deviation comes from. What a
 /// marker is off by in every frame is no scatter.
 #[derive(Debug, Clone, Default)]
@@ -34,8 +34,8 @@ impl ResidualScale {
             variance += 2.0 * sd_px * sd_px;
             count += 2.0;
         }
-        let spare = (count - 6.0) / count;
-        let here = square / (variance * spare);
+        let redundancy = (count - 6.0) / count;
+        let here = square / (variance * redundancy);
         if count > 6.0 && here.is_finite() {
             self.frames = frames;
             self.factor += (here - self.factor) / frames;

@@ -1,8 +1,9 @@
 //! Stage 6: one frame's result, and its files.
 //!
-//! In: [`FrameFindings`], what all stages found. Out: [`Tracked`], its JSON and CSV lines, and a picture.
+//! In: [`FrameFindings`], what all stages found. Out: [`Tracked`], its JSON and CSV lines, and with the feature `overlay` a picture.
 
 mod checks;
+#[cfg(feature = "overlay")]
 mod overlay;
 mod problem;
 mod reference;
@@ -10,6 +11,7 @@ mod reporter;
 mod result;
 mod write;
 
+#[cfg(feature = "overlay")]
 pub use overlay::{OverlayError, overlay_png};
 pub use problem::{Problem, Problems};
 pub(super) use reporter::{FrameFindings, Reporter};

@@ -187,7 +187,7 @@ impl LightField {
         self.error
     }
 
-    /// Points at which every light was worked out exactly to make the tables.
+    /// Points at which every light was computed exactly to make the tables.
     pub fn evaluations(&self) -> u64 {
         self.evaluations
     }

@@ -203,9 +203,9 @@ fn no_effect_of_light_passes_its_bound() {
             largest[5] = largest[5].max(brightest / bound.brightest);
         }
         println!("largest over bound: {largest:.2?}");
-        // A bound may be too large, but not by so much that nothing can ever be spared.
-        let least = if more.is_empty() { 0.04 } else { 0.005 };
-        assert!(largest.iter().all(|part| *part > least), "{largest:?}");
+        // A bound may be too large, but not by so much that no effect can ever be left out.
+        let smallest = if more.is_empty() { 0.04 } else { 0.005 };
+        assert!(largest.iter().all(|part| *part > smallest), "{largest:?}");
     }
 }
 
@@ -231,9 +231,9 @@ fn a_change_of_light_changes_no_code_by_more_than_its_bound_and_none_by_more_tha
         for i in 0..60 {
             for j in 0..60 {
                 let (before, after) = (f64::from(i) * 0.05, f64::from(j) * 0.05);
-                let most = super::bounds::grey_of_change(gamma, (after - before).abs());
+                let bound = super::bounds::grey_of_change(gamma, (after - before).abs());
                 let found = (code(after) - code(before)).abs();
-                assert!(found <= most + 1e-9 && most <= 255.0, "{gamma} {before} {after}: {found} {most}");
+                assert!(found <= bound + 1e-9 && bound <= 255.0, "{gamma} {before} {after}: {found} {bound}");
             }
         }
     }

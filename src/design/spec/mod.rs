@@ -5,9 +5,11 @@
 //! checked and derived values are computed once. What later modules see is valid by construction;
 //! they never check again, and they never see a default that the file does not state.
 
+mod derive;
 mod design;
 mod error;
 mod explain;
+mod lens;
 mod lints;
 mod resolve;
 mod rules;
@@ -25,6 +27,7 @@ use serde_json::Value;
 
 use domecast_optics::SensorOptics;
 
+pub use derive::{DerivedField, derive, rule_of};
 pub use design::{Design, DesignWarning};
 pub use error::DesignError;
 pub use explain::{Explained, explain};
@@ -50,9 +53,11 @@ impl std::str::FromStr for Design {
 
     /// Resolves a design from its text.
     fn from_str(text: &str) -> Result<Self, DesignError> {
-        let value = parse_json(text)?;
+        let mut value = parse_json(text)?;
         check_version(&value)?;
-        resolve::resolve(from_value(&value)?, text)
+        schema::check(design_schema(), &value, "")?;
+        let derived = derive(&mut value)?;
+        resolve::resolve(from_value(&value)?, text, derived)
     }
 }
 
@@ -71,6 +76,12 @@ pub fn load_optics(path: &Path) -> Result<SensorOptics, DesignError> {
 /// The first fault of those fields.
 pub fn optics_from_text(text: &str) -> Result<SensorOptics, DesignError> {
     let mut value = parse_json(text)?;
+    // where the camera stands may follow from the whole design
+    let is_whole = |path: &str| value.pointer(path).is_some();
+    if !["/camera/position_mm", "/camera/field_of_view_deg", "/optics/layers"].into_iter().all(is_whole) {
+        schema::check(design_schema(), &value, "")?;
+        derive(&mut value)?;
+    }
     if let Value::Object(map) = &mut value {
         map.retain(|key, _| OPTICS_FIELDS.contains(&key.as_str()));
     }

@@ -17,7 +17,36 @@ use super::sections::DesignFile;
 /// The JSON schema (draft 2020-12) of the design file.
 pub fn design_schema() -> &'static Value {
     static SCHEMA: OnceLock<Value> = OnceLock::new();
-    SCHEMA.get_or_init(schema_of::<DesignFile>)
+    SCHEMA.get_or_init(|| {
+        let mut schema = schema_of::<DesignFile>();
+        for field in super::derive::fields() {
+            let keys: Vec<&str> = field.split('.').collect();
+            // a section of which every field may be left out may be left out itself
+            for depth in (1..=keys.len()).rev() {
+                let (above, last) = keys[..depth].split_at(depth - 1);
+                if !not_required(&mut schema, above, last[0]) {
+                    break;
+                }
+            }
+        }
+        schema
+    })
+}
+
+/// Takes a key from what the object at a path requires; whether that object then requires nothing more.
+fn not_required(schema: &mut Value, path: &[&str], key: &str) -> bool {
+    let mut place = String::new();
+    for step in path {
+        place += &format!("/properties/{step}");
+        let Some(name) = schema.pointer(&place).and_then(|found| found.get("$ref")?.as_str()) else {
+            continue;
+        };
+        place = name.trim_start_matches('#').to_owned();
+    }
+    let Some(object) = schema.pointer_mut(&place) else { return false };
+    let Some(required) = object.get_mut("required").and_then(Value::as_array_mut) else { return true };
+    required.retain(|name| name != key);
+    required.is_empty()
 }
 
 /// The schema of any type of ours, without the `null` that optional fields would allow: in a

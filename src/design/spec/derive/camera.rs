@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::geometry::{depth_for_mm, depth_mm, lens, marks_angle_rad, press_mm, sheet_mm, usable_angle_rad};
 use super::known::{Known, up};
-use super::{Rule, fixed, follows};
+use super::rule::{Rule, fixed, follows};
 use domecast_optics::camera::Lens;
 use glam::DVec2;
 

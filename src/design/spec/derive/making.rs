@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::known::Known;
-use super::{Rule, fixed, follows};
+use super::rule::{Rule, fixed, follows};
 
 pub(super) const PROCESS: &[Rule] = &[
     fixed("process.name", "\"material jetting, clear\"", "fine enough for walls of 0.6 mm; name yours"),

@@ -1,6 +1,6 @@
 //! Fields that a design file may leave out, and the rules that give them.
 //!
-//! Every rule stands in [`RULES`], in the order in which they are applied: a rule reads only fields that the file gives
+//! Every rule stands in a table, in the order in which they are applied: a rule reads only fields that the file gives
 //! or that an earlier rule gave, so none can depend on itself. A field that stands in the file always wins.
 //!
 //! The rules are those that `designs/thumb24.json` was drawn by, written out: heights from what must fit over each
@@ -12,6 +12,8 @@ mod known;
 mod making;
 mod pattern;
 mod platforms;
+mod room;
+mod rule;
 mod springs;
 #[cfg(test)]
 mod tests;
@@ -20,32 +22,8 @@ use serde_json::{Map, Value};
 
 use super::error::DesignError;
 use known::Known;
-
-/// How a left-out field is given.
-#[derive(Clone, Copy)]
-enum Gives {
-    /// Always the same, as JSON text.
-    Fixed(&'static str),
-    /// From fields that are known; `None` where the field does not apply.
-    Follows(fn(&Known<'_>) -> Option<Value>),
-}
-
-/// One rule.
-#[derive(Clone, Copy)]
-struct Rule {
-    field: &'static str,
-    /// In a sentence, with its formula.
-    says: &'static str,
-    gives: Gives,
-}
-
-const fn fixed(field: &'static str, json: &'static str, says: &'static str) -> Rule {
-    Rule { field, says, gives: Gives::Fixed(json) }
-}
-
-const fn follows(field: &'static str, says: &'static str, give: fn(&Known<'_>) -> Option<Value>) -> Rule {
-    Rule { field, says, gives: Gives::Follows(give) }
-}
+pub use rule::DerivedField;
+use rule::{Gives, Rule};
 
 /// All rules, in the order in which they are applied.
 fn rules() -> impl Iterator<Item = &'static Rule> {
@@ -68,17 +46,6 @@ fn rules() -> impl Iterator<Item = &'static Rule> {
     ]
     .into_iter()
     .flatten()
-}
-
-/// A field that the file leaves out, with its value and where that comes from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DerivedField {
-    /// The field, as a path.
-    pub field: &'static str,
-    /// The rule, in a sentence.
-    pub rule: &'static str,
-    /// Its value.
-    pub value: Value,
 }
 
 /// The rule of a field that may be left out, in a sentence; `None` where a file must give it.

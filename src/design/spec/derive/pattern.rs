@@ -6,7 +6,7 @@ use super::super::resolve::optics;
 use super::super::sections::{CameraSection, DomeSection, OpticsSection};
 use super::geometry::dome_place;
 use super::known::{Known, down, up};
-use super::{Rule, fixed, follows};
+use super::rule::{Rule, fixed, follows};
 use domecast_optics::SensorOptics;
 use nalgebra::Matrix3x2;
 

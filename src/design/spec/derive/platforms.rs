@@ -2,12 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::geometry::{
-    back_mm, bore_mm, depth_mm, lower_top_mm, marks_mm, pocket_mm, sheet_mm, tilt, view_mm, wall_mm,
-};
+use super::geometry::{back_mm, depth_mm, lower_top_mm, pocket_mm, sheet_mm, tilt, view_mm, wall_mm};
 use super::known::{Known, down, up};
-use super::springs::{HOLE_IN_RECESS_MM, ring_count, ring_mm, spring_count, springs_reach_mm};
-use super::{Rule, fixed, follows};
+use super::room::{HOLE_IN_RECESS_MM, half_mm, ring_count, ring_mm, spring_count, springs_reach_mm};
+use super::rule::{Rule, fixed, follows};
 
 pub(super) const LIGHTS: &[Rule] = &[
     fixed("platforms.window_margin_mm", "0.1", "the printing accuracy"),
@@ -222,22 +220,6 @@ fn lip(k: &Known<'_>) -> Option<Value> {
     let inner = view_mm(k, top).min(radius - 0.2);
     let line = top - (top - front).max(0.0) * (radius - inner) / (radius + lens);
     k.number(up(line + 0.05, 0.05).min(top))
-}
-
-/// Half of the platforms' side, mm: what must fit, and `springs_mm` for the springs.
-pub(super) fn half_mm(k: &Known<'_>, springs_mm: f64) -> f64 {
-    let (sin, cos) = tilt(k);
-    let wall = wall_mm(k);
-    let sheet =
-        0.5 * k.at("sheet.size_mm", 0).max(k.at("sheet.size_mm", 1)) + k.n("sheet.clearance_mm") + 0.9;
-    let deep = k.n("leds.package_height_mm") + k.n("leds.board_thickness_mm") + k.n("leds.clearance_mm");
-    let lean =
-        (k.n("platforms.upper.rim_height_mm") - sheet_mm(k) - k.n("leds.center_z_mm")) * cos / sin.max(0.3);
-    let lights = k.n("leds.center_radius_mm") + deep / sin.max(0.3) + lean + wall;
-    let camera = bore_mm(k) + wall;
-    // set screws pass the mounting holes 15 degrees off
-    let screws = 8.8;
-    up(sheet.max(lights).max(springs_mm).max(camera).max(screws).max(marks_mm(k) + wall), 0.25)
 }
 
 /// Azimuth of a spring, degrees.

@@ -1,15 +1,11 @@
 //! Springs, magnets, and the loads that they carry.
 
-use std::f64::consts::PI;
-
-use glam::DVec2;
 use serde_json::{Value, json};
 
-use super::geometry::{
-    SWAY_MM, bore_mm, pit_half_mm, pocket_mm, sheet_mm, spring_from_light_rad, view_mm, wall_mm,
-};
+use super::geometry::{pocket_mm, wall_mm};
 use super::known::{Known, down, up};
-use super::{Rule, fixed, follows};
+use super::room::{HOLE_IN_RECESS_MM, first_deg, half_mm, ring_count, ring_mm, spring_count};
+use super::rule::{Rule, fixed, follows};
 
 pub(super) const BOUGHT: &[Rule] = &[
     fixed("springs.outer_diameter_mm", "3.0", "a common size that fits beside the camera"),
@@ -76,59 +72,10 @@ fn claims(k: &Known<'_>) -> Option<Value> {
     ]))
 }
 
-/// What a push-out hole keeps from the edge of the sheet's recess, mm.
-pub(super) const HOLE_IN_RECESS_MM: f64 = 0.1;
-
-/// Azimuth of the first of so many springs: half a step from the first light.
-fn first_deg(k: &Known<'_>, count: usize) -> f64 {
-    let light = k.value("leds.list").and_then(|list| list.get(0)?.get("azimuth_deg")?.as_f64());
-    light.unwrap_or(0.0) + 180.0 / count as f64
-}
-
-/// Smallest ring for so many springs, mm.
-pub(super) fn ring_mm(k: &Known<'_>, count: usize) -> f64 {
-    let (pocket, wall) = (pocket_mm(k), wall_mm(k));
-    let coil = 0.5 * k.n("springs.outer_diameter_mm");
-    let between = spring_from_light_rad(k, count, first_deg(k, count)).min(0.5 * PI).sin();
-    let view = view_mm(k, k.n("platforms.upper.underside_z_mm")) + wall + pocket;
-    let camera = (bore_mm(k) + wall + pocket).max(0.5 * k.n("camera_body.diameter_mm") + 1.0 + coil);
-    let lights = (pit_half_mm(k) + wall + pocket) / between.max(0.05);
-    past_markers_mm(k, count, view.max(camera).max(lights))
-}
-
-/// The smallest ring from a radius on of which no push-out hole comes near a marker's window, mm.
-fn past_markers_mm(k: &Known<'_>, count: usize, from_mm: f64) -> f64 {
-    const STEP_MM: f64 = 0.05;
-    let hole = 0.5 * k.n("magnet_pockets.push_out_diameter_mm");
-    let apart = hole + wall_mm(k) + 0.5 * k.n("white_markers.diameter_mm") + 0.7 * SWAY_MM;
-    let markers = k.value("white_markers.positions_mm").and_then(Value::as_array);
-    let markers: Vec<DVec2> = markers
-        .into_iter()
-        .flatten()
-        .filter_map(|place| Some(DVec2::new(place.get(0)?.as_f64()?, place.get(1)?.as_f64()?)))
-        .map(|place| place - place.normalize_or_zero() * 0.5 * sheet_mm(k))
-        .collect();
-    let first = first_deg(k, count).to_radians();
-    let is_clear = |radius: f64| {
-        (0..count).all(|i| {
-            let azimuth = first + std::f64::consts::TAU * i as f64 / count as f64;
-            let at = radius * DVec2::from_angle(azimuth);
-            markers.iter().all(|marker| marker.distance(at) >= apart)
-        })
-    };
-    let steps = (0..200).map(|step| from_mm + STEP_MM * f64::from(step));
-    steps.into_iter().find(|radius| is_clear(*radius)).unwrap_or(from_mm)
-}
-
-/// How many springs a ring gets.
-pub(super) fn ring_count(k: &Known<'_>) -> usize {
-    if ring_mm(k, 6) <= 1.5 * ring_mm(k, 3) { 6 } else { 3 }
-}
-
 fn places(k: &Known<'_>) -> Option<Value> {
     let count = ring_count(k);
     let wall = wall_mm(k) + pocket_mm(k);
-    let half = super::platforms::half_mm(k, ring_mm(k, count) + wall);
+    let half = half_mm(k, ring_mm(k, count) + wall);
     let reach = k
         .value("platforms.outer_mm")
         .map_or(half, |_| 0.5 * k.at("platforms.outer_mm", 0).min(k.at("platforms.outer_mm", 1)));
@@ -139,24 +86,6 @@ fn places(k: &Known<'_>) -> Option<Value> {
     Some(
         json!({ "ring": { "count": count, "radius_mm": radius_mm, "first_azimuth_deg": first_deg(k, count) } }),
     )
-}
-
-/// How many springs there are.
-pub(super) fn spring_count(k: &Known<'_>) -> usize {
-    let ring =
-        k.value("springs.places.ring.count").and_then(Value::as_u64).and_then(|n| usize::try_from(n).ok());
-    ring.unwrap_or_else(|| k.count("springs.places.listed"))
-}
-
-/// The farthest that a spring stands along x or y, mm.
-pub(super) fn springs_reach_mm(k: &Known<'_>) -> f64 {
-    if k.has("springs.places.ring.radius_mm") {
-        return k.n("springs.places.ring.radius_mm");
-    }
-    let listed = k.value("springs.places.listed").and_then(Value::as_array);
-    let numbers =
-        listed.into_iter().flatten().filter_map(Value::as_array).flatten().filter_map(Value::as_f64);
-    numbers.map(f64::abs).fold(0.0, f64::max)
 }
 
 fn wire(k: &Known<'_>) -> Option<Value> {

@@ -10,6 +10,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod calibration;
+pub mod catalogue;
 pub mod layout;
 pub mod parts;
 mod spec;

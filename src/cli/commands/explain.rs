@@ -12,13 +12,7 @@ const EXAMPLE: &str = include_str!("../../../designs/thumb24.json");
 /// Prints what a field means, its allowed values, and its value and reason in a design.
 pub fn run(output: &Output, field: &str, design: Option<&Path>) -> Result<(), Failure> {
     let (name, value): (String, Value) = match design {
-        Some(path) => {
-            let text = domecast_design::read_text(path)?;
-            (
-                path.display().to_string(),
-                domecast_design::parse_json(&text).map_err(|error| error.in_file(path))?,
-            )
-        }
+        Some(path) => (path.display().to_string(), domecast_design::read_filled(path)?),
         None => ("thumb24".into(), serde_json::from_str(EXAMPLE).unwrap_or_default()),
     };
     let found = domecast_design::explain(field, &value)?;

@@ -9,6 +9,7 @@ mod check;
 mod compare;
 mod explain;
 mod input;
+mod list;
 mod new;
 mod output;
 mod points;
@@ -87,6 +88,14 @@ enum Command {
         /// Show the value and reason of this design.
         #[arg(long)]
         design: Option<PathBuf>,
+    },
+    /// The catalogue of parts that a design can name by key, as `"from": KEY`.
+    List {
+        /// Which kind of part.
+        #[arg(value_enum)]
+        kind: list::ListKind,
+        /// One part with all its numbers and their sources.
+        key: Option<String>,
     },
     /// Two designs or two builds side by side: fields, dots, parts, loads, resolution.
     Compare {
@@ -229,6 +238,7 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         }
         Command::New { name, from, out } => new::run(output, name, from.as_deref(), out.as_deref()),
         Command::Explain { field, design } => explain::run(output, field, design.as_deref()),
+        Command::List { kind, key } => list::run(output, *kind, key.as_deref()),
         Command::Compare { a, b } => compare::run(output, a, b),
         Command::Completions { shell } => shell::completions(output, *shell, Arguments::command()),
         Command::Man => shell::man(output, Arguments::command()),

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::error::DesignError;
-use super::schema::design_schema;
+use super::schema::strict_schema;
 
 /// A field, explained.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,7 +49,7 @@ const UNITS: [(&str, &str); 14] = [
 /// # Errors
 /// A path that the design file has no field for, with the nearest that it has.
 pub fn explain(field: &str, design: &Value) -> Result<Explained, DesignError> {
-    let root = design_schema();
+    let root = strict_schema();
     let mut schema = root;
     let mut required = true;
     let mut value = Some(design);

@@ -9,6 +9,7 @@ mod derive;
 mod design;
 mod error;
 mod explain;
+mod fill;
 mod lens;
 mod lints;
 mod resolve;
@@ -31,6 +32,7 @@ pub use derive::{DerivedField, derive, rule_of};
 pub use design::{Design, DesignWarning};
 pub use error::DesignError;
 pub use explain::{Explained, explain};
+pub use fill::{Filled, Filling, fill, read_filled};
 pub use schema::{design_schema, schema_of};
 pub use sections::DesignFile;
 pub use source::{parse as parse_json, read_text};
@@ -44,20 +46,39 @@ impl Design {
     /// # Errors
     /// The first fault of the file: see [`DesignError`].
     pub fn load(path: &Path) -> Result<Self, DesignError> {
-        read_text(path)?.parse().map_err(|error: DesignError| error.in_file(path))
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::from_text(&read_text(path)?, folder).map_err(|error| error.in_file(path))
     }
+
+    /// Resolves a design from its text; the paths in it are from `folder`.
+    ///
+    /// # Errors
+    /// The first fault of the text: see [`DesignError`].
+    pub fn from_text(text: &str, folder: &Path) -> Result<Self, DesignError> {
+        filled_design(text, Some(folder))
+    }
+}
+
+/// A design from its text, with what it takes from elsewhere; one that took something has a text of its own, complete
+/// in itself.
+fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, DesignError> {
+    let mut value = parse_json(text)?;
+    check_version(&value)?;
+    let filling = fill(&mut value, folder)?;
+    let filled = if filling.fields.is_empty() { None } else { Some(format!("{value:#}\n")) };
+    schema::check(schema::open_schema(), &value, "")?;
+    let derived = derive(&mut value)?;
+    let mut design = resolve::resolve(from_value(&value)?, filled.as_deref().unwrap_or(text), derived)?;
+    design.warnings.extend(filling.warnings);
+    Ok(design)
 }
 
 impl std::str::FromStr for Design {
     type Err = DesignError;
 
-    /// Resolves a design from its text.
+    /// Resolves a design from its text, which lies in no folder: see [`Design::from_text`].
     fn from_str(text: &str) -> Result<Self, DesignError> {
-        let mut value = parse_json(text)?;
-        check_version(&value)?;
-        schema::check(design_schema(), &value, "")?;
-        let derived = derive(&mut value)?;
-        resolve::resolve(from_value(&value)?, text, derived)
+        filled_design(text, None)
     }
 }
 
@@ -67,7 +88,7 @@ impl std::str::FromStr for Design {
 /// The first fault of those fields.
 pub fn load_optics(path: &Path) -> Result<SensorOptics, DesignError> {
     let text = read_text(path)?;
-    optics_from_text(&text).map_err(|error| error.in_file(path))
+    filled_optics(&text, path.parent()).map_err(|error| error.in_file(path))
 }
 
 /// [`load_optics`] on text.
@@ -75,16 +96,24 @@ pub fn load_optics(path: &Path) -> Result<SensorOptics, DesignError> {
 /// # Errors
 /// The first fault of those fields.
 pub fn optics_from_text(text: &str) -> Result<SensorOptics, DesignError> {
+    filled_optics(text, None)
+}
+
+fn filled_optics(text: &str, folder: Option<&Path>) -> Result<SensorOptics, DesignError> {
     let mut value = parse_json(text)?;
     // where the camera stands may follow from the whole design
     let is_whole = |path: &str| value.pointer(path).is_some();
-    if !["/camera/position_mm", "/camera/field_of_view_deg", "/optics/layers"].into_iter().all(is_whole) {
-        schema::check(design_schema(), &value, "")?;
+    let given = ["/camera/position_mm", "/optics/layers"].into_iter().all(is_whole);
+    let seen = ["/camera/field_of_view_deg", "/camera/calibration", "/camera/from"].into_iter().any(is_whole);
+    if !(given && seen) {
+        fill(&mut value, folder)?;
+        schema::check(schema::open_schema(), &value, "")?;
         derive(&mut value)?;
     }
     if let Value::Object(map) = &mut value {
         map.retain(|key, _| OPTICS_FIELDS.contains(&key.as_str()));
     }
+    fill(&mut value, folder)?;
     let file: sections::OpticsFile = from_value(&value)?;
     resolve::optics(&file.camera, &file.optics, &file.dome)
 }

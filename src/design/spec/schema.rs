@@ -18,7 +18,23 @@ use super::sections::DesignFile;
 pub fn design_schema() -> &'static Value {
     static SCHEMA: OnceLock<Value> = OnceLock::new();
     SCHEMA.get_or_init(|| {
-        let mut schema = schema_of::<DesignFile>();
+        let mut schema = open_schema().clone();
+        super::fill::relax(&mut schema);
+        schema
+    })
+}
+
+/// The schema of a design in which what it takes from elsewhere is filled in.
+pub(super) fn strict_schema() -> &'static Value {
+    static SCHEMA: OnceLock<Value> = OnceLock::new();
+    SCHEMA.get_or_init(schema_of::<DesignFile>)
+}
+
+/// The schema of a design of which rules give what it leaves out.
+pub(super) fn open_schema() -> &'static Value {
+    static SCHEMA: OnceLock<Value> = OnceLock::new();
+    SCHEMA.get_or_init(|| {
+        let mut schema = strict_schema().clone();
         for field in super::derive::fields() {
             let keys: Vec<&str> = field.split('.').collect();
             // a section of which every field may be left out may be left out itself

@@ -105,7 +105,7 @@ impl BrownConrady {
     }
 
     #[inline]
-    fn image_with_slope(&self, x: DVec2) -> (DVec2, DMat2) {
+    pub fn image_with_slope(&self, x: DVec2) -> (DVec2, DMat2) {
         let (n, d) = (&self.numerator, &self.denominator);
         let (image, slope) = if *d == [0.0; 3] {
             image_with_slope::<false>(n, d, self.q, x)
@@ -206,7 +206,7 @@ impl BrownConrady {
 
     /// Rounding error of the formula at the domain's end: a few ulp of the sum
     /// of the sizes of all terms.
-    fn rounding_at_rim(&self) -> f64 {
+    pub fn rounding_at_rim(&self) -> f64 {
         let (r, u) = (self.end, self.end * self.end);
         let sum = |k: &[f64; 3]| 1.0 + u * (k[0].abs() + u * (k[1].abs() + u * k[2].abs()));
         let d = &self.denominator;

@@ -6,7 +6,7 @@ use glam::DVec2;
 use crate::numeric::Polynomial;
 
 /// Relative distance that the domain keeps from a pole of the rational form.
-const POLE_MARGIN: f64 = 1e-9;
+pub(super) const POLE_MARGIN: f64 = 1e-9;
 
 /// `L`, and its derivative by `u`.
 #[inline(always)]

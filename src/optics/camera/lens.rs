@@ -3,12 +3,13 @@
 use glam::{DVec2, DVec3};
 use nalgebra::{Matrix2x3, Matrix3x2};
 
-use super::brown_conrady::{self, BrownConrady};
+use super::brown_conrady::BrownConrady;
 use super::kannala_brandt::KannalaBrandt;
 use super::lanes::Lanes;
 use super::limit::Domain;
 use super::pinhole::Pinhole;
 use super::pupil::PupilPolynomial;
+use super::thin_prism::{self, ThinPrism};
 use super::{LensError, LensLimit, LensModel, LensSpec};
 use crate::numeric::LengthMismatch;
 use crate::numeric::batch::{fill, fill_runs};
@@ -45,6 +46,7 @@ pub struct SolvedRay {
 enum Formula {
     Pinhole(Pinhole),
     BrownConrady(BrownConrady),
+    ThinPrism(ThinPrism),
     KannalaBrandt(KannalaBrandt),
 }
 
@@ -53,6 +55,7 @@ macro_rules! each {
         match $formula {
             Formula::Pinhole($model) => $call,
             Formula::BrownConrady($model) => $call,
+            Formula::ThinPrism($model) => $call,
             Formula::KannalaBrandt($model) => $call,
         }
     };
@@ -69,6 +72,11 @@ impl Lens {
         let formula = match (spec.model, spec.distortion.as_slice()) {
             (LensModel::KannalaBrandt, &[k1, k2, k3, k4]) => {
                 KannalaBrandt::new([k1, k2, k3, k4], view).map(Formula::KannalaBrandt)
+            }
+            (LensModel::BrownConrady, distortion)
+                if distortion.iter().skip(8).any(|coefficient| *coefficient != 0.0) =>
+            {
+                ThinPrism::new(distortion, view).map(Formula::ThinPrism)
             }
             (LensModel::BrownConrady, distortion) => {
                 BrownConrady::new(distortion, view).map(Formula::BrownConrady)
@@ -102,7 +110,8 @@ impl Lens {
     /// model, meets its pole), whether or not the field of view reaches it.
     ///
     /// With tangential terms the fold is nearer in one azimuth than in others;
-    /// this is the nearest.
+    /// this is the nearest. With prism terms or a tilted sensor it may be nearer than the real one: up to
+    /// it, no two rays share a pixel for certain.
     pub fn fold_angle_rad(&self) -> Option<f64> {
         self.domain().fold_rad
     }
@@ -113,7 +122,7 @@ impl Lens {
     }
 
     /// No pixel farther than this from the principal point sees anything, in
-    /// pixels. Exact for square pixels, an upper bound otherwise.
+    /// pixels. Exact for square pixels without prism terms and tilt, an upper bound otherwise.
     pub fn max_radius_px(&self) -> f64 {
         let [[fx, _, _], [_, fy, _], _] = self.spec.matrix;
         each!(&self.formula, model => model.max_radius()) * fx.max(fy)
@@ -160,7 +169,7 @@ impl Lens {
     }
 
     /// No [`Lens::unproject`] evaluates the formula of its model more often.
-    pub const MAX_UNPROJECT_ITERATIONS: u32 = brown_conrady::MAX_STEPS;
+    pub const MAX_UNPROJECT_ITERATIONS: u32 = thin_prism::MAX_STEPS;
 
     /// [`Lens::unproject`] and how it was found. A pinhole needs no iterations.
     ///
@@ -172,6 +181,7 @@ impl Lens {
         let iterations = match &self.formula {
             Formula::Pinhole(_) => 0,
             Formula::BrownConrady(model) => model.plane_of(image, slack)?.1,
+            Formula::ThinPrism(model) => model.plane_of(image, slack)?.1,
             Formula::KannalaBrandt(model) => model.angle_of(image, slack)?.1,
         };
         Ok(SolvedRay { ray, iterations, residual_px: (self.project(ray)? - pixel).length() })

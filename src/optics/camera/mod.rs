@@ -1,7 +1,7 @@
 //! Lens models: the direction of a ray in air to a pixel, and back.
 //!
 //! One type, [`Lens`], serves three forms ([`LensModel`]): a pinhole, Brown-Conrady
-//! with 5 or 8 coefficients, and Kannala-Brandt with 4. All share one
+//! with 5, 8, 12 or 14 coefficients, and Kannala-Brandt with 4. All share one
 //! interface, one set of limits ([`LensLimit`]) and one conformance suite.
 //!
 //! # Example
@@ -56,6 +56,8 @@ mod perspective;
 mod pinhole;
 mod pupil;
 mod spec;
+mod thin_prism;
+mod tilt;
 
 pub use lens::{Lens, SolvedRay};
 pub use limit::LensLimit;

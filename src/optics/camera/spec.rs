@@ -7,7 +7,8 @@ pub enum LensModel {
     Pinhole,
     /// D. C. Brown, "Decentering distortion of lenses" (1966), as in OpenCV's
     /// `calib3d`: 5 coefficients `k1 k2 p1 p2 k3` (ROS `plumb_bob`), or 8 with
-    /// the denominator `k4 k5 k6` (`rational_polynomial`).
+    /// the denominator `k4 k5 k6` (`rational_polynomial`); with 12 the thin prism `s1 s2 s3 s4` follows, with 14
+    /// the sensor's tilt `tau_x tau_y`, radians.
     BrownConrady,
     /// J. Kannala and S. S. Brandt (2006), doi:10.1109/TPAMI.2006.153, as in
     /// OpenCV's `fisheye`: 4 coefficients `k1 k2 k3 k4` (ROS `equidistant`).
@@ -35,7 +36,7 @@ impl LensModel {
     pub fn coefficient_counts(self) -> &'static [usize] {
         match self {
             Self::Pinhole => &[0],
-            Self::BrownConrady => &[5, 8],
+            Self::BrownConrady => &[5, 8, 12, 14],
             Self::KannalaBrandt => &[4],
         }
     }

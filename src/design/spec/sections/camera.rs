@@ -11,7 +11,8 @@ use super::Why;
 pub enum ModelName {
     /// No distortion; `distortion` is empty.
     Pinhole,
-    /// OpenCV's standard model: k1, k2, p1, p2, k3, and optionally k4, k5, k6.
+    /// OpenCV's standard model: k1, k2, p1, p2, k3, and optionally k4, k5, k6, then s1, s2, s3, s4 (thin prism), then
+    /// tau_x, tau_y (tilt of the sensor, rad).
     BrownConrady,
     /// OpenCV's fisheye model: k1, k2, k3, k4.
     KannalaBrandt,
@@ -31,9 +32,9 @@ pub struct CameraSection {
     pub height: u32,
     /// Intrinsic matrix `[[fx,0,cx],[0,fy,cy],[0,0,1]]`, px; the centre of the top-left pixel is (0, 0).
     pub matrix: [[f64; 3]; 3],
-    /// Distortion coefficients: none for pinhole; k1, k2, p1, p2, k3 (then k4, k5, k6) for
-    /// `brown_conrady`; k1, k2, k3, k4 for `kannala_brandt`.
-    #[schemars(length(max = 8))]
+    /// Distortion coefficients: none for pinhole; k1, k2, p1, p2, k3 (then k4, k5, k6, s1 to s4, tau_x,
+    /// tau_y: 5, 8, 12 or 14) for `brown_conrady`; k1, k2, k3, k4 for `kannala_brandt`.
+    #[schemars(length(max = 14))]
     pub distortion: Vec<f64>,
     /// Full field of view of the lens as sold, degrees; the model may reach less.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 360.0))]
@@ -48,6 +49,16 @@ pub struct CameraSection {
     #[serde(default)]
     #[schemars(length(max = 4))]
     pub pupil_shift_mm: Vec<f64>,
+    /// The camera's calibration, a path from the design file's folder: OpenCV FileStorage (YAML, XML, JSON), ROS
+    /// camera_info or Kalibr camchain; it gives model, width, height, matrix and distortion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<String>,
+    /// Which camera of a camchain, where it has several: `cam0`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration_camera: Option<String>,
+    /// Key of a part whose numbers stand for the fields that are left out here: `domecast list cameras`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
@@ -78,6 +89,9 @@ pub struct CameraBodySection {
     /// Diameter of the cable that leaves at the back, mm.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 100.0))]
     pub cable_diameter_mm: f64,
+    /// Key of a part whose numbers stand for the fields that are left out here: `domecast list cameras`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,

@@ -189,6 +189,9 @@ pub struct ElastomerSection {
     #[serde(default = "silicone_density")]
     #[schemars(range(min = 0.1, max = 25.0))]
     pub density_g_per_cm3: f64,
+    /// Key of a part whose numbers stand for the fields that are left out here: `domecast list silicones`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,

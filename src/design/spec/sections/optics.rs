@@ -29,6 +29,9 @@ pub struct LayerSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub thickness_mm: Option<f64>,
+    /// Key of a part whose numbers stand for the fields that are left out here: `domecast list sheets` or `silicones`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,

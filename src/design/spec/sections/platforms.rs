@@ -227,6 +227,9 @@ pub struct LedsSection {
     /// Diameter of the wire hole through the pit's floor, mm; 0 for none.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub wire_hole_diameter_mm: f64,
+    /// Key of a part whose numbers stand for the fields that are left out here: `domecast list leds`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,

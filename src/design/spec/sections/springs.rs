@@ -36,6 +36,9 @@ pub struct SpringsSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stop_clearance_mm: Option<f64>,
+    /// Key of a part whose numbers stand for the fields that are left out here: `domecast list springs`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
@@ -116,6 +119,9 @@ pub struct MagnetsSection {
     pub grip_force_n: f64,
     /// Which way the two magnets of a pair face each other.
     pub facing: MagnetFacing,
+    /// Key of a part whose numbers stand for the fields that are left out here: `domecast list magnets`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,

@@ -3,6 +3,9 @@
 use super::number::list;
 use domecast_runtime::constants::Constants;
 
+/// Brown-Conrady's coefficients from the fifth on.
+const NAMES: [&str; 10] = ["k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"];
+
 /// `kalibr.yaml` with one camera.
 ///
 /// # Errors
@@ -17,9 +20,9 @@ pub fn kalibr_yaml(constants: &Constants) -> Result<String, String> {
         _ => {
             if let Some(i) = (4..camera.distortion.len()).find(|i| coefficient(*i) != 0.0) {
                 return Err(format!(
-                    "Kalibr's radtan has k1, k2, p1, p2 only; this lens also has k{} = {}, and without it the \
+                    "Kalibr's radtan has k1, k2, p1, p2 only; this lens also has {} = {}, and without it the \
                      file would describe another lens",
-                    i - 1,
+                    NAMES.get(i - 4).unwrap_or(&"a coefficient"),
                     coefficient(i)
                 ));
             }

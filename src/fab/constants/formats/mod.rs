@@ -38,6 +38,7 @@ mod tests {
 
     use super::*;
     use crate::constants;
+    use domecast_design::calibration::{Calibration, CalibrationHints};
     use domecast_design::layout::Layout;
     use domecast_mesh::TriMesh;
     use domecast_runtime::constants::Constants;
@@ -63,6 +64,42 @@ mod tests {
         let mut eight = of("thumb24.json");
         eight.camera.distortion.extend([0.1, 0.2, 0.3]);
         assert!(camera_info_yaml(&eight).contains("rational_polynomial"));
+    }
+
+    // What the files say of the camera is all that they say, whichever the lens, to the last digit.
+    #[test]
+    fn our_own_files_read_back_to_the_same_bytes() {
+        let mut all = ["thumb24.json", "thumb24-fisheye.json", "thumb24-pinhole.json"].map(of).to_vec();
+        for count in [8, 12, 14] {
+            let mut more = of("thumb24.json");
+            let rest = (5..count).map(|i| 0.1 / 3.0_f64.powi(i));
+            more.camera.distortion.extend(rest);
+            all.push(more);
+        }
+        let mut radtan = of("thumb24.json");
+        radtan.camera.distortion[4] = 0.0;
+        all.push(radtan);
+        let mut looked = 0;
+        for constants in &all {
+            let written = [
+                Ok(opencv_yaml(constants)),
+                Ok(camera_info_yaml(constants)),
+                kalibr_yaml(constants),
+            ];
+            let write = [|c: &Constants| opencv_yaml(c), |c| camera_info_yaml(c), |c| kalibr_yaml(c).unwrap()];
+            for (text, write) in written.into_iter().zip(write) {
+                let Ok(text) = text else { continue };
+                let read = Calibration::parse(&text, &CalibrationHints::default()).unwrap();
+                assert_eq!(read.matrix, constants.camera.matrix);
+                let mut again = constants.clone();
+                again.camera.model = read.model.as_str().into();
+                (again.camera.width, again.camera.height) = (read.width, read.height);
+                (again.camera.matrix, again.camera.distortion) = (read.matrix, read.distortion);
+                assert_eq!(write(&again), text);
+                looked += 1;
+            }
+        }
+        assert_eq!(looked, 2 * 7 + 3);
     }
 
     // A box from twelve triangles against the closed form, off its own centre.

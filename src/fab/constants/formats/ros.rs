@@ -3,7 +3,8 @@
 use super::number::list;
 use domecast_runtime::constants::Constants;
 
-/// `camera_info.yaml`: `plumb_bob` for up to five Brown-Conrady coefficients, `rational_polynomial` for eight,
+/// `camera_info.yaml`: `plumb_bob` for up to five Brown-Conrady coefficients, `rational_polynomial` for 8, 12 and
+/// 14,
 /// `equidistant` for Kannala-Brandt. The projection matrix is the undistorted frame's.
 pub fn camera_info_yaml(constants: &Constants) -> String {
     let camera = &constants.camera;
@@ -11,7 +12,8 @@ pub fn camera_info_yaml(constants: &Constants) -> String {
     let model = match camera.model.as_str() {
         "kannala_brandt" => "equidistant",
         _ if distortion.len() > 5 => {
-            distortion.resize(8, 0.0);
+            let length = distortion.len().max(8);
+            distortion.resize(length, 0.0);
             "rational_polynomial"
         }
         _ => {

@@ -26,17 +26,22 @@ const CHORD_MM: f64 = 0.03;
 /// Runs every check of the assembled sensor.
 ///
 /// # Errors
-/// The first failure: which parts, where, value, limit, which design field.
+/// The failures, the first of each check: which parts, where, value, limit, which design field.
 pub fn check_assembly(m: &Measures, parts: &[Part], assembly: &Assembly) -> Result<(), PartError> {
-    process::check(m, parts)?;
-    undercut::check(m, parts)?;
-    envelope(m, assembly)?;
+    let checks = [process::check(m, parts), undercut::check(m, parts), envelope(m, assembly)];
+    let mut faults: Vec<PartError> = checks.into_iter().filter_map(Result::err).collect();
+    faults.extend(assembled(m, assembly).err());
+    PartError::all(faults)
+}
+
+/// What only the assembly as a whole tells, at every position of the springs.
+fn assembled(m: &Measures, assembly: &Assembly) -> Result<(), PartError> {
     let chord = Chord::new(CHORD_MM.max(m.chord.tolerance_mm())).map_err(|e| mesh_error("assembly", e))?;
     let scene = Scene::of(m, assembly, chord)?;
     scene.within_bodies()?;
     m.poses
         .par_iter()
-        .map(|Pose { name, rest_from_platform: pose }| {
+        .map(|Pose { name, rest_from_platform: pose, .. }| {
             scene.between_bodies(m, name, pose, chord)?;
             camera_gap(m, name, pose)?;
             scene.view(m, name, pose)?;

@@ -44,6 +44,36 @@ pub enum PartError {
         /// Why.
         problem: String,
     },
+    /// Rays of the image end on a part.
+    Blocked {
+        /// The part.
+        part: String,
+        /// At which position of the platform.
+        when: String,
+        /// Field angle of the first ray that it blocks, degrees.
+        angle_deg: f64,
+        /// How many rays of each kind it blocks: "dots 12.0 % (204 of 1700)".
+        shares: String,
+        /// What lets the rays pass.
+        cure: Cure,
+    },
+    /// Something purchased has no sound seat.
+    Unheld {
+        /// What is not held.
+        part: String,
+        /// What should hold it, or is in its way.
+        by: String,
+        /// What is wrong.
+        problem: String,
+        /// What was found, mm.
+        value_mm: f64,
+        /// What it has to be, mm.
+        limit_mm: f64,
+        /// What would do.
+        cure: Cure,
+    },
+    /// More than one fault, in the order in which they were found.
+    Several(Vec<PartError>),
     /// The camera's view cannot be computed.
     View {
         /// Why.
@@ -53,6 +83,72 @@ pub enum PartError {
     },
 }
 
+/// A change of the design that takes a fault away.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cure {
+    /// The field, as a path from the top.
+    pub field: String,
+    /// Its new value.
+    pub value: serde_json::Value,
+}
+
+impl Cure {
+    /// A number for a field, rounded to 0.01 mm away from `from`, so that rounding never undoes it.
+    pub(super) fn length(field: impl Into<String>, from: f64, to: f64) -> Self {
+        let steps = 100.0 * to;
+        // A hundredth that is met but for rounding stays.
+        let rounded = if to >= from { (steps - 1e-6).ceil() } else { (steps + 1e-6).floor() };
+        Self { field: field.into(), value: serde_json::json!(rounded / 100.0) }
+    }
+
+    /// Any value for a field.
+    pub(super) fn value(field: impl Into<String>, value: serde_json::Value) -> Self {
+        Self { field: field.into(), value }
+    }
+}
+
+impl fmt::Display for Cure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {} would do", self.field, self.value)
+    }
+}
+
+impl PartError {
+    /// One error of all: nothing if there is none.
+    ///
+    /// # Errors
+    /// The faults.
+    pub(super) fn all(faults: Vec<Self>) -> Result<(), Self> {
+        let mut flat: Vec<Self> = Vec::new();
+        for fault in faults {
+            let new = if let Self::Several(inner) = fault { inner } else { vec![fault] };
+            for one in new {
+                if !flat.contains(&one) {
+                    flat.push(one);
+                }
+            }
+        }
+        match flat.len() {
+            0 => Ok(()),
+            1 => flat.pop().map_or(Ok(()), Err),
+            _ => Err(Self::Several(flat)),
+        }
+    }
+
+    /// The faults one by one.
+    pub fn faults(&self) -> &[Self] {
+        if let Self::Several(faults) = self { faults } else { std::slice::from_ref(self) }
+    }
+
+    /// The change that takes this fault away, where one is known.
+    pub fn cure(&self) -> Option<&Cure> {
+        match self {
+            Self::Blocked { cure, .. } | Self::Unheld { cure, .. } => Some(cure),
+            _ => None,
+        }
+    }
+}
+
 impl fmt::Display for PartError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -60,6 +156,20 @@ impl fmt::Display for PartError {
                 write!(f, "{part}: {place}: {value_mm:.3} mm, limit {limit_mm:.3} mm; change {field}")
             }
             Self::Mesh { part, error } => write!(f, "{part}: {error}"),
+            Self::Blocked { part, when, angle_deg, shares, cure } => {
+                write!(f, "{part}: blocks the view {when} from {angle_deg:.1} degrees: {shares}; {cure}")
+            }
+            Self::Unheld { part, by, problem, value_mm, limit_mm, cure } => write!(
+                f,
+                "{part} and {by}: {problem}: {value_mm:.3} mm, limit {limit_mm:.3} mm, {:.3} mm missing; {cure}",
+                (limit_mm - value_mm).abs()
+            ),
+            Self::Several(faults) => {
+                for (i, fault) in faults.iter().enumerate() {
+                    write!(f, "{}{fault}", if i == 0 { "" } else { "; also: " })?;
+                }
+                Ok(())
+            }
             Self::Broken { part, problem } => write!(f, "{part}: {problem}"),
             Self::Unwritable { path, problem } => write!(f, "{path}: {problem}"),
             Self::View { problem, field } => write!(f, "the camera's view: {problem}; change {field}"),
@@ -78,6 +188,29 @@ impl From<PartError> for DesignError {
                 format!("{part}: {place}: {value_mm:.4} mm"),
                 format!("a limit of {limit_mm:.4} mm"),
             ),
+            PartError::Blocked { part, when, angle_deg, shares, cure } => Self::at(
+                cure.field.clone(),
+                "",
+                format!("{part}: blocks the camera's view {when} from {angle_deg:.1} degrees: {shares}"),
+                "every ray of the image free from the pupil to the sheet, at rest and under every claimed load",
+            )
+            .with_help(cure.to_string()),
+            PartError::Unheld { part, by, problem, value_mm, limit_mm, cure } => Self::at(
+                cure.field.clone(),
+                "",
+                format!(
+                    "{part} and {by}: {problem}: {value_mm:.3} mm, {:.3} mm missing",
+                    (limit_mm - value_mm).abs()
+                ),
+                format!("a limit of {limit_mm:.3} mm"),
+            )
+            .with_help(cure.to_string()),
+            PartError::Several(faults) => {
+                let mut all = faults.into_iter().map(Self::from);
+                let first =
+                    all.next().unwrap_or_else(|| Self::at("platforms", "", "parts that cannot be made", ""));
+                first.with_more(all.collect())
+            }
             PartError::View { problem, field } => Self::at(
                 field,
                 "",

@@ -17,8 +17,15 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     );
     // A bore is crossed by what leads into it; push-out holes may end in the
     // cable's channel.
-    b.may_meet =
-        &[("camera bore", "clamp hole"), ("camera bore", "cable exit"), ("push-out hole", "cable exit")];
+    b.may_meet = &[
+        ("camera bore", "clamp hole"),
+        ("camera bore", "cable exit"),
+        ("push-out hole", "cable exit"),
+        ("camera bore", "view cone"),
+        ("camera bore", "marker view"),
+        ("view cone", "marker view"),
+        ("marker view", "marker view"),
+    ];
     if top <= bottom {
         return Err(b.infeasible(
             "height",
@@ -40,6 +47,17 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
         Feature::new("camera bore", "camera_body.bore_clearance_mm", bore).placed(m.sensor_from_camera),
     );
     b.genus += 1;
+
+    if let Some(view) = &m.lower_view {
+        // About the pupil, from the camera's front to beyond the top; below the front the bore is open anyway.
+        let to_pupil = DAffine3::from_translation(m.pupil_mm().with_z(0.0));
+        let below = 1e-3 * (top - bottom);
+        let field = "camera.position_mm[2]";
+        b.cut.push(Feature::new("view cone", field, view.cone(below, top + over)).placed(to_pupil));
+        for (i, (shape, placed)) in view.beams(below, top + over).into_iter().enumerate() {
+            b.cut.push(Feature::new("marker view", field, shape).numbered(i).placed(to_pupil * placed));
+        }
+    }
 
     let clamp = &lower.clamp;
     for (i, &azimuth_deg) in clamp.azimuth_deg.iter().enumerate() {

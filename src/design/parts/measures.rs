@@ -51,6 +51,9 @@ pub struct Measures {
     pub sensor_from_camera: DAffine3,
     /// What the camera must see through the upper platform.
     pub view: ViewCone,
+    /// What it must see through the lower platform, about the pupil; `None` where it stands above it, or where the
+    /// bore is wide enough.
+    pub lower_view: Option<ViewCone>,
     /// Positions of the platform: rest first, then the travel, the claimed
     /// loads, and the corners of the load envelope.
     pub poses: Vec<Pose>,
@@ -99,6 +102,31 @@ pub(super) fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
     DAffine3 { matrix3: DMat3::from_cols(y.cross(z), y, z), translation: center }
 }
 
+/// What the camera must see through the lower platform, from its front to the top.
+fn lower_view(design: &Design, poses: &[Pose], markers_mm: &[DVec2]) -> Result<Option<ViewCone>, PartError> {
+    /// The view is narrow near the pupil; below this share of the way to the top no opening is cut for it.
+    const LOW: f64 = 0.05;
+    let sections = design.sections();
+    let body = &sections.camera_body;
+    let (pupil_z, top) = (design.sensor_from_camera().translation_mm.z, design.lower_top_z_mm());
+    let low = (pupil_z + body.front_from_pupil_mm)
+        .max(pupil_z + LOW * (top - pupil_z))
+        .max(sections.platforms.lower.underside_z_mm);
+    if low >= top {
+        return Ok(None);
+    }
+    let view = ViewCone::below(
+        design.optics(),
+        sections.dome.radius_mm,
+        (markers_mm, 0.5 * sections.white_markers.diameter_mm),
+        &poses.iter().map(|pose| pose.rest_from_platform).collect::<Vec<_>>(),
+        (low, top),
+        sections.platforms.window_margin_mm,
+    )?;
+    let bore_mm = 0.5 * body.diameter_mm + body.bore_clearance_mm;
+    Ok((!view.is_within(bore_mm)).then_some(view))
+}
+
 /// A point in the plane from radius and azimuth.
 pub(super) fn polar(radius_mm: f64, azimuth_deg: f64) -> DVec2 {
     radius_mm * DVec2::from_angle(azimuth_deg.to_radians())
@@ -126,6 +154,7 @@ impl Measures {
             (sections.platforms.upper.underside_z_mm, design.sheet_underside_z_mm()),
             sections.platforms.window_margin_mm,
         )?;
+        let lower_view = lower_view(design, &poses, &markers_mm)?;
         Ok(Self {
             platforms: sections.platforms.clone(),
             leds: sections.leds.clone(),
@@ -144,6 +173,7 @@ impl Measures {
             spring_axes_mm: design.springs_at_mm(),
             sensor_from_camera: DAffine3 { matrix3: camera.rotation, translation: camera.translation_mm },
             view,
+            lower_view,
             poses,
             optics: design.optics().clone(),
             markers_mm,

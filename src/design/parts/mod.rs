@@ -22,21 +22,28 @@
 
 mod accessories;
 mod assembly;
+mod bearing;
 mod bom;
 mod checks;
 mod drawing;
 mod error;
 mod feature;
 mod files;
+mod image_rays;
 mod lower;
 mod measures;
 mod mould;
 mod poses;
 mod process;
 mod purchased;
+mod remedy;
+mod screws;
+mod seats;
 mod sight;
+mod traced;
 mod undercut;
 mod upper;
+mod verdict;
 mod view;
 mod walls;
 
@@ -50,12 +57,15 @@ use rayon::prelude::*;
 
 pub use assembly::{Assembly, AssemblyItem};
 pub use checks::check_assembly;
-pub use error::PartError;
+pub use error::{Cure, PartError};
 use feature::{Blueprint, Feature};
 pub use files::{PartFile, files};
+pub use image_rays::RayKind;
 pub use measures::Measures;
 pub use poses::Pose;
 pub use sight::{EdgeRay, MarkerView, markers_of};
+pub use traced::{PoseSight, RayCount, trace_sight};
+pub use verdict::{CheckedSensor, build_seated, check_sensor};
 pub use view::ViewCone;
 
 use crate::layout::PrintPass;
@@ -179,7 +189,7 @@ pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
 /// pad-printing jig is made for each hit.
 ///
 /// # Errors
-/// The first part, in that order, that cannot be made.
+/// Why parts cannot be made: the first fault of each, in that order.
 pub fn build(m: &Measures, hits: &[PrintPass]) -> Result<Vec<Part>, PartError> {
     let makers: [Maker; 7] = [
         upper::blueprint,
@@ -194,11 +204,17 @@ pub fn build(m: &Measures, hits: &[PrintPass]) -> Result<Vec<Part>, PartError> {
         let name = if hits.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") };
         hits.get(i).map(|hit| accessories::jig(m, &name, hit))
     };
-    (0..makers.len() + hits.len())
+    let results: Vec<Result<Part, PartError>> = (0..makers.len() + hits.len())
         .into_par_iter()
         .filter_map(|i| makers.get(i).map(|make| make(m)).or_else(|| jig(i - makers.len())))
         .map(|blueprint| blueprint?.build(m))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .collect()
+        .collect();
+    let (mut made, mut faults) = (Vec::new(), Vec::new());
+    for result in results {
+        match result {
+            Ok(part) => made.push(part),
+            Err(fault) => faults.push(fault),
+        }
+    }
+    PartError::all(faults).map(|()| made)
 }

@@ -22,6 +22,8 @@ pub struct Pose {
     pub name: String,
     /// Where the platform is.
     pub rest_from_platform: Rigid,
+    /// At rest or under a load that the design claims.
+    pub is_claimed: bool,
 }
 
 /// How far the upper platform can go straight down: until the springs are
@@ -52,13 +54,15 @@ pub(super) fn poses(design: &Design) -> Result<Vec<Pose>, PartError> {
                 _ => format!("at {i}/{STEPS} of the travel"),
             };
             let down_mm = travel_mm * f64::from(i) / f64::from(STEPS);
-            Pose { name, rest_from_platform: Rigid::from_translation(DVec3::NEG_Z * down_mm) }
+            let rest_from_platform = Rigid::from_translation(DVec3::NEG_Z * down_mm);
+            Pose { name, rest_from_platform, is_claimed: i == 0 }
         })
         .collect();
     for (claim, case) in design.sections().loads.claims.iter().zip(claims_of(design, &suspension)) {
         let balance = case.equilibrium.map_err(|error| fault(format!("load \"{}\": {error}", claim.name)))?;
         let name = format!("under the load \"{}\"", claim.name);
-        out.push(Pose { name, rest_from_platform: balance.displacement.to_pose(suspension.at_mm()) });
+        let rest_from_platform = balance.displacement.to_pose(suspension.at_mm());
+        out.push(Pose { name, rest_from_platform, is_claimed: true });
     }
     let (limits, sight) = (limits_of(design), MarkerView::of(design));
     let more = |pose: &Rigid| sight.checks(pose, |_, _| {});
@@ -71,6 +75,7 @@ pub(super) fn poses(design: &Design) -> Result<Vec<Pose>, PartError> {
             Some(Pose {
                 name: format!("at the end of the load envelope, {} x {:.3}", direction.name, reached.factor),
                 rest_from_platform: balance.displacement.to_pose(suspension.at_mm()),
+                is_claimed: false,
             })
         })
         .collect();

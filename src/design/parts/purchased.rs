@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 use glam::{DQuat, DVec2, DVec3};
 
 use super::measures::Measures;
-use domecast_mesh::{Chord, Fit, MeshError, Piece, Profile, ProfileEdge, Shape, TriMesh};
+use super::screws::Thread;
+use domecast_mesh::{Chord, Construction, Fit, MeshError, Piece, Profile, ProfileEdge, Shape, TriMesh};
 use domecast_optics::numeric::Rigid;
 
 /// The camera's housing, about the camera's axis, in the sensor frame at rest.
@@ -14,6 +15,33 @@ pub(super) fn camera(m: &Measures) -> Piece {
     let front = body.front_from_pupil_mm;
     let shape = Shape::cylinder(0.5 * body.diameter_mm, front - body.length_mm, front, Fit::Inside);
     Piece::new("camera", shape).placed(m.sensor_from_camera)
+}
+
+/// The camera's housing as a ray from its pupil meets it: open within the front glass. `None` where the glass is as
+/// wide as the housing.
+pub(super) fn camera_housing(m: &Measures) -> Option<Construction> {
+    let body = &m.camera_body;
+    if body.lens_diameter_mm >= body.diameter_mm {
+        return None;
+    }
+    let (front, over) = (body.front_from_pupil_mm, 0.1 * body.length_mm);
+    let back = front - body.length_mm - over;
+    let glass = Shape::cylinder(0.5 * body.lens_diameter_mm, back, front + over, Fit::Outside);
+    let cut = Piece::new("front glass", glass).placed(m.sensor_from_camera);
+    Some(Construction { added: vec![camera(m)], cut: vec![cut] })
+}
+
+/// The cap heads of the mounting screws, on the lower platform's top or in their counterbores, rest frame.
+pub(super) fn screw_heads(m: &Measures) -> Vec<Piece> {
+    let mounting = &m.platforms.lower.mounting;
+    let Some(thread) = Thread::through(mounting.hole_diameter_mm) else { return Vec::new() };
+    let is_sunk = mounting.counterbore_diameter_mm > mounting.hole_diameter_mm;
+    let floor = m.lower_top_z_mm - if is_sunk { mounting.counterbore_depth_mm } else { 0.0 };
+    let head = |i: usize, at: &[f64; 2]| {
+        let shape = Shape::cylinder(0.5 * thread.head_mm, floor, floor + thread.nominal_mm, Fit::Inside);
+        Piece::new(format!("mounting screw {i}"), shape).at(at[0], at[1])
+    };
+    mounting.at_mm.iter().enumerate().map(|(i, at)| head(i, at)).collect()
 }
 
 /// The elastomer dome, in the sensor frame.

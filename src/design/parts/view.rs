@@ -9,7 +9,7 @@ use domecast_optics::camera::Lens;
 use domecast_optics::numeric::Rigid;
 
 /// Directions round a rim or marker that are followed.
-const DIRECTIONS: u32 = 48;
+pub(super) const DIRECTIONS: u32 = 48;
 /// Heights at which the dome's cone is taken. It is the hull of straight rays,
 /// so its radius is a convex function of height, and straight lines between
 /// these heights lie outside it.
@@ -22,6 +22,8 @@ pub(super) struct SightLine {
     pub pupil_mm: DVec3,
     /// Where the ray enters the sheet, mm.
     pub sheet_mm: DVec3,
+    /// Its angle to the camera's axis, rad.
+    pub angle_rad: f64,
 }
 
 impl SightLine {
@@ -35,22 +37,29 @@ impl SightLine {
 /// at one pose of the platform. A point that the lens cannot see has none;
 /// that the design requires it is checked elsewhere.
 pub(super) fn sight_lines(optics: &SensorOptics, center_mm: DVec2, radius_mm: f64) -> Vec<SightLine> {
-    let bottom_mm = -optics.layers().iter().skip(1).filter_map(|l| l.thickness_mm).sum::<f64>();
-    let sensor_from_camera = optics.sensor_from_camera();
     (0..DIRECTIONS)
         .filter_map(|k| {
             let angle = std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS);
             let point = (center_mm + radius_mm * DVec2::from_angle(angle)).extend(0.0);
-            let ray = optics.lens().unproject(optics.project(point).ok()?).ok()?;
-            let shift = optics.lens().pupil_shift_mm(Lens::field_angle_rad(ray)).0;
-            let pupil_mm = sensor_from_camera.point(DVec3::Z * shift);
-            let direction = sensor_from_camera.vector(ray);
-            (direction.z > 0.0).then(|| SightLine {
-                pupil_mm,
-                sheet_mm: pupil_mm + direction * ((bottom_mm - pupil_mm.z) / direction.z),
-            })
+            sight_line(optics, optics.project(point).ok()?)
         })
         .collect()
+}
+
+/// The chief ray of a pixel from the pupil through the air to the sheet; `None` where the lens has none, or where it
+/// does not rise to the sheet.
+pub(super) fn sight_line(optics: &SensorOptics, pixel: DVec2) -> Option<SightLine> {
+    let bottom_mm = -optics.layers().iter().skip(1).filter_map(|l| l.thickness_mm).sum::<f64>();
+    let sensor_from_camera = optics.sensor_from_camera();
+    let ray = optics.lens().unproject(pixel).ok()?;
+    let angle_rad = Lens::field_angle_rad(ray);
+    let pupil_mm = sensor_from_camera.point(DVec3::Z * optics.lens().pupil_shift_mm(angle_rad).0);
+    let direction = sensor_from_camera.vector(ray);
+    (direction.z > 0.0).then(|| SightLine {
+        pupil_mm,
+        sheet_mm: pupil_mm + direction * ((bottom_mm - pupil_mm.z) / direction.z),
+        angle_rad,
+    })
 }
 
 /// The camera's view of dome and markers below the sheet at all positions of
@@ -62,6 +71,51 @@ pub struct ViewCone {
     cone_mm: Vec<DVec2>,
     beams: Vec<Beam>,
     margin_mm: f64,
+}
+
+/// The rays to the dome's rim and to each marker's edge, at all poses.
+#[derive(Debug, Clone, Default)]
+struct Lines {
+    rim: Vec<SightLine>,
+    markers: Vec<Vec<SightLine>>,
+}
+
+impl Lines {
+    /// In the frame of the platform; none may be empty of the dome's rim.
+    fn over(
+        optics: &SensorOptics,
+        dome_radius_mm: f64,
+        (markers_mm, marker_radius_mm): (&[DVec2], f64),
+        poses: &[Rigid],
+    ) -> Result<Self, PartError> {
+        let mut all = Self { rim: Vec::new(), markers: vec![Vec::new(); markers_mm.len()] };
+        for pose in poses {
+            let moved = optics.at_pose(pose).map_err(|error| PartError::View {
+                problem: format!("at one of the springs' positions {error}"),
+                field: "camera.position_mm".into(),
+            })?;
+            all.rim.extend(sight_lines(&moved, DVec2::ZERO, dome_radius_mm));
+            for (lines, &center) in all.markers.iter_mut().zip(markers_mm) {
+                lines.extend(sight_lines(&moved, center, marker_radius_mm));
+            }
+        }
+        if all.rim.is_empty() {
+            return Err(PartError::View {
+                problem: "the dome's rim cannot be seen at any position of the springs".into(),
+                field: "camera.position_mm".into(),
+            });
+        }
+        Ok(all)
+    }
+
+    /// Takes in others, each brought into this one's frame.
+    fn extend(&mut self, other: Self, mut moved: impl FnMut(SightLine) -> SightLine) {
+        self.rim.extend(other.rim.into_iter().map(&mut moved));
+        self.markers.resize(self.markers.len().max(other.markers.len()), Vec::new());
+        for (mine, others) in self.markers.iter_mut().zip(other.markers) {
+            mine.extend(others.into_iter().map(&mut moved));
+        }
+    }
 }
 
 /// Circles round all rays of one marker at the lowest and highest height.
@@ -96,24 +150,43 @@ impl ViewCone {
         (low_z_mm, high_z_mm): (f64, f64),
         margin_mm: f64,
     ) -> Result<Self, PartError> {
-        let mut rim = Vec::new();
-        let mut markers = vec![Vec::new(); markers_mm.len()];
+        let lines = Lines::over(optics, dome_radius_mm, (markers_mm, marker_radius_mm), poses)?;
+        Ok(Self::of_lines(&lines, (low_z_mm, high_z_mm), margin_mm))
+    }
+
+    /// What the same view needs of the lower platform: in the rest frame less the pupil's place beside the axis,
+    /// which the opening goes round.
+    ///
+    /// # Errors
+    /// As [`ViewCone::over`].
+    pub(super) fn below(
+        optics: &SensorOptics,
+        dome_radius_mm: f64,
+        (markers_mm, marker_radius_mm): (&[DVec2], f64),
+        poses: &[Rigid],
+        (low_z_mm, high_z_mm): (f64, f64),
+        margin_mm: f64,
+    ) -> Result<Self, PartError> {
+        let beside = optics.rest_from_camera().translation_mm.with_z(0.0);
+        let mut lines = Lines::default();
         for pose in poses {
-            let moved = optics.at_pose(pose).map_err(|error| PartError::View {
-                problem: format!("at one of the springs' positions {error}"),
-                field: "camera.position_mm".into(),
-            })?;
-            rim.extend(sight_lines(&moved, DVec2::ZERO, dome_radius_mm));
-            for (lines, &center) in markers.iter_mut().zip(markers_mm) {
-                lines.extend(sight_lines(&moved, center, marker_radius_mm));
-            }
-        }
-        if rim.is_empty() {
-            return Err(PartError::View {
-                problem: "the dome's rim cannot be seen at any position of the springs".into(),
-                field: "camera.position_mm".into(),
+            let seen = Lines::over(
+                optics,
+                dome_radius_mm,
+                (markers_mm, marker_radius_mm),
+                std::slice::from_ref(pose),
+            )?;
+            lines.extend(seen, |line| SightLine {
+                pupil_mm: pose.point(line.pupil_mm) - beside,
+                sheet_mm: pose.point(line.sheet_mm) - beside,
+                ..line
             });
         }
+        Ok(Self::of_lines(&lines, (low_z_mm, high_z_mm), margin_mm))
+    }
+
+    fn of_lines(lines: &Lines, (low_z_mm, high_z_mm): (f64, f64), margin_mm: f64) -> Self {
+        let Lines { rim, markers } = lines;
         let cone_mm: Vec<DVec2> = (0..HEIGHTS)
             .map(|i| {
                 let z = low_z_mm + (high_z_mm - low_z_mm) * f64::from(i) / f64::from(HEIGHTS - 1);
@@ -139,7 +212,7 @@ impl ViewCone {
             Beam { low_mm, low_radius_mm: low + margin, high_mm, high_radius_mm: high + margin }
         };
         let beams = markers.iter().filter(|lines| !lines.is_empty()).map(beam).collect();
-        Ok(Self { cone_mm, beams, margin_mm })
+        Self { cone_mm, beams, margin_mm }
     }
 
     /// Radius of the dome's cone at a height, with the margin; beyond the
@@ -171,6 +244,17 @@ impl ViewCone {
             share(b.low_mm.lerp(b.high_mm, part), radius_mm)
         };
         self.beams.iter().map(beam).fold(dome, f64::min)
+    }
+
+    /// Whether all of it is within a distance of the axis.
+    pub(super) fn is_within(&self, radius_mm: f64) -> bool {
+        let heights = self.cone_mm.iter().all(|p| self.radius_mm(p.y) <= radius_mm);
+        let reach = |at: DVec2, r: f64| at.length() + r <= radius_mm;
+        heights
+            && self
+                .beams
+                .iter()
+                .all(|b| reach(b.low_mm, b.low_radius_mm) && reach(b.high_mm, b.high_radius_mm))
     }
 
     /// Largest distance from the axis that the view needs, with the margin, mm.

@@ -22,6 +22,8 @@ pub struct DesignError {
     pub allowed: String,
     /// What to do, where more than "change the value" can be said.
     pub help: Option<String>,
+    /// Further faults that were found in the same run.
+    pub more: Vec<DesignError>,
 }
 
 impl DesignError {
@@ -40,7 +42,15 @@ impl DesignError {
             problem: problem.into(),
             allowed: allowed.into(),
             help: None,
+            more: Vec::new(),
         }
+    }
+
+    /// The same fault, with others that were found in the same run.
+    #[must_use]
+    pub fn with_more(mut self, more: Vec<Self>) -> Self {
+        self.more.extend(more);
+        self
     }
 
     /// The same fault, with advice.
@@ -70,6 +80,7 @@ impl DesignError {
             "allowed": self.allowed,
             "help": self.help,
             "message": self.to_string(),
+            "more": self.more.iter().map(Self::to_json).collect::<Vec<_>>(),
         })
     }
 }
@@ -107,6 +118,9 @@ impl fmt::Display for DesignError {
         }
         if let Some(help) = &self.help {
             write!(f, "; {help}")?;
+        }
+        for fault in &self.more {
+            write!(f, "; also: {fault}")?;
         }
         Ok(())
     }

@@ -38,7 +38,7 @@ use domecast_design::layout::{Layout, LayoutError, LayoutSpec};
 use domecast_design::parts;
 use domecast_design::parts::PartError;
 use domecast_design::settings::SAFETY;
-use domecast_design::{Design, DesignError};
+use domecast_design::{Design, DesignError, DesignWarning};
 use domecast_design::{claims_of, suspension_of};
 use domecast_optics::numeric::Rigid;
 use domecast_springs::Check;
@@ -183,7 +183,7 @@ fn make(
         tree.add(file.path, file.bytes);
     }
     tree.add("artwork/layout.json", pretty(&judged));
-    let MadeParts { made, files, poses } = parts?;
+    let MadeParts { made, assembly, checked, files, poses } = parts?;
     for file in files {
         tree.add(file.path, file.bytes);
     }
@@ -200,7 +200,7 @@ fn make(
     for (path, text) in forms.files {
         tree.add(path, text.into_bytes());
     }
-    let warnings = warnings(design, &judged, forms.left_out);
+    let warnings = warnings(design, &checked.notes, &judged, forms.left_out);
 
     step("writing the page");
     let shown: Vec<(String, String)> =
@@ -212,6 +212,8 @@ fn make(
         constants: &constants,
         forces: &forces,
         parts: &made,
+        assembly: &assembly,
+        sight: &checked.sight,
         poses: &poses,
         warnings: &shown,
         hash: &sha256,
@@ -227,10 +229,15 @@ fn make(
     Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines })
 }
 
-/// The design's own warnings, then those of the constants' formats and of the pattern.
-fn warnings(design: &Design, judged: &LayoutReport, formats_left_out: Vec<String>) -> Vec<Warning> {
+/// The design's own warnings, then those of the assembled parts, then those of the constants' formats and of the pattern.
+fn warnings(
+    design: &Design,
+    notes: &[DesignWarning],
+    judged: &LayoutReport,
+    formats_left_out: Vec<String>,
+) -> Vec<Warning> {
     let warning = |field: &str, message: String| Warning { field: field.into(), message };
-    let own = design.warnings().iter().map(|own| warning(&own.field, own.message.clone()));
+    let own = design.warnings().iter().chain(notes).map(|own| warning(&own.field, own.message.clone()));
     let formats = formats_left_out.into_iter().map(|message| warning("constants", message));
     let pattern = judged.warnings.iter().map(|message| warning("pattern", message.clone()));
     own.chain(formats).chain(pattern).collect()
@@ -268,6 +275,8 @@ fn pretty(value: &impl serde::Serialize) -> Vec<u8> {
 /// The parts, checked in their assembly, and their files.
 struct MadeParts {
     made: Vec<parts::Part>,
+    assembly: parts::Assembly,
+    checked: parts::CheckedSensor,
     files: Vec<parts::PartFile>,
     /// Names of the positions at which the assembly was checked.
     poses: Vec<String>,
@@ -279,12 +288,12 @@ fn make_parts(
     springs: &constants::DesignSprings,
 ) -> Result<MadeParts, PartError> {
     let measures = springs.sight.measures()?;
-    let made = parts::build(measures, &layout.passes)?;
+    let made = parts::build_seated(design, measures, &layout.passes)?;
     let assembly = parts::Assembly::of(measures, &made)?;
-    parts::check_assembly(measures, &made, &assembly)?;
+    let checked = parts::check_sensor(design, measures, &made, &assembly, &layout.dots)?;
     let files = parts::files(design, measures, &made, &assembly)?;
     let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
-    Ok(MadeParts { made, files, poses })
+    Ok(MadeParts { made, assembly, checked, files, poses })
 }
 
 /// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay visible. Returns the

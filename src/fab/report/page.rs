@@ -118,9 +118,10 @@ fn sensor(subject: &ReportSubject<'_>) -> Html {
     };
     let rows: Vec<Vec<Html>> = subject.constants.optics.layers.iter().map(row).collect();
     figure(
-        &section::drawing(subject.design),
-        "Cut along x, true to scale: red are the rays of the image's middle row, bent at the sheet and in the silicone. \
-         Platforms are drawn as blocks; their true shape is below.",
+        &section::drawing(subject.design, subject.assembly),
+        "Cut along x through the pupil, true to scale, from the meshes of the parts; dashed grey outlines stand behind the \
+         cut. Red are rays of the image's middle row, bent at the sheet and in the silicone; dashed red ones end on a part \
+         beyond the dome.",
     ) + table("Layers from the camera outwards", &["layer", "thickness", "index (red / green / blue)"], &rows)
 }
 

@@ -86,11 +86,32 @@ pub(super) fn fits(subject: &ReportSubject<'_>) -> Html {
     ]
     .map(|(what, limit)| vec![what.into(), format!("{} mm", n(limit)).into()]);
     html!(
-        "<p>No two bodies of the assembly touch at any of {} positions of the platform, the view is free, and no LED \
-         shines straight into the lens.</p>\n<details><summary>The positions</summary><p>{}</p></details>\n{}{}",
+        "<p>No two bodies of the assembly touch at any of {} positions of the platform, and no LED shines straight into the \
+         lens.</p>\n<details><summary>The positions</summary><p>{}</p></details>\n{}{}{}",
         subject.poses.len(),
         subject.poses.join("; "),
+        sight(subject),
         table("Fits", &["fit", "inner, mm", "outer, mm", "play on each side, mm", "field"], &rows),
         table(&format!("Limits of {}, kept by every part", s.process.name), &["", "limit"], &limits),
+    )
+}
+
+/// The traced rays, by position and by what they show.
+fn sight(subject: &ReportSubject<'_>) -> Html {
+    let kinds: Vec<&str> =
+        subject.sight.first().map_or_else(Vec::new, |s| s.counts.iter().map(|c| c.kind.as_str()).collect());
+    let heads: Vec<&str> = std::iter::once("position").chain(kinds).collect();
+    let cell = |count: &domecast_design::parts::RayCount| match count.traced {
+        0 => "no ray".into(),
+        traced => html!("{} of {}", traced - count.blocked, traced),
+    };
+    let row = |pose: &domecast_design::parts::PoseSight| {
+        std::iter::once(pose.pose.as_str().into()).chain(pose.counts.iter().map(cell)).collect()
+    };
+    let rows: Vec<Vec<Html>> = subject.sight.iter().map(row).collect();
+    table(
+        "Rays of the image that reach the sheet, traced from the pupil against every part's mesh",
+        &heads,
+        &rows,
     )
 }

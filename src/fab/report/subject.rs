@@ -5,7 +5,7 @@ use crate::html::{Html, picture};
 use domecast_design::Design;
 use domecast_design::layout::Layout;
 use domecast_design::layout::report::LayoutReport;
-use domecast_design::parts::Part;
+use domecast_design::parts::{Assembly, Part, PoseSight};
 use domecast_runtime::constants::Constants;
 
 /// What the page is made from.
@@ -23,6 +23,10 @@ pub struct ReportSubject<'a> {
     pub forces: &'a ForceReport,
     /// The parts.
     pub parts: &'a [Part],
+    /// The parts and stand-ins, put together.
+    pub assembly: &'a Assembly,
+    /// The traced rays of the image, by position of the platform.
+    pub sight: &'a [PoseSight],
     /// Positions of the platform at which the assembly was checked, by name.
     pub poses: &'a [String],
     /// Field and message of each warning.

@@ -2,6 +2,7 @@ mod checks;
 mod exactness;
 mod mechanism;
 mod random_designs;
+mod seats;
 mod sweep;
 mod walls;
 

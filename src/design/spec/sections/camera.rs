@@ -92,6 +92,10 @@ pub struct CameraBodySection {
     /// Key of a part whose numbers stand for the fields that are left out here: `domecast list cameras`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<String>,
+    /// Smallest radius that the cable may be bent to, mm; left out: twice its diameter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1000.0))]
+    pub cable_bend_radius_mm: Option<f64>,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,

@@ -1,0 +1,52 @@
+//! Everything that is checked of the assembled sensor, with all faults in one answer.
+
+use super::traced::{PoseSight, trace_sight};
+use super::{Assembly, Measures, Part, PartError, bearing, build, check_assembly, seats};
+use crate::layout::{Dot, PrintPass};
+use crate::spec::{Design, DesignWarning};
+
+/// What the checks of a sound sensor found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckedSensor {
+    /// The traced rays at rest and under each claimed load; none is blocked.
+    pub sight: Vec<PoseSight>,
+    /// What does not stop a build, but should be known.
+    pub notes: Vec<DesignWarning>,
+}
+
+/// Makes all parts as [`super::build`] does, after a look at the seat of each purchased part.
+///
+/// # Errors
+/// All faults of the seats, and those of the parts that cannot be made.
+pub fn build_seated(design: &Design, m: &Measures, hits: &[PrintPass]) -> Result<Vec<Part>, PartError> {
+    let mut faults = seats::faults(design, m);
+    let made = build(m, hits);
+    if let Err(fault) = &made {
+        faults.push(fault.clone());
+    }
+    PartError::all(faults)?;
+    made
+}
+
+/// Runs every check of the assembled sensor, the traced view among them.
+///
+/// # Errors
+/// All faults that were found, each with its part, value, limit and design field.
+pub fn check_sensor(
+    design: &Design,
+    m: &Measures,
+    parts: &[Part],
+    assembly: &Assembly,
+    dots: &[Dot],
+) -> Result<CheckedSensor, PartError> {
+    let (whole, sight) =
+        rayon::join(|| check_assembly(m, parts, assembly), || trace_sight(design, m, assembly, dots));
+    let mut faults = bearing::faults(m, assembly);
+    faults.extend(whole.err());
+    let sight = sight.unwrap_or_else(|fault| {
+        faults.push(fault);
+        Vec::new()
+    });
+    PartError::all(faults)?;
+    Ok(CheckedSensor { sight, notes: seats::notes(m) })
+}

@@ -97,7 +97,7 @@ fn forbid_null(schema: &mut Schema) {
     }
 }
 
-/// Checks `value` against the schema of `T`, naming the first fault by its path below `at`.
+/// Checks `value` against the schema of `T`, naming every fault by its path below `at`.
 ///
 /// # Errors
 /// Unknown keys (with the nearest known one), missing fields, wrong types, values out of range.
@@ -219,9 +219,11 @@ impl<'a> Walk<'a> {
             ));
         }
         if let Some(each) = schema.get("items") {
-            for (index, item) in items.iter().enumerate() {
-                self.visit(each, item, &format!("{at}[{index}]"))?;
-            }
+            let visited = items
+                .iter()
+                .enumerate()
+                .map(|(index, item)| self.visit(each, item, &format!("{at}[{index}]")));
+            return DesignError::all(visited.filter_map(Result::err).collect());
         }
         Ok(())
     }
@@ -244,16 +246,19 @@ impl<'a> Walk<'a> {
             .filter_map(|source| source.get("properties")?.as_object())
             .flat_map(|properties| properties.iter().map(|(key, value)| (key.clone(), value.clone())))
             .collect();
+        let mut faults = Vec::new();
         for (key, value) in map {
             let found = sources
                 .iter()
                 .flatten()
                 .find_map(|source| source.get("properties").and_then(|all| all.get(key)));
             match (found, schema.get("additionalProperties")) {
-                (Some(field), _) => self.visit(field, value, &join(at, key))?,
-                (None, Some(rest @ Value::Object(_))) => self.visit(rest, value, &join(at, key))?,
+                (Some(field), _) => faults.extend(self.visit(field, value, &join(at, key)).err()),
+                (None, Some(rest @ Value::Object(_))) => {
+                    faults.extend(self.visit(rest, value, &join(at, key)).err());
+                }
                 (None, None | Some(Value::Bool(true))) if known.is_empty() => {}
-                (None, _) => return Err(unknown_key(key, value, &known, at)),
+                (None, _) => faults.push(unknown_key(key, value, &known, at)),
             }
         }
         for source in sources.iter().flatten() {
@@ -262,7 +267,7 @@ impl<'a> Walk<'a> {
                     let about =
                         known.get(name).and_then(|field| field.get("description")).and_then(Value::as_str);
                     let fault = missing(name, at);
-                    return Err(match about {
+                    faults.push(match about {
                         Some(about) => fault.with_help(format!("it says: {}", first_sentence(about))),
                         None => fault,
                     });
@@ -272,10 +277,10 @@ impl<'a> Walk<'a> {
         if let Some(Value::Object(reasons)) = map.get("why") {
             // a reason for a field that does not exist is a misspelt field
             if let Some((key, value)) = reasons.iter().find(|(key, _)| !known.contains_key(*key)) {
-                return Err(unknown_key(key, value, &known, &join(at, "why")));
+                faults.push(unknown_key(key, value, &known, &join(at, "why")));
             }
         }
-        Ok(())
+        DesignError::all(faults)
     }
 }
 

@@ -133,8 +133,16 @@ fn set_screws_beside_the_camera_are_refused() {
 
 #[test]
 fn a_cable_wider_than_its_exit_is_refused() {
-    refused("platforms.lower.cable_exit.width_mm", &["cable", "width"], &[("camera_body.cable_diameter_mm", json!(3.4))]);
-    refused("platforms.lower.cable_exit.height_mm", &["cable", "height"], &[("camera_body.cable_diameter_mm", json!(2.8))]);
+    refused(
+        "platforms.lower.cable_exit.width_mm",
+        &["cable", "width"],
+        &[("camera_body.cable_diameter_mm", json!(3.4))],
+    );
+    refused(
+        "platforms.lower.cable_exit.height_mm",
+        &["cable", "height"],
+        &[("camera_body.cable_diameter_mm", json!(2.8))],
+    );
 }
 
 #[test]
@@ -154,7 +162,11 @@ fn springs_and_magnets_without_a_seat_are_refused() {
 
 #[test]
 fn lights_without_a_seat_are_refused() {
-    refused("leds.lip_top_z_mm", &["height of the package behind the lip"], &[("leds.lip_top_z_mm", json!(-4.2))]);
+    refused(
+        "leds.lip_top_z_mm",
+        &["height of the package behind the lip"],
+        &[("leds.lip_top_z_mm", json!(-4.2))],
+    );
     refused("leds.center_z_mm", &["LED boards and acrylic_sheet"], &[("leds.center_z_mm", json!(-1.9))]);
 }
 

@@ -81,12 +81,10 @@ mod tests {
         all.push(radtan);
         let mut looked = 0;
         for constants in &all {
-            let written = [
-                Ok(opencv_yaml(constants)),
-                Ok(camera_info_yaml(constants)),
-                kalibr_yaml(constants),
-            ];
-            let write = [|c: &Constants| opencv_yaml(c), |c| camera_info_yaml(c), |c| kalibr_yaml(c).unwrap()];
+            let written =
+                [Ok(opencv_yaml(constants)), Ok(camera_info_yaml(constants)), kalibr_yaml(constants)];
+            let write =
+                [|c: &Constants| opencv_yaml(c), |c| camera_info_yaml(c), |c| kalibr_yaml(c).unwrap()];
             for (text, write) in written.into_iter().zip(write) {
                 let Ok(text) = text else { continue };
                 let read = Calibration::parse(&text, &CalibrationHints::default()).unwrap();

@@ -75,7 +75,9 @@ pub(super) const TOOLS: &[Rule] = &[
     }),
     fixed("jig.base_thickness_mm", "8", "stiff under the pad's stroke"),
     fixed("jig.seat_height_mm", "6", "the pad wraps past the sheet"),
-    fixed("stencil.thickness_mm", "0.6", "thin, so that the discs are sharp"),
+    follows("stencil.thickness_mm", "the thinnest wall, at least 0.6 mm, so that the discs are sharp", |k| {
+        k.number(k.n("process.min_wall_mm").max(0.6))
+    }),
     fixed("stencil.border_mm", "4", "room for two fingers"),
     follows(
         "stencil.skirt_depth_mm",

@@ -110,9 +110,11 @@ pub(super) const OUTLINE: &[Rule] = &[
             k.numbers(&[2.0 * half, 2.0 * half])
         },
     ),
-    follows("platforms.lower.clamp.hole_diameter_mm", "for tapping M2", |k| {
-        k.number(k.n("process.min_hole_diameter_mm").max(1.6))
-    }),
+    follows(
+        "platforms.lower.clamp.hole_diameter_mm",
+        "for tapping the thinnest of M2 to M6 of which a set screw, sunk by three diameters, reaches the body",
+        tapped,
+    ),
     follows("platforms.lower.cable_exit.width_mm", "the cable and 0.7 mm", |k| {
         k.number(k.n("camera_body.cable_diameter_mm") + 0.7)
     }),
@@ -219,7 +221,20 @@ fn lip(k: &Known<'_>) -> Option<Value> {
     let front = k.n("camera_body.front_from_pupil_mm") - depth_mm(k) + down_mm;
     let inner = view_mm(k, top).min(radius - 0.2);
     let line = top - (top - front).max(0.0) * (radius - inner) / (radius + lens);
-    k.number(up(line + 0.05, 0.05).min(top))
+    // and a quarter of the package behind it, which keeps the light's foot dark
+    let covers = k.n("leds.center_z_mm") - 0.25 * k.at("leds.package_mm", 1) + 0.02;
+    k.number(up((line + 0.05).max(covers), 0.01).min(top))
+}
+
+fn tapped(k: &Known<'_>) -> Option<Value> {
+    // tapped hole, and the longest common set screw with three diameters, mm
+    const REACHES_MM: [(f64, f64); 6] =
+        [(1.6, 16.0), (2.05, 19.5), (2.5, 25.0), (3.3, 32.0), (4.2, 40.0), (5.0, 48.0)];
+    let half = 0.5 * k.at("platforms.outer_mm", 0).max(k.at("platforms.outer_mm", 1));
+    // no screw stands more than 35 degrees off a side's middle
+    let way = half / 35f64.to_radians().cos() - 0.5 * k.n("camera_body.diameter_mm");
+    let found = REACHES_MM.into_iter().find(|(_, reach)| way <= *reach).map_or(5.0, |(hole, _)| hole);
+    k.number(found.max(k.n("process.min_hole_diameter_mm")))
 }
 
 /// Azimuth of a spring, degrees.

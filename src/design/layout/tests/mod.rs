@@ -276,10 +276,11 @@ fn is_same(places: &[DVec2], turn_rad: f64, mirrored: bool) -> bool {
 
 #[test]
 fn patterns_are_symmetric_about_the_axis() {
+    use crate::layout::boundary::Boundary;
     use crate::layout::pattern::Pattern;
     use crate::sections::{CentredOn, PatternKind};
     // an edge as a projection makes it: round but for rounding
-    let edge = Boundary::new(|way| 180.0 * (1.0 + 2e-10 * (37.0 * way.x).sin()));
+    let edge = Boundary::new(|way: DVec2| 180.0 * (1.0 + 2e-10 * f64::sin(37.0 * way.x)));
     for (kind, centred_on, turns) in [
         (PatternKind::Square, CentredOn::Gap, 4),
         (PatternKind::Square, CentredOn::Dot, 4),

@@ -53,6 +53,27 @@ impl DesignError {
         self
     }
 
+    /// All faults as one error, in their order, or none.
+    ///
+    /// # Errors
+    /// The first, which carries the others.
+    pub fn all(faults: Vec<Self>) -> Result<(), Self> {
+        let mut flat: Vec<Self> = Vec::new();
+        for mut fault in faults {
+            let more = std::mem::take(&mut fault.more);
+            flat.push(fault);
+            flat.extend(more);
+        }
+        let mut flat = flat.into_iter();
+        flat.next().map_or(Ok(()), |first| Err(first.with_more(flat.collect())))
+    }
+
+    /// The same fault, with a value of a field that takes it away.
+    #[must_use]
+    pub(super) fn cured_by(self, field: &str, value: impl fmt::Display) -> Self {
+        self.with_help(format!("{field} = {value} would do"))
+    }
+
     /// The same fault, with advice.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {

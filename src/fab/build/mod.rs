@@ -312,6 +312,7 @@ fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
     let sight = constants::MarkerSight::of(design);
     sight.require(design, &Rigid::identity(), "at rest")?;
     let suspension = suspension_of(design)?;
+    let mut faults = Vec::new();
     for (index, (claim, case)) in
         design.sections().loads.claims.iter().zip(claims_of(design, &suspension)).enumerate()
     {
@@ -333,19 +334,21 @@ fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
             )
         });
         if let Some(error) = passed {
-            return Err(error);
+            faults.push(error);
+            continue;
         }
-        let balance = case.equilibrium.map_err(|error| {
-            DesignError::at(
-                field,
-                serde_json::json!(claim),
-                error.to_string(),
-                "a load that the springs carry",
-            )
-        })?;
+        let balance = match case.equilibrium {
+            Ok(balance) => balance,
+            Err(error) => {
+                let allowed = "a load that the springs carry";
+                faults.push(DesignError::at(field, serde_json::json!(claim), error.to_string(), allowed));
+                continue;
+            }
+        };
         let pose = balance.displacement.to_pose(suspension.at_mm());
-        sight.require(design, &pose, &format!("under the load \"{}\"", claim.name))?;
+        faults.extend(sight.require(design, &pose, &format!("under the load \"{}\"", claim.name)).err());
     }
+    DesignError::all(faults)?;
     Ok(sight)
 }
 

@@ -175,12 +175,7 @@ fn make(
     let draw = || artwork::files(&spec, &layout);
     let judge = || LayoutReport::new(design, &spec, &layout);
     let make_parts = || make_parts(design, &layout, &springs);
-    // What a frame resolves hangs on how the markers stand out in it.
-    let load = || {
-        let light = LightCheck::of(design)?;
-        let noise_px: Vec<f64> = light.report.markers.iter().map(|marker| marker.centroid_sd_px).collect();
-        Ok::<_, DesignError>((light, constants::force_report(design, &springs, &noise_px)?))
-    };
+    let load = || light_and_forces(design, &springs);
     let ((films, judged), (parts, loaded)) =
         rayon::join(|| rayon::join(draw, judge), || rayon::join(make_parts, load));
     for file in films? {
@@ -235,6 +230,17 @@ fn make(
     let mut headlines = judged.headlines();
     headlines.extend(averaging(design, &forces));
     Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines })
+}
+
+/// The lit sensor, and what a frame of it resolves, which hangs on how the markers stand out in it.
+fn light_and_forces(
+    design: &Design,
+    springs: &constants::DesignSprings,
+) -> Result<(LightCheck, constants::ForceReport), DesignError> {
+    let light = LightCheck::of(design)?;
+    let noise_px: Vec<f64> = light.report.markers.iter().map(|marker| marker.centroid_sd_px).collect();
+    let forces = constants::force_report(design, springs, &noise_px)?;
+    Ok((light, forces))
 }
 
 /// The design's own warnings, then those of the assembled parts, of the constants' formats, of the pattern and of the light.

@@ -3,7 +3,7 @@
 
 use serde_json::json;
 
-use super::LightReport;
+use super::levels::LightReport;
 use crate::numbers::{percent, typeset};
 use domecast_design::{Design, DesignError};
 use domecast_runtime::track::MIN_MARKER_RISE_LEVELS;

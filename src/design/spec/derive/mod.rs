@@ -32,7 +32,7 @@ fn rules() -> impl Iterator<Item = &'static Rule> {
         camera::LENS,
         camera::LAYERS,
         camera::BODY,
-        springs::BOUGHT,
+        springs::PURCHASED,
         platforms::LIGHTS,
         springs::LOADS,
         platforms::HEIGHTS,
@@ -58,7 +58,7 @@ pub(super) fn fields() -> impl Iterator<Item = &'static str> {
     rules().map(|rule| rule.field)
 }
 
-/// Gives every left-out field of a design file's tree its value; what was given is told in the order of the rules.
+/// Gives every left-out field of a design file's tree its value; what was given is returned in the order of the rules.
 ///
 /// # Errors
 /// A rule whose fields make no number: a lens that cannot be, or one that sees nothing of the dome.

@@ -7,7 +7,7 @@ use super::known::{Known, down, up};
 use super::room::{HOLE_IN_RECESS_MM, first_deg, half_mm, ring_count, ring_mm, spring_count};
 use super::rule::{Rule, fixed, follows};
 
-pub(super) const BOUGHT: &[Rule] = &[
+pub(super) const PURCHASED: &[Rule] = &[
     fixed("springs.outer_diameter_mm", "3.0", "a common size that fits beside the camera"),
     fixed("springs.free_length_mm", "5.0", "a common size; the camera's depth grows with it"),
     fixed("springs.active_coils", "3", "few coils leave travel before they bind"),
@@ -94,10 +94,10 @@ fn wire(k: &Known<'_>) -> Option<Value> {
         .into_iter()
         .flatten()
         .filter_map(|claim| claim.get("force_n")?.get(2)?.as_f64())
-        .fold(0.0, |most: f64, force| most.max(-force));
+        .fold(0.0, |hardest: f64, force| hardest.max(-force));
     let stiffness = press.max(0.1) / (0.4 * k.n("springs.free_length_mm") * spring_count(k).max(1) as f64);
     let (outer, coils) = (k.n("springs.outer_diameter_mm"), k.n("springs.active_coils"));
-    // the mean diameter depends on the wire: a few rounds settle it far below a step
+    // the mean diameter depends on the wire: a few rounds bring it far below a step
     let mut wire = 0.1 * outer;
     for _ in 0..30 {
         let mean = (outer - wire).max(0.1 * outer);

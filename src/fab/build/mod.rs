@@ -161,10 +161,7 @@ fn make(
     for (path, bytes) in measured.map_or(&[][..], Measured::files) {
         tree.add(path.as_str(), bytes.clone());
     }
-    tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
-    if !design.derived().is_empty() {
-        tree.add(DERIVED_NAME, derived(design));
-    }
+    add_design(&mut tree, design);
     let sha256 = sha256_hex(design.text().as_bytes());
 
     step("trying the claimed loads");
@@ -285,10 +282,14 @@ fn averaging(design: &Design, forces: &constants::ForceReport) -> Option<String>
     ))
 }
 
-/// The fields that rules gave, for programs that read `design.json`.
-fn derived(design: &Design) -> Vec<u8> {
+/// The design as it was written, and beside it what rules gave, for programs that read it.
+fn add_design(tree: &mut Tree, design: &Design) {
+    tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
     let told = |one: &domecast_design::DerivedField| serde_json::json!({ "field": one.field, "value": one.value, "rule": one.rule });
-    pretty(&design.derived().iter().map(told).collect::<Vec<_>>())
+    let derived: Vec<serde_json::Value> = design.derived().iter().map(told).collect();
+    if !derived.is_empty() {
+        tree.add(DERIVED_NAME, pretty(&derived));
+    }
 }
 
 /// A file for programs.

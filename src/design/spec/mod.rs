@@ -17,6 +17,7 @@ mod lints;
 mod resolve;
 mod rules;
 mod schema;
+mod schema_faults;
 pub mod sections;
 pub mod settings;
 mod source;

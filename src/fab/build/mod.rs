@@ -187,11 +187,9 @@ fn make(
         tree.add(file.path, file.bytes);
     }
     let (light, forces) = loaded?;
-    for (path, bytes) in light.files() {
+    let force_files = forces.files().into_iter().map(|(path, text)| (path, text.into_bytes()));
+    for (path, bytes) in light.files().into_iter().chain(force_files) {
         tree.add(path, bytes);
-    }
-    for (path, text) in forces.files() {
-        tree.add(path, text.into_bytes());
     }
     step("writing what other programs read");
     tree.add(

@@ -22,8 +22,10 @@ const MAX_SHARE: f64 = 0.005;
 pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), DesignError> {
     let (dome, leds) = (&report.dome, &design.sections().leds);
     if dome.median_level < MIN_DOME_LEVEL {
-        let factor = MIN_DOME_LEVEL / dome.median_level.max(f64::MIN_POSITIVE);
-        let flux = leds.radiant_flux_mw.to_array().map(|mw| json!(round_up(1.1 * factor * mw)));
+        // Light from outside does not grow with the lights.
+        let stray = 255.0 * design.sections().exposure.stray_level;
+        let factor = (MIN_DOME_LEVEL - stray) / (dome.median_level - stray).max(f64::MIN_POSITIVE);
+        let [r, g, b] = leds.radiant_flux_mw.to_array().map(|mw| round_up(1.1 * factor.max(1.0) * mw));
         return Err(DesignError::at(
             "leds.radiant_flux_mw",
             json!(leds.radiant_flux_mw),
@@ -34,8 +36,8 @@ pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), Desig
             format!("a median of at least {}", typeset(MIN_DOME_LEVEL)),
         )
         .with_help(format!(
-            "{} mW would do, or a larger `exposure.max_level_per_mw_mm2` where the camera has it",
-            json!(flux)
+            "leds.radiant_flux_mw = {} would do, or a larger exposure.max_level_per_mw_mm2 where the camera has it",
+            json!({ "r": r, "g": g, "b": b })
         )));
     }
     let dimmest = report.markers.iter().min_by(|a, b| a.contrast_levels.total_cmp(&b.contrast_levels));

@@ -134,7 +134,9 @@ fn led_seat(m: &Measures, i: usize, b: &mut Blueprint) {
     let lean = platform_from_led.matrix3.z_axis.z / up;
     let front_at_seat = leds.center_radius_mm - front / up + (m.seat_z_mm() - leds.center_z_mm) * lean;
     let beyond = front_at_seat - leds.center_radius_mm;
-    let end = leds.center_radius_mm + if beyond > SKIN_MM { beyond + 0.5 * front } else { 0.0 };
+    // Into the pit, also where the pit's front is behind the emitting face.
+    let into = 0.5 * front.abs().max(2.0 * SKIN_MM);
+    let end = leds.center_radius_mm + if beyond > SKIN_MM { beyond + into } else { 0.0 };
     let channel = Shape::cuboid(
         DVec3::new(inside_window, -half_channel, lip),
         DVec3::new(end, half_channel, top + over),

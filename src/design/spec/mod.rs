@@ -33,7 +33,7 @@ use domecast_optics::SensorOptics;
 
 pub use derive::{DerivedField, derive, rule_of};
 pub use design::{Design, DesignWarning};
-pub use error::DesignError;
+pub use error::{Cure, DesignError};
 pub use explain::{Explained, explain};
 pub use fill::{Filled, Filling, fill, read_filled};
 pub use schema::{design_schema, schema_of};

@@ -56,6 +56,7 @@ use std::io::{self, Write};
 use glam::DAffine3;
 use rayon::prelude::*;
 
+pub use accessories::stroke_notes;
 pub use assembly::{Assembly, AssemblyItem};
 pub use checks::check_assembly;
 pub use error::{Cure, PartError};

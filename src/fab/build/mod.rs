@@ -23,7 +23,9 @@ mod tree;
 
 pub use crate::hash::sha256_hex;
 pub use domecast_files::{WriteError, list_files};
-pub use manifest::{DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning};
+pub use manifest::{
+    DERIVED_NAME, DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning,
+};
 pub use measured::Measured;
 pub use tree::Tree;
 
@@ -158,6 +160,9 @@ fn make(
         tree.add(path.as_str(), bytes.clone());
     }
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
+    if !design.derived().is_empty() {
+        tree.add(DERIVED_NAME, derived(design));
+    }
     let sha256 = sha256_hex(design.text().as_bytes());
 
     step("trying the claimed loads");
@@ -276,6 +281,12 @@ fn averaging(design: &Design, forces: &constants::ForceReport) -> Option<String>
     ))
 }
 
+/// The fields that rules gave, for programs that read `design.json`.
+fn derived(design: &Design) -> Vec<u8> {
+    let told = |one: &domecast_design::DerivedField| serde_json::json!({ "field": one.field, "value": one.value, "rule": one.rule });
+    pretty(&design.derived().iter().map(told).collect::<Vec<_>>())
+}
+
 /// A file for programs.
 fn pretty(value: &impl serde::Serialize) -> Vec<u8> {
     // numbers, strings and lists only: nothing here can fail to be written
@@ -302,7 +313,8 @@ fn make_parts(
     let measures = springs.sight.measures()?;
     let made = parts::build_seated(design, measures, &layout.passes)?;
     let assembly = parts::Assembly::of(measures, &made)?;
-    let checked = parts::check_sensor(design, measures, &made, &assembly, &layout.dots)?;
+    let mut checked = parts::check_sensor(design, measures, &made, &assembly, &layout.dots)?;
+    checked.notes.extend(parts::stroke_notes(measures, &layout.passes));
     let files = parts::files(design, measures, &made, &assembly)?;
     let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
     Ok(MadeParts { made, assembly, checked, files, poses })

@@ -188,7 +188,7 @@ fn what_is_filled_in_is_what_each_ray_shows() {
 
 #[test]
 fn long_objects_are_filled_in_as_each_ray_shows_them() {
-    for design in ["thumb24", "thumb24-pinhole", "thumb24-fisheye"] {
+    for design in ["thumb24", "thumb24-pinhole", "thumb24-fisheye", "thumb24-wide"] {
         for object in OBJECTS {
             for level in ["geometric", "closed_form", "linear"] {
                 // The closed form knows balls.

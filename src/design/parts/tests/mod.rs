@@ -3,6 +3,7 @@ mod exactness;
 mod mechanism;
 mod random_designs;
 mod seats;
+mod strokes;
 mod sweep;
 mod walls;
 

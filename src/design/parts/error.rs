@@ -35,8 +35,17 @@ pub enum PartError {
     Broken {
         /// The part.
         part: String,
-        /// What is wrong with it.
+        /// What is wrong with it, with the features that meet.
         problem: String,
+        /// The design fields that decide those features: "A or B"; empty where none is known.
+        field: String,
+    },
+    /// Another fault, with a change that was tried and takes it away.
+    Cured {
+        /// The fault.
+        fault: Box<PartError>,
+        /// What would do.
+        cure: Cure,
     },
     /// A file cannot be made.
     Unwritable {
@@ -114,7 +123,7 @@ impl PartError {
     /// The change that takes this fault away, where one is known.
     pub fn cure(&self) -> Option<&Cure> {
         match self {
-            Self::Blocked { cure, .. } | Self::Unheld { cure, .. } => Some(cure),
+            Self::Blocked { cure, .. } | Self::Unheld { cure, .. } | Self::Cured { cure, .. } => Some(cure),
             _ => None,
         }
     }
@@ -141,7 +150,8 @@ impl fmt::Display for PartError {
                 }
                 Ok(())
             }
-            Self::Broken { part, problem } => write!(f, "{part}: {problem}"),
+            Self::Broken { part, problem, .. } => write!(f, "{part}: {problem}"),
+            Self::Cured { fault, cure } => write!(f, "{fault}; {cure}"),
             Self::Unwritable { path, problem } => write!(f, "{path}: {problem}"),
             Self::View { problem, field } => write!(f, "the camera's view: {problem}; change {field}"),
         }
@@ -200,12 +210,13 @@ impl From<PartError> for DesignError {
                 format!("{path}: {problem}"),
                 "a tolerance that suits the size",
             ),
-            PartError::Broken { part, problem } => Self::at(
-                "platforms",
+            PartError::Broken { part, problem, field } => Self::at(
+                if field.is_empty() { "platforms" } else { &field },
                 "",
                 format!("{part}: {problem}"),
                 "features that neither touch nor overlap",
             ),
+            PartError::Cured { fault, cure } => Self::from(*fault).with_cure(cure),
         }
     }
 }

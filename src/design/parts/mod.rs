@@ -32,6 +32,7 @@ mod files;
 mod image_rays;
 mod lower;
 mod measures;
+mod meeting;
 mod mould;
 mod openings;
 mod poses;
@@ -42,6 +43,7 @@ mod screws;
 mod seats;
 mod sight;
 mod traced;
+mod trial;
 mod undercut;
 mod upper;
 mod verdict;
@@ -100,6 +102,31 @@ pub struct Part {
 
 type Maker = fn(&Measures) -> Result<Blueprint, PartError>;
 
+/// The parts that every design has, by name, in their order.
+const MAKERS: [(&str, Maker); 7] = [
+    ("upper_platform", upper::blueprint),
+    ("lower_platform", lower::blueprint),
+    ("mould_cavity", mould::cavity),
+    ("mould_base", mould::base),
+    ("acrylic_sheet", accessories::sheet),
+    ("marker_stencil", accessories::stencil),
+    ("fit_coupon", accessories::coupon),
+];
+
+/// Name of the jig of a print pass.
+fn jig_name(i: usize, passes: &[PrintPass]) -> String {
+    if passes.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") }
+}
+
+/// A part before it is meshed, by its name.
+fn blueprint_of(m: &Measures, name: &str, passes: &[PrintPass]) -> Option<Result<Blueprint, PartError>> {
+    if let Some((_, make)) = MAKERS.iter().find(|(known, _)| *known == name) {
+        return Some(make(m));
+    }
+    let pass = (0..passes.len()).find(|i| jig_name(*i, passes) == name)?;
+    passes.get(pass).map(|pass| accessories::jig(m, name, pass))
+}
+
 impl Blueprint {
     /// Meshes the part, checks its walls, and looks at what came out.
     fn build(&self, m: &Measures) -> Result<Part, PartError> {
@@ -109,7 +136,8 @@ impl Blueprint {
         walls::check(self, m, made.as_ref().ok())?;
         let in_f64 = made.map_err(|error| PartError::Mesh { part: self.name.clone(), error })?;
         let mesh = in_f64.welded_f32();
-        let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
+        let broken =
+            |problem: String| PartError::Broken { part: self.name.clone(), problem, field: String::new() };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
         let genus = match inspect(&mesh).genus() {
             Some(found) if self.genus_is_min => found.max(self.genus),
@@ -126,8 +154,16 @@ impl Blueprint {
             bounds,
             mesh,
         };
-        part.check()?;
+        part.check().map_err(|fault| self.with_meetings(fault, m.process.min_wall_mm))?;
         Ok(part)
+    }
+
+    /// A broken part with the features that break it.
+    fn with_meetings(&self, fault: PartError, min_wall_mm: f64) -> PartError {
+        let PartError::Broken { part, problem, .. } = fault else { return fault };
+        let found = meeting::meetings(self, min_wall_mm);
+        let problem = format!("{problem}: {}", found.text);
+        PartError::Broken { part, problem, field: found.fields.join(" or ") }
     }
 }
 
@@ -154,7 +190,9 @@ impl Part {
         });
         match problem {
             None => Ok(()),
-            Some(problem) => Err(PartError::Broken { part: self.name.clone(), problem }),
+            Some(problem) => {
+                Err(PartError::Broken { part: self.name.clone(), problem, field: String::new() })
+            }
         }
     }
 
@@ -193,22 +231,13 @@ pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
 /// # Errors
 /// Why parts cannot be made: the first fault of each, in that order.
 pub fn build(m: &Measures, passes: &[PrintPass]) -> Result<Vec<Part>, PartError> {
-    let makers: [Maker; 7] = [
-        upper::blueprint,
-        lower::blueprint,
-        mould::cavity,
-        mould::base,
-        accessories::sheet,
-        accessories::stencil,
-        accessories::coupon,
-    ];
-    let jig = |i: usize| {
-        let name = if passes.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") };
-        passes.get(i).map(|pass| accessories::jig(m, &name, pass))
-    };
-    let results: Vec<Result<Part, PartError>> = (0..makers.len() + passes.len())
+    let results: Vec<Result<Part, PartError>> = (0..MAKERS.len() + passes.len())
         .into_par_iter()
-        .filter_map(|i| makers.get(i).map(|make| make(m)).or_else(|| jig(i - makers.len())))
+        .filter_map(|i| {
+            let maker = MAKERS.get(i).map(|(_, make)| make(m));
+            let jig = |i: usize| accessories::jig(m, &jig_name(i, passes), &passes[i]);
+            maker.or_else(|| Some(jig(i.checked_sub(MAKERS.len())?)))
+        })
         .map(|blueprint| blueprint?.build(m))
         .collect();
     let (mut made, mut faults) = (Vec::new(), Vec::new());

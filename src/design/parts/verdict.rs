@@ -1,7 +1,7 @@
 //! Everything that is checked of the assembled sensor, with all faults in one answer.
 
 use super::traced::{PoseSight, trace_sight};
-use super::{Assembly, Measures, Part, PartError, bearing, build, check_assembly, openings, seats};
+use super::{Assembly, Measures, Part, PartError, bearing, build, check_assembly, openings, seats, trial};
 use crate::layout::{Dot, PrintPass};
 use crate::spec::{Design, DesignWarning};
 
@@ -26,7 +26,7 @@ pub fn build_seated(design: &Design, m: &Measures, passes: &[PrintPass]) -> Resu
         faults.extend(openings::faults(design, m));
         faults.push(fault.clone());
     }
-    PartError::all(faults)?;
+    PartError::all(trial::with_cures(design, passes, faults))?;
     made
 }
 

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Part;
+use super::board::BoardSeat;
 use super::measures::Measures;
 use crate::spec::Design;
 use crate::spec::sections::LedColor;
@@ -32,6 +33,19 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
             "bought",
             "platforms.lower.clamp",
         ]);
+    }
+    if let Some(seat) = BoardSeat::of(m)
+        && let Some(thread) = seat.thread
+    {
+        let size = format!(
+            "{} x {:.0}, for a hole of {}",
+            thread.name,
+            (seat.board.thickness_mm + seat.hole_depth_mm).floor(),
+            thread.tap_mm
+        );
+        let count = seat.holes_mm.len().to_string();
+        let what = "thread-forming, holds the camera's board";
+        table.row(["board screw", &count, "piece", what, &size, "", "steel", "bought", "camera_body.board"]);
     }
     table.0
 }
@@ -117,7 +131,13 @@ fn made(design: &Design, m: &Measures, parts: &[Part], table: &mut Table) {
 fn purchased(design: &Design, m: &Measures, table: &mut Table) {
     let sections = design.sections();
     let body = &m.camera_body;
-    let camera = format!("diameter {} x {}", body.diameter_mm, body.length_mm);
+    let camera = match &body.board {
+        None => format!("diameter {} x {}", body.diameter_mm, body.length_mm),
+        Some(board) => format!(
+            "board {} x {} x {}, lens diameter {} x {}",
+            board.size_mm[0], board.size_mm[1], board.thickness_mm, body.diameter_mm, body.length_mm
+        ),
+    };
     let lens = format!(
         "camera {} x {} px, {} degrees",
         sections.camera.width, sections.camera.height, sections.camera.field_of_view_deg

@@ -23,6 +23,8 @@
 mod accessories;
 mod assembly;
 mod bearing;
+mod board;
+mod board_seat;
 mod bom;
 mod checks;
 mod drawing;

@@ -107,10 +107,11 @@ impl Design {
         sensor_from_camera(&self.sections.camera)
     }
 
-    /// Height of the camera's back on its axis, mm.
+    /// Height of the camera's back on its axis, mm; of a board that of what stands on its back.
     pub fn camera_back_z_mm(&self) -> f64 {
         let body = &self.sections.camera_body;
-        self.sections.camera.position_mm[2] + body.front_from_pupil_mm - body.length_mm
+        let board_mm = body.board.as_ref().map_or(0.0, |b| b.thickness_mm + b.components_height_mm);
+        self.sections.camera.position_mm[2] + body.front_from_pupil_mm - body.length_mm - board_mm
     }
 
     /// Lowest and highest corner of the whole sensor at rest, mm.

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 
+use super::body_rules;
 use super::design::{Design, DesignWarning, sensor_from_camera, with_lints};
 use super::error::DesignError;
 use super::lints::lints;
@@ -69,6 +70,7 @@ pub(super) fn resolve(mut sections: DesignFile, text: &str) -> Result<Design, De
     sections.mesh.chord_tolerance_mm = Some(settings.chord_tolerance_mm.value);
     sections.mesh.optical_chord_tolerance_mm = Some(settings.optical_chord_tolerance_mm.value);
     sections.tolerances.samples = Some(settings.samples.value);
+    body_rules::check(&sections).map_err(|fault| with_lints(fault, &lints))?;
     let design = Design { sections, text: text.to_owned(), optics, warnings, lints, settings };
     rules::check(&design).map_err(|fault| design.with_lints(fault))?;
     Ok(design)

@@ -159,15 +159,7 @@ fn dots_and_assembly(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
             ),
         ),
         step("Lights", lights_text(subject)),
-        step(
-            "Camera",
-            html!(
-                "Push the camera in from below until its front stands {} mm above the entrance pupil's place at z = {} mm, and \
-                 clamp it. Image axes are the sensor's axes.",
-                n(s.camera_body.front_from_pupil_mm),
-                n(s.camera.position_mm[2]),
-            ),
-        ),
+        step("Camera", camera_text(subject)),
         step(
             "Calibrate",
             html!(
@@ -178,6 +170,26 @@ fn dots_and_assembly(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
             ),
         ),
     ]
+}
+
+fn camera_text(subject: &ReportSubject<'_>) -> Html {
+    let s = subject.design.sections();
+    let n = typeset;
+    match &s.camera_body.board {
+        None => html!(
+            "Push the camera in from below until its front stands {} mm above the entrance pupil's place at z = {} mm, and \
+             clamp it. Image axes are the sensor's axes.",
+            n(s.camera_body.front_from_pupil_mm),
+            n(s.camera.position_mm[2]),
+        ),
+        Some(board) => html!(
+            "Lay the board into its pocket from below, the lens barrel in the bore, and screw it against its {} posts. The \
+             front glass then stands {} mm above the entrance pupil's place at z = {} mm. Image axes are the sensor's axes.",
+            board.holes_mm.len(),
+            n(s.camera_body.front_from_pupil_mm),
+            n(s.camera.position_mm[2]),
+        ),
+    }
 }
 
 /// Area of the dome's surface, mm^2.

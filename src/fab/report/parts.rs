@@ -51,7 +51,7 @@ pub(super) fn fits(subject: &ReportSubject<'_>) -> Html {
     let rows = [
         ("magnet in its pocket", s.magnets.diameter_mm, pocket, "magnet_pockets.diameter_clearance_mm"),
         (
-            "camera in its bore",
+            if s.camera_body.board.is_some() { "lens barrel in its bore" } else { "camera in its bore" },
             s.camera_body.diameter_mm,
             s.camera_body.diameter_mm + 2.0 * s.camera_body.bore_clearance_mm,
             "camera_body.bore_clearance_mm",

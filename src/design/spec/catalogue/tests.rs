@@ -23,7 +23,7 @@ fn every_entry_is_complete_and_has_sources() {
                 assert!(fact.source.len() > 8, "{} {name}: a source is missing", entry.key);
                 assert!(!fact.value.is_null() && name.contains('.'), "{} {name}", entry.key);
                 let explained = match name.split_once('.') {
-                    Some(("body" | "sensor", _)) => continue,
+                    Some(("sensor", _)) => continue,
                     Some(("layer", field)) => format!("optics.layers.{field}"),
                     _ => name.clone(),
                 };

@@ -14,6 +14,7 @@
 //! ```
 
 mod accuracy;
+mod body;
 mod camera;
 mod light;
 mod loads;
@@ -32,7 +33,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use accuracy::AccuracySection;
-pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
+pub use body::{CameraBoardSection, CameraBodyKind, CameraBodySection};
+pub use camera::{CameraSection, ModelName, RuntimeSection};
 pub use light::{DiffuserSection, ExposureSection, PowerRgb, ReflectanceRgb};
 pub use loads::{CentroidNoiseSection, LoadClaim, LoadsSection, WhiteMarkersSection};
 pub use making::{

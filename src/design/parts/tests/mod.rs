@@ -1,3 +1,4 @@
+mod boards;
 mod checks;
 mod exactness;
 mod mechanism;

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::Part;
 use super::board::BoardSeat;
 use super::measures::Measures;
+use super::mount;
 use crate::spec::Design;
 use crate::spec::sections::LedColor;
 
@@ -144,6 +145,16 @@ fn purchased(design: &Design, m: &Measures, table: &mut Table) {
     );
     let bore = format!("diameter +{}/-any", 2.0 * body.bore_clearance_mm);
     table.row(["camera", "1", "piece", &lens, &camera, &bore, "", "bought", "camera_body"]);
+    if m.mount.is_rigid() {
+        let count = m.mount.at_mm.len().to_string();
+        let size = mount::thread(m).map_or_else(String::new, |thread| {
+            let through = m.platforms.upper.underside_z_mm - m.platforms.lower.underside_z_mm;
+            format!("{} x {:.0}, heads sunk", thread.name, (through - thread.nominal_mm).floor() + 2.0 * thread.nominal_mm)
+        });
+        let what = "thread-forming, holds the upper platform on its posts";
+        table.row(["post screw", &count, "piece", what, &size, "", "steel", "bought", "mount"]);
+        return;
+    }
     let count = m.spring_axes_mm.len().to_string();
     let springs = &sections.springs;
     let size = format!(

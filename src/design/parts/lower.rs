@@ -4,6 +4,7 @@ use glam::{DAffine3, DVec3};
 
 use super::board::BoardSeat;
 use super::measures::{Measures, polar};
+use super::mount;
 use super::{Blueprint, Feature, PartError};
 use domecast_mesh::{Fit, Profile, Shape};
 
@@ -35,7 +36,11 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     let h = 0.5 * m.outer_mm;
     let mut b = Blueprint::new(
         "lower_platform",
-        "lower platform: camera bore, clamp, magnet pockets, mounting holes, cable exit; printed",
+        if m.mount.is_rigid() {
+            "lower platform: camera seat, posts, mounting holes, cable exit; printed"
+        } else {
+            "lower platform: camera bore, clamp, magnet pockets, mounting holes, cable exit; printed"
+        },
         m.chord,
     );
     b.may_meet = MAY_MEET;
@@ -80,6 +85,7 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     }
 
     m.cut_magnet_pockets(&mut b, top, bottom - over);
+    mount::lower(m, &mut b);
 
     mounting_holes(m, &mut b)?;
     if lower.wire_hole_diameter_mm > 0.0 {

@@ -35,6 +35,7 @@ mod image_rays;
 mod lower;
 mod measures;
 mod mould;
+mod mount;
 mod openings;
 mod poses;
 mod process;
@@ -194,7 +195,7 @@ pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
 /// # Errors
 /// Why parts cannot be made: the first fault of each, in that order.
 pub fn build(m: &Measures, passes: &[PrintPass]) -> Result<Vec<Part>, PartError> {
-    let makers: [Maker; 7] = [
+    let all: [Maker; 7] = [
         upper::blueprint,
         lower::blueprint,
         mould::cavity,
@@ -203,6 +204,10 @@ pub fn build(m: &Measures, passes: &[PrintPass]) -> Result<Vec<Part>, PartError>
         accessories::stencil,
         accessories::coupon,
     ];
+    // No markers, no stencil.
+    let stencil = all.len() - 2;
+    let is_made = |(i, _): &(usize, Maker)| *i != stencil || !m.markers_mm.is_empty();
+    let makers: Vec<Maker> = all.into_iter().enumerate().filter(is_made).map(|(_, make)| make).collect();
     let jig = |i: usize| {
         let name = if passes.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") };
         passes.get(i).map(|pass| accessories::jig(m, &name, pass))

@@ -37,7 +37,9 @@ pub(super) fn faults(design: &Design, m: &Measures) -> Vec<PartError> {
     found.extend(camera_in_block(m));
     set_screws(m, &mut found);
     cable_exit(m, &mut found);
-    magnets_and_springs(design, m, &mut found);
+    if !design.is_rigid() {
+        magnets_and_springs(design, m, &mut found);
+    }
     lights(m, &mut found);
     mounting(m, &mut found);
     mould_pins(m, &mut found);

@@ -78,9 +78,17 @@ impl Design {
         -self.sheet_thickness_mm()
     }
 
-    /// Height of the lower platform's top at rest: one free spring length below the upper platform, mm.
+    /// Whether the upper platform stands on posts, and no net wrench is promised.
+    pub fn is_rigid(&self) -> bool {
+        self.sections.mount.is_rigid()
+    }
+
+    /// Height of the lower platform's top at rest: one free spring length below the upper platform, or the height of a
+    /// rigid mount's posts, mm.
     pub fn lower_top_z_mm(&self) -> f64 {
-        self.sections.platforms.upper.underside_z_mm - self.sections.springs.free_length_mm
+        let mount = &self.sections.mount;
+        let gap_mm = if mount.is_rigid() { mount.height_mm } else { self.sections.springs.free_length_mm };
+        self.sections.platforms.upper.underside_z_mm - gap_mm
     }
 
     /// x, y of every spring's axis, mm.

@@ -13,6 +13,7 @@ mod error;
 mod explain;
 mod fill;
 mod lints;
+mod mount_rules;
 mod resolve;
 mod rules;
 mod schema;

@@ -6,6 +6,7 @@ use super::body_rules;
 use super::design::{Design, DesignWarning, sensor_from_camera, with_lints};
 use super::error::DesignError;
 use super::lints::lints;
+use super::mount_rules;
 use super::rules;
 use super::sections::{CameraSection, DesignFile, DomeSection, ModelName, OpticsSection};
 use super::settings::Settings;
@@ -70,6 +71,7 @@ pub(super) fn resolve(mut sections: DesignFile, text: &str) -> Result<Design, De
     sections.mesh.chord_tolerance_mm = Some(settings.chord_tolerance_mm.value);
     sections.mesh.optical_chord_tolerance_mm = Some(settings.optical_chord_tolerance_mm.value);
     sections.tolerances.samples = Some(settings.samples.value);
+    mount_rules::check(&sections).map_err(|fault| with_lints(fault, &lints))?;
     body_rules::check(&sections).map_err(|fault| with_lints(fault, &lints))?;
     let design = Design { sections, text: text.to_owned(), optics, warnings, lints, settings };
     rules::check(&design).map_err(|fault| design.with_lints(fault))?;

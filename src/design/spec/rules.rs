@@ -189,6 +189,9 @@ fn pattern(design: &Design) -> Result<(), DesignError> {
 }
 
 fn springs(design: &Design) -> Result<(), DesignError> {
+    if design.sections().mount.is_rigid() {
+        return Ok(());
+    }
     let springs = &design.sections().springs;
     if springs.outer_diameter_mm <= 2.0 * springs.wire_diameter_mm {
         return Err(DesignError::at(

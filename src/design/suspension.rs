@@ -30,7 +30,12 @@ pub fn suspension_of(design: &Design) -> Result<Suspension, DesignError> {
     let sections = design.sections();
     if design.is_rigid() {
         let problem = "rigid mount: no springs carry the platform, and no net wrench is promised";
-        return Err(DesignError::at("mount.kind", "rigid", problem, "\"springs\" for what works with loads and poses"));
+        return Err(DesignError::at(
+            "mount.kind",
+            "rigid",
+            problem,
+            "\"springs\" for what works with loads and poses",
+        ));
     }
     let (springs, magnets) = (&sections.springs, &sections.magnets);
     let spring = Spring::new(SpringSpec {

@@ -99,12 +99,14 @@ impl BoardSeat {
         b.cut.push(Feature::new("board pocket", field, pocket).placed(m.sensor_from_camera));
         if self.recess_mm > 0.0 {
             let (floor, roof) = (face - over, face + self.recess_mm);
-            let along_x = self.bands_mm(0).into_iter().map(|[from, to]| {
-                (DVec3::new(from, low.y, floor), DVec3::new(to, high.y, roof))
-            });
-            let along_y = self.bands_mm(1).into_iter().map(|[from, to]| {
-                (DVec3::new(low.x, from, floor), DVec3::new(high.x, to, roof))
-            });
+            let along_x = self
+                .bands_mm(0)
+                .into_iter()
+                .map(|[from, to]| (DVec3::new(from, low.y, floor), DVec3::new(to, high.y, roof)));
+            let along_y = self
+                .bands_mm(1)
+                .into_iter()
+                .map(|[from, to]| (DVec3::new(low.x, from, floor), DVec3::new(high.x, to, roof)));
             for (i, (low, high)) in along_x.chain(along_y).enumerate() {
                 let feature = Feature::new("board recess", field, Shape::cuboid(low, high));
                 b.cut.push(feature.numbered(i).placed(m.sensor_from_camera));
@@ -112,7 +114,8 @@ impl BoardSeat {
         }
         let Some(thread) = self.thread.filter(|_| self.hole_depth_mm > 0.0) else { return };
         for (i, at) in self.holes_mm.iter().enumerate() {
-            let hole = Shape::cylinder(0.5 * thread.tap_mm, face - over, face + self.hole_depth_mm, Fit::Area);
+            let hole =
+                Shape::cylinder(0.5 * thread.tap_mm, face - over, face + self.hole_depth_mm, Fit::Area);
             let placed = m.sensor_from_camera * DAffine3::from_translation(at.extend(0.0));
             b.cut.push(Feature::new("board screw hole", field, hole).numbered(i).placed(placed));
         }

@@ -137,7 +137,8 @@ fn room_below(m: &Measures, seat: &BoardSeat, thread: &Thread) -> Option<PartErr
 
 /// What the finished lower platform lacks: posts under the board, material round its screws.
 pub(super) fn bearing(m: &Measures, assembly: &Assembly) -> Vec<PartError> {
-    let Some((seat, thread)) = BoardSeat::of(m).and_then(|seat| Some((seat.thread?, seat)).map(|(t, s)| (s, t)))
+    let Some((seat, thread)) =
+        BoardSeat::of(m).and_then(|seat| Some((seat.thread?, seat)).map(|(t, s)| (s, t)))
     else {
         return Vec::new();
     };
@@ -150,14 +151,14 @@ pub(super) fn bearing(m: &Measures, assembly: &Assembly) -> Vec<PartError> {
         lower.is_hit(m.sensor_from_camera.transform_point3(from), m.sensor_from_camera.transform_point3(to))
     };
     let round = |at: DVec2, radius: f64| {
-        (0..AROUND).map(move |k| at + radius * DVec2::from_angle(TAU * (f64::from(k) + 0.5) / f64::from(AROUND)))
+        (0..AROUND)
+            .map(move |k| at + radius * DVec2::from_angle(TAU * (f64::from(k) + 0.5) / f64::from(AROUND)))
     };
     let (face, tap) = (seat.face_z_mm, 0.5 * thread.tap_mm);
     let mut found = Vec::new();
     for (i, &at) in seat.holes_mm.iter().enumerate() {
         let ring = 0.5 * (tap + seat.post_mm);
-        let backed =
-            round(at, ring).filter(|p| hit(p.extend(face - skin), p.extend(face + skin))).count();
+        let backed = round(at, ring).filter(|p| hit(p.extend(face - skin), p.extend(face + skin))).count();
         let share = backed as f64 / f64::from(AROUND);
         if share < MIN_BACKED {
             let place = format!(

@@ -149,7 +149,11 @@ fn purchased(design: &Design, m: &Measures, table: &mut Table) {
         let count = m.mount.at_mm.len().to_string();
         let size = mount::thread(m).map_or_else(String::new, |thread| {
             let through = m.platforms.upper.underside_z_mm - m.platforms.lower.underside_z_mm;
-            format!("{} x {:.0}, heads sunk", thread.name, (through - thread.nominal_mm).floor() + 2.0 * thread.nominal_mm)
+            format!(
+                "{} x {:.0}, heads sunk",
+                thread.name,
+                (through - thread.nominal_mm).floor() + 2.0 * thread.nominal_mm
+            )
         });
         let what = "thread-forming, holds the upper platform on its posts";
         table.row(["post screw", &count, "piece", what, &size, "", "steel", "bought", "mount"]);

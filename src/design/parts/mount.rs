@@ -85,7 +85,11 @@ pub(super) fn faults(m: &Measures) -> Vec<PartError> {
     let Some(thread) = thread(m) else {
         let least = THREADS[0].clearance_mm;
         let cure = Cure::length("mount.hole_diameter_mm", hole, least);
-        return vec![unheld("no screw is as thin as the posts' holes; their diameter".into(), [hole, least], cure)];
+        return vec![unheld(
+            "no screw is as thin as the posts' holes; their diameter".into(),
+            [hole, least],
+            cure,
+        )];
     };
     let mut found = Vec::new();
     let (wall, post) = (m.process.min_wall_mm, m.mount.post_diameter_mm);
@@ -106,7 +110,9 @@ pub(super) fn faults(m: &Measures) -> Vec<PartError> {
 /// What the finished upper platform lacks above the posts: a face that bears, material round the screws.
 pub(super) fn bearing(m: &Measures, assembly: &Assembly) -> Vec<PartError> {
     let upper = assembly.items.iter().find(|item| item.name == "upper_platform");
-    let Some((thread, upper)) = thread(m).zip(upper).filter(|_| m.mount.is_rigid()) else { return Vec::new() };
+    let Some((thread, upper)) = thread(m).zip(upper).filter(|_| m.mount.is_rigid()) else {
+        return Vec::new();
+    };
     let upper = RayTarget::new(&upper.mesh);
     let (under, tap) = (m.platforms.upper.underside_z_mm, 0.5 * thread.tap_mm);
     let skin = 2.0 * m.chord.tolerance_mm() + 0.01;

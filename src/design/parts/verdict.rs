@@ -1,7 +1,9 @@
 //! Everything that is checked of the assembled sensor, with all faults in one answer.
 
 use super::traced::{PoseSight, trace_sight};
-use super::{Assembly, Measures, Part, PartError, bearing, board_seat, build, check_assembly, mount, openings, seats};
+use super::{
+    Assembly, Measures, Part, PartError, bearing, board_seat, build, check_assembly, mount, openings, seats,
+};
 use crate::layout::{Dot, PrintPass};
 use crate::spec::{Design, DesignWarning};
 

@@ -33,7 +33,12 @@ pub(super) fn check(sections: &DesignFile) -> Result<(), DesignError> {
             Ok(())
         } else {
             let problem = "posts are given, but the platform stands on springs";
-            Err(DesignError::at("mount.at_mm", json!(mount.at_mm), problem, "mount.kind = \"rigid\", or no posts"))
+            Err(DesignError::at(
+                "mount.at_mm",
+                json!(mount.at_mm),
+                problem,
+                "mount.kind = \"rigid\", or no posts",
+            ))
         };
     }
     let cannot = |field: &str, value: Value, problem: &str, allowed: &str| {
@@ -53,7 +58,12 @@ pub(super) fn check(sections: &DesignFile) -> Result<(), DesignError> {
     }
     let markers = sections.white_markers.positions_mm.len();
     if markers > 0 {
-        return cannot("white_markers.positions_mm", json!(markers), "no pose is looked for", "no such section");
+        return cannot(
+            "white_markers.positions_mm",
+            json!(markers),
+            "no pose is looked for",
+            "no such section",
+        );
     }
     if mount.at_mm.len() < 2 {
         let problem = "the upper platform stands on too few posts";
@@ -69,7 +79,12 @@ pub(super) fn check(sections: &DesignFile) -> Result<(), DesignError> {
         }
         let near = |other: &[f64; 2]| DVec2::from_array(*other).distance(place) < mount.post_diameter_mm;
         if mount.at_mm[..i].iter().any(near) {
-            return cannot(&field, json!(at), "the post overlaps another", "posts apart by a diameter or more");
+            return cannot(
+                &field,
+                json!(at),
+                "the post overlaps another",
+                "posts apart by a diameter or more",
+            );
         }
     }
     Ok(())

@@ -38,7 +38,11 @@ fn the_shipped_board_is_held() {
 #[test]
 fn a_board_that_does_not_fit_is_refused() {
     let sizes = json!([64.0, 30.0]);
-    refused("platforms.outer_mm", &["wall beside the board's pocket"], &[("camera_body.board.size_mm", sizes)]);
+    refused(
+        "platforms.outer_mm",
+        &["wall beside the board's pocket"],
+        &[("camera_body.board.size_mm", sizes)],
+    );
     refused(
         "camera.position_mm[2]",
         &["block above the board"],

@@ -27,12 +27,7 @@ pub struct WhiteMarkersSection {
 /// What stands for the section where a rigid mount leaves it out.
 impl Default for WhiteMarkersSection {
     fn default() -> Self {
-        Self {
-            positions_mm: Vec::new(),
-            diameter_mm: 1.0,
-            reflectance: 0.0,
-            why: None,
-        }
+        Self { positions_mm: Vec::new(), diameter_mm: 1.0, reflectance: 0.0, why: None }
     }
 }
 

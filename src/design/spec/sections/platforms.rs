@@ -152,12 +152,7 @@ pub struct MagnetPocketsSection {
 /// What stands for the section where a rigid mount leaves it out.
 impl Default for MagnetPocketsSection {
     fn default() -> Self {
-        Self {
-            diameter_clearance_mm: 0.0,
-            depth_clearance_mm: 0.0,
-            push_out_diameter_mm: 0.0,
-            why: None,
-        }
+        Self { diameter_clearance_mm: 0.0, depth_clearance_mm: 0.0, push_out_diameter_mm: 0.0, why: None }
     }
 }
 

@@ -83,8 +83,7 @@ mod tests {
         for constants in &all {
             let written =
                 [Ok(opencv_yaml(constants)), Ok(camera_info_yaml(constants)), kalibr_yaml(constants)];
-            let write =
-                [opencv_yaml, camera_info_yaml, |c: &Constants| kalibr_yaml(c).unwrap()];
+            let write = [opencv_yaml, camera_info_yaml, |c: &Constants| kalibr_yaml(c).unwrap()];
             for (text, write) in written.into_iter().zip(write) {
                 let Ok(text) = text else { continue };
                 let read = CameraCalibration::parse(&text, &CalibrationHints::default()).unwrap();

@@ -121,8 +121,9 @@ def check_build(folder):
             first = np.degrees(np.arcsin(min(s for s, n in zip(sines, names) if n is not None)))
             detail += f"; {len(lost)} blocked from {first:.1f} degrees, most by {worst}"
         check(f"no {what[:-1] if what.endswith('s') else what} is behind a part", not lost, detail)
-    # The check sees walls: rays spread by a third beyond the markers meet the platforms.
-    pupil, ends, _ = air_rays(constants, markers or dots)
+    # The check sees walls: rays spread by a third beyond the markers (the dome's rim without them) meet the platforms.
+    edge = markers or list(rims(np.zeros(3), np.array([0, 0, 1.0]), radius))
+    pupil, ends, _ = air_rays(constants, edge)
     wide = pupil + (ends - pupil) * np.array([1.33, 1.33, 1.0])
     check("wider rays do meet parts", any(n is not None for n in blocked(meshes, pupil, wide)))
 

@@ -3,6 +3,7 @@ mod checks;
 mod exactness;
 mod mechanism;
 mod random_designs;
+mod rigid;
 mod seats;
 mod sweep;
 mod walls;

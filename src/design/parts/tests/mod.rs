@@ -1,7 +1,9 @@
+mod boards;
 mod checks;
 mod exactness;
 mod mechanism;
 mod random_designs;
+mod rigid;
 mod seats;
 mod strokes;
 mod sweep;

@@ -10,6 +10,7 @@ and camchain. yourdfpy: URDF. mujoco: MJCF, stepped under a known load.
 import json
 import pathlib
 import sys
+import xml.etree.ElementTree as ET
 
 import cv2
 import numpy as np
@@ -326,12 +327,30 @@ def check_robots(folder, constants):
     check("MJCF: the 6x6 gives way as the constants say", np.allclose(moved, want, rtol=2e-3, atol=2e-6), str(np.round(moved, 5)))
 
 
+def check_rigid(root, constants):
+    """Without springs nothing moves: no marker, no wrench, no joint that could give way."""
+    folder, report = root / "constants", json.loads((root / "report" / "force.json").read_text())
+    check("rigid mount: no net wrench", report == {"mount": "rigid", "status": "rigid mount: no net wrench"})
+    check("rigid mount: no white markers", constants["white_markers"] == [])
+    store = cv2.FileStorage(str(folder / "opencv.yaml"), cv2.FileStorage_READ)
+    same = np.array_equal(numbers(store, "camera_matrix"), np.array(constants["camera"]["matrix"]))
+    check("cv2.FileStorage reads opencv.yaml", same and store.getNode("springs_stiffness").empty())
+    mjcf, urdf = ET.parse(folder / "sensor.xml").getroot(), ET.parse(folder / "sensor.urdf").getroot()
+    check("MJCF: no joint", not list(mjcf.iter("joint")) and not list(mjcf.iter("tendon")))
+    check("URDF: fixed joints alone", {j.get("type") for j in urdf.findall("joint")} == {"fixed"})
+
+
 for argument in sys.argv[1:]:
     print(argument)
     root = pathlib.Path(argument)
     folder = root / "constants"
     constants = json.loads((folder / "constants.json").read_text())
     check_layer_free(constants)
+    if "springs" not in constants:
+        check_rigid(root, constants)
+        check_ros(folder, constants)
+        check_kalibr(folder, constants)
+        continue
     check_spring_law(constants)
     check_opencv(folder, constants)
     check_ros(folder, constants)

@@ -69,7 +69,11 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
     let c = &m.coupon;
     let mut b = Blueprint::new(
         "fit_coupon",
-        "test piece: magnet pockets and camera bores in steps of diameter, smallest at the cut corner; printed",
+        if m.spring_axes_mm.is_empty() {
+            "test piece: camera bores in steps of diameter, smallest at the cut corner; printed"
+        } else {
+            "test piece: magnet pockets and camera bores in steps of diameter, smallest at the cut corner; printed"
+        },
         m.chord,
     );
     let (pocket, depth) = m.pocket_mm();
@@ -77,7 +81,8 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
     let steps = i64::from(c.steps);
     let grow = 0.5 * c.step_mm * steps as f64;
     let wall = (2.0 * m.process.min_wall_mm).max(0.5 * pocket);
-    if pocket <= grow {
+    let has_magnets = !m.spring_axes_mm.is_empty();
+    if has_magnets && pocket <= grow {
         return Err(b.infeasible("radius of the smallest pocket", pocket - grow, 0.0, "coupon.step_mm"));
     }
     let pitch = 2.0 * (bore.max(pocket) + grow) + wall;
@@ -103,13 +108,15 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
         let i = usize::try_from(k + steps).unwrap_or(0);
         let x = pitch * k as f64;
         let d = 0.5 * c.step_mm * k as f64;
-        let y = low_y + 0.5 * rows.x;
-        let shape = Shape::cylinder(pocket + d, height - depth, height + over, Fit::Outside);
-        b.cut.push(Feature::new("magnet pocket", "coupon.step_mm", shape).numbered(i).at(x, y));
-        if push_out > 0.0 {
-            let hole = Shape::cylinder(push_out, -over, height - 0.5 * depth, Fit::Outside);
-            b.cut.push(Feature::new("push-out hole", "coupon.step_mm", hole).numbered(i).at(x, y));
-            b.genus += 1;
+        if has_magnets {
+            let y = low_y + 0.5 * rows.x;
+            let shape = Shape::cylinder(pocket + d, height - depth, height + over, Fit::Outside);
+            b.cut.push(Feature::new("magnet pocket", "coupon.step_mm", shape).numbered(i).at(x, y));
+            if push_out > 0.0 {
+                let hole = Shape::cylinder(push_out, -over, height - 0.5 * depth, Fit::Outside);
+                b.cut.push(Feature::new("push-out hole", "coupon.step_mm", hole).numbered(i).at(x, y));
+                b.genus += 1;
+            }
         }
         let y = -low_y - 0.5 * rows.y;
         let shape = Shape::cylinder(bore + d, -over, height + over, Fit::Outside);

@@ -55,6 +55,9 @@ fn skin_mm(m: &Measures) -> f64 {
 /// Length of the bore that stands round the camera's body.
 fn bore(m: &Measures, lower: &RayTarget) -> Option<PartError> {
     let body = &m.camera_body;
+    if body.board.is_some() {
+        return None;
+    }
     let reach = m.bore_radius_mm() + skin_mm(m);
     let engaged = (0..HEIGHTS)
         .filter(|&h| {

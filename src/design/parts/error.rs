@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+pub use crate::spec::Cure;
 use crate::spec::DesignError;
 use domecast_mesh::MeshError;
 
@@ -34,8 +35,17 @@ pub enum PartError {
     Broken {
         /// The part.
         part: String,
-        /// What is wrong with it.
+        /// What is wrong with it, with the features that meet.
         problem: String,
+        /// The design fields that decide those features: "A or B"; empty where none is known.
+        field: String,
+    },
+    /// Another fault, with a change that was tried and takes it away.
+    Cured {
+        /// The fault.
+        fault: Box<PartError>,
+        /// What would do.
+        cure: Cure,
     },
     /// A file cannot be made.
     Unwritable {
@@ -83,36 +93,6 @@ pub enum PartError {
     },
 }
 
-/// A change of the design that takes a fault away.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cure {
-    /// The field, as a path from the top.
-    pub field: String,
-    /// Its new value.
-    pub value: serde_json::Value,
-}
-
-impl Cure {
-    /// A number for a field, rounded to 0.01 mm away from `from`, so that rounding never undoes it.
-    pub(super) fn length(field: impl Into<String>, from: f64, to: f64) -> Self {
-        let steps = 100.0 * to;
-        // A hundredth that is met but for rounding stays.
-        let rounded = if to >= from { (steps - 1e-6).ceil() } else { (steps + 1e-6).floor() };
-        Self { field: field.into(), value: serde_json::json!(rounded / 100.0) }
-    }
-
-    /// Any value for a field.
-    pub(super) fn value(field: impl Into<String>, value: serde_json::Value) -> Self {
-        Self { field: field.into(), value }
-    }
-}
-
-impl fmt::Display for Cure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {} would do", self.field, self.value)
-    }
-}
-
 impl PartError {
     /// One error of all: nothing if there is none.
     ///
@@ -143,7 +123,7 @@ impl PartError {
     /// The change that takes this fault away, where one is known.
     pub fn cure(&self) -> Option<&Cure> {
         match self {
-            Self::Blocked { cure, .. } | Self::Unheld { cure, .. } => Some(cure),
+            Self::Blocked { cure, .. } | Self::Unheld { cure, .. } | Self::Cured { cure, .. } => Some(cure),
             _ => None,
         }
     }
@@ -170,7 +150,8 @@ impl fmt::Display for PartError {
                 }
                 Ok(())
             }
-            Self::Broken { part, problem } => write!(f, "{part}: {problem}"),
+            Self::Broken { part, problem, .. } => write!(f, "{part}: {problem}"),
+            Self::Cured { fault, cure } => write!(f, "{fault}; {cure}"),
             Self::Unwritable { path, problem } => write!(f, "{path}: {problem}"),
             Self::View { problem, field } => write!(f, "the camera's view: {problem}; change {field}"),
         }
@@ -194,7 +175,7 @@ impl From<PartError> for DesignError {
                 format!("{part}: blocks the camera's view {when} from {angle_deg:.1} degrees: {shares}"),
                 "every ray of the image free from the pupil to the sheet, at rest and under every claimed load",
             )
-            .with_help(cure.to_string()),
+            .with_cure(cure),
             PartError::Unheld { part, by, problem, value_mm, limit_mm, cure } => Self::at(
                 cure.field.clone(),
                 "",
@@ -204,7 +185,7 @@ impl From<PartError> for DesignError {
                 ),
                 format!("a limit of {limit_mm:.3} mm"),
             )
-            .with_help(cure.to_string()),
+            .with_cure(cure),
             PartError::Several(faults) => {
                 let mut all = faults.into_iter().map(Self::from);
                 let first =
@@ -229,12 +210,13 @@ impl From<PartError> for DesignError {
                 format!("{path}: {problem}"),
                 "a tolerance that suits the size",
             ),
-            PartError::Broken { part, problem } => Self::at(
-                "platforms",
+            PartError::Broken { part, problem, field } => Self::at(
+                if field.is_empty() { "platforms" } else { &field },
                 "",
                 format!("{part}: {problem}"),
                 "features that neither touch nor overlap",
             ),
+            PartError::Cured { fault, cure } => Self::from(*fault).with_cure(cure),
         }
     }
 }

@@ -23,6 +23,8 @@
 mod accessories;
 mod assembly;
 mod bearing;
+mod board;
+mod board_seat;
 mod bom;
 mod checks;
 mod drawing;
@@ -32,7 +34,9 @@ mod files;
 mod image_rays;
 mod lower;
 mod measures;
+mod meeting;
 mod mould;
+mod mount;
 mod openings;
 mod poses;
 mod process;
@@ -42,6 +46,7 @@ mod screws;
 mod seats;
 mod sight;
 mod traced;
+mod trial;
 mod undercut;
 mod upper;
 mod verdict;
@@ -100,6 +105,34 @@ pub struct Part {
 
 type Maker = fn(&Measures) -> Result<Blueprint, PartError>;
 
+/// Name of the part that only a design with white markers has.
+const STENCIL: &str = "marker_stencil";
+
+/// The parts of a design by name, in their order.
+const MAKERS: [(&str, Maker); 7] = [
+    ("upper_platform", upper::blueprint),
+    ("lower_platform", lower::blueprint),
+    ("mould_cavity", mould::cavity),
+    ("mould_base", mould::base),
+    ("acrylic_sheet", accessories::sheet),
+    (STENCIL, accessories::stencil),
+    ("fit_coupon", accessories::coupon),
+];
+
+/// Name of the jig of a print pass.
+fn jig_name(i: usize, passes: &[PrintPass]) -> String {
+    if passes.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") }
+}
+
+/// A part before it is meshed, by its name.
+fn blueprint_of(m: &Measures, name: &str, passes: &[PrintPass]) -> Option<Result<Blueprint, PartError>> {
+    if let Some((_, make)) = MAKERS.iter().find(|(known, _)| *known == name) {
+        return Some(make(m));
+    }
+    let pass = (0..passes.len()).find(|i| jig_name(*i, passes) == name)?;
+    passes.get(pass).map(|pass| accessories::jig(m, name, pass))
+}
+
 impl Blueprint {
     /// Meshes the part, checks its walls, and looks at what came out.
     fn build(&self, m: &Measures) -> Result<Part, PartError> {
@@ -109,7 +142,8 @@ impl Blueprint {
         walls::check(self, m, made.as_ref().ok())?;
         let in_f64 = made.map_err(|error| PartError::Mesh { part: self.name.clone(), error })?;
         let mesh = in_f64.welded_f32();
-        let broken = |problem: String| PartError::Broken { part: self.name.clone(), problem };
+        let broken =
+            |problem: String| PartError::Broken { part: self.name.clone(), problem, field: String::new() };
         let bounds = mesh.bounds().ok_or_else(|| broken("the mesh is empty".into()))?;
         let genus = match inspect(&mesh).genus() {
             Some(found) if self.genus_is_min => found.max(self.genus),
@@ -126,8 +160,16 @@ impl Blueprint {
             bounds,
             mesh,
         };
-        part.check()?;
+        part.check().map_err(|fault| self.with_meetings(fault, m.process.min_wall_mm))?;
         Ok(part)
+    }
+
+    /// A broken part with the features that break it.
+    fn with_meetings(&self, fault: PartError, min_wall_mm: f64) -> PartError {
+        let PartError::Broken { part, problem, .. } = fault else { return fault };
+        let found = meeting::meetings(self, min_wall_mm);
+        let problem = format!("{problem}: {}", found.text);
+        PartError::Broken { part, problem, field: found.fields.join(" or ") }
     }
 }
 
@@ -154,7 +196,9 @@ impl Part {
         });
         match problem {
             None => Ok(()),
-            Some(problem) => Err(PartError::Broken { part: self.name.clone(), problem }),
+            Some(problem) => {
+                Err(PartError::Broken { part: self.name.clone(), problem, field: String::new() })
+            }
         }
     }
 
@@ -193,22 +237,19 @@ pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
 /// # Errors
 /// Why parts cannot be made: the first fault of each, in that order.
 pub fn build(m: &Measures, passes: &[PrintPass]) -> Result<Vec<Part>, PartError> {
-    let makers: [Maker; 7] = [
-        upper::blueprint,
-        lower::blueprint,
-        mould::cavity,
-        mould::base,
-        accessories::sheet,
-        accessories::stencil,
-        accessories::coupon,
-    ];
-    let jig = |i: usize| {
-        let name = if passes.len() == 1 { "print_jig".to_owned() } else { format!("print_jig_{i}") };
-        passes.get(i).map(|pass| accessories::jig(m, &name, pass))
-    };
+    let makers: Vec<Maker> = MAKERS
+        .iter()
+        // No markers, no stencil.
+        .filter(|(name, _)| *name != STENCIL || !m.markers_mm.is_empty())
+        .map(|(_, make)| *make)
+        .collect();
     let results: Vec<Result<Part, PartError>> = (0..makers.len() + passes.len())
         .into_par_iter()
-        .filter_map(|i| makers.get(i).map(|make| make(m)).or_else(|| jig(i - makers.len())))
+        .filter_map(|i| {
+            let maker = makers.get(i).map(|make| make(m));
+            let jig = |i: usize| accessories::jig(m, &jig_name(i, passes), &passes[i]);
+            maker.or_else(|| Some(jig(i.checked_sub(makers.len())?)))
+        })
         .map(|blueprint| blueprint?.build(m))
         .collect();
     let (mut made, mut faults) = (Vec::new(), Vec::new());

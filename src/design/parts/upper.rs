@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::measures::Measures;
+use super::mount;
 use super::{Blueprint, Feature, PartError};
 use domecast_mesh::{Fit, Profile, Shape};
 
@@ -43,7 +44,11 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     let top = m.upper_top_z_mm();
     let mut b = Blueprint::new(
         "upper_platform",
-        "upper platform: sheet seat, window, LED seats, magnet pockets; printed",
+        if m.mount.is_rigid() {
+            "upper platform: sheet seat, window, LED seats, screw holes; printed"
+        } else {
+            "upper platform: sheet seat, window, LED seats, magnet pockets; printed"
+        },
         m.chord,
     );
     // All of it is open to the recess above; pockets and wire holes must keep
@@ -93,6 +98,7 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
 
     // Their push-out holes lead up into window, recess or rim: open above.
     m.cut_magnet_pockets(&mut b, bottom, top + over);
+    mount::upper(m, &mut b);
     for i in 0..m.leds.list.len() {
         led_seat(m, i, &mut b);
     }
@@ -134,7 +140,9 @@ fn led_seat(m: &Measures, i: usize, b: &mut Blueprint) {
     let lean = platform_from_led.matrix3.z_axis.z / up;
     let front_at_seat = leds.center_radius_mm - front / up + (m.seat_z_mm() - leds.center_z_mm) * lean;
     let beyond = front_at_seat - leds.center_radius_mm;
-    let end = leds.center_radius_mm + if beyond > SKIN_MM { beyond + 0.5 * front } else { 0.0 };
+    // Into the pit, also where the pit's front is behind the emitting face.
+    let into = 0.5 * front.abs().max(2.0 * SKIN_MM);
+    let end = leds.center_radius_mm + if beyond > SKIN_MM { beyond + into } else { 0.0 };
     let channel = Shape::cuboid(
         DVec3::new(inside_window, -half_channel, lip),
         DVec3::new(end, half_channel, top + over),

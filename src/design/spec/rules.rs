@@ -1,7 +1,7 @@
 //! The rules that hold between the fields of a design.
 
 use glam::DVec2;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::design::Design;
 use super::error::DesignError;
@@ -195,6 +195,9 @@ fn pattern(design: &Design, faults: &mut Vec<DesignError>) {
 }
 
 fn springs(design: &Design, faults: &mut Vec<DesignError>) {
+    if design.sections().mount.is_rigid() {
+        return;
+    }
     let springs = &design.sections().springs;
     if springs.outer_diameter_mm <= 2.0 * springs.wire_diameter_mm {
         faults.push(
@@ -296,14 +299,14 @@ fn tenth_up(value: f64) -> f64 {
 }
 
 /// Sides that leave room for what reaches so far from the axis, none smaller than they are.
-fn room_for(reach_mm: DVec2, half_mm: DVec2) -> String {
+fn room_for(reach_mm: DVec2, half_mm: DVec2) -> Value {
     let sides = (2.0 * reach_mm.max(half_mm)).to_array().map(tenth_up);
-    json!(sides).to_string()
+    json!(sides)
 }
 
 /// A place moved away from the axis to at least a distance; one on the axis goes along x.
-fn outwards(at_mm: DVec2, distance_mm: f64) -> String {
+fn outwards(at_mm: DVec2, distance_mm: f64) -> Value {
     let way = at_mm.try_normalize().unwrap_or(DVec2::X);
     let place = (way * (distance_mm + 0.01)).to_array();
-    json!(place.map(|side| rounded((100.0 * side).round() / 100.0))).to_string()
+    json!(place.map(|side| rounded((100.0 * side).round() / 100.0)))
 }

@@ -16,6 +16,7 @@
 //! ```
 
 pub mod check;
+mod claims;
 mod manifest;
 mod measured;
 mod tree;
@@ -41,9 +42,6 @@ use domecast_design::parts;
 use domecast_design::parts::PartError;
 use domecast_design::settings::SAFETY;
 use domecast_design::{Design, DesignError, DesignWarning};
-use domecast_design::{claims_of, suspension_of};
-use domecast_optics::numeric::Rigid;
-use domecast_springs::Check;
 
 /// Why a build could not be made.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -165,7 +163,7 @@ fn make(
     let sha256 = sha256_hex(design.text().as_bytes());
 
     step("trying the claimed loads");
-    let sight = try_claims(design)?;
+    let sight = claims::try_claims(design)?;
     step("laying out the dots");
     let (spec, layout) = lay_out(design)?;
     step("writing the constants");
@@ -189,11 +187,9 @@ fn make(
         tree.add(file.path, file.bytes);
     }
     let (light, forces) = loaded?;
-    for (path, bytes) in light.files() {
+    let force_files = forces.files().into_iter().map(|(path, text)| (path, text.into_bytes()));
+    for (path, bytes) in light.files().into_iter().chain(force_files) {
         tree.add(path, bytes);
-    }
-    for (path, text) in forces.files() {
-        tree.add(path, text.into_bytes());
     }
     step("writing what other programs read");
     tree.add(
@@ -323,52 +319,6 @@ fn make_parts(
     let files = parts::files(design, measures, &made, &assembly)?;
     let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
     Ok(MadeParts { made, assembly, checked, files, poses })
-}
-
-/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay visible. Returns the
-/// check of the markers.
-fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
-    let sight = constants::MarkerSight::of(design);
-    sight.require(design, &Rigid::identity(), "at rest")?;
-    let suspension = suspension_of(design)?;
-    let mut faults = Vec::new();
-    for (index, (claim, case)) in
-        design.sections().loads.claims.iter().zip(claims_of(design, &suspension)).enumerate()
-    {
-        let field = format!("loads.claims[{index}]");
-        let passed = case.passed().next().map(|check| {
-            let Check { limit, part, value, bound, unit } = check;
-            DesignError::at(
-                field.clone(),
-                serde_json::json!(claim),
-                format!(
-                    "the load \"{}\" passes a limit: {} at {part}, {value:.3} {unit}",
-                    claim.name,
-                    limit.as_str()
-                ),
-                format!("at most {bound:.3} {unit}"),
-            )
-            .with_help(
-                "claim less, or change `springs`, `magnets.grip_force_n` or the heights of the platforms",
-            )
-        });
-        if let Some(error) = passed {
-            faults.push(error);
-            continue;
-        }
-        let balance = match case.equilibrium {
-            Ok(balance) => balance,
-            Err(error) => {
-                let allowed = "a load that the springs carry";
-                faults.push(DesignError::at(field, serde_json::json!(claim), error.to_string(), allowed));
-                continue;
-            }
-        };
-        let pose = balance.displacement.to_pose(suspension.at_mm());
-        faults.extend(sight.require(design, &pose, &format!("under the load \"{}\"", claim.name)).err());
-    }
-    DesignError::all(faults)?;
-    Ok(sight)
 }
 
 /// The layout of a design's dots, and what it was made from.

@@ -48,7 +48,7 @@ fn levels(scene: &Scene, frame: u32, tolerances: &[f32]) -> (Vec<Levels>, Vec<(u
     let touches: Vec<Touch> =
         (0..=frame).map(|k| stepper.next(k, scene.time_s(k), &mut work).unwrap()).collect();
     let around = Between::at_frame(touches.last().unwrap().clone());
-    let state = around.state(scene.suspension().at_mm());
+    let state = around.state(scene.reference_mm());
     let step = Some(map_step_mm(Some(level)));
     let shape = SkinShape::of(Some(around), scene.optics().dome_radius_mm(), step, &mut work);
     let time_s = scene.time_s(frame);

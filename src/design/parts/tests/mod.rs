@@ -1,7 +1,9 @@
+mod boards;
 mod checks;
 mod exactness;
 mod mechanism;
 mod random_designs;
+mod rigid;
 mod seats;
 mod strokes;
 mod sweep;
@@ -16,7 +18,7 @@ use super::*;
 use crate::spec::Design;
 use domecast_mesh::{Fit, Piece, RayTarget, Shape, Solid};
 
-fn thumb24() -> Design {
+pub(crate) fn thumb24() -> Design {
     Design::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json"))).unwrap()
 }
 

@@ -2,7 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::geometry::{back_mm, depth_mm, lower_top_mm, pocket_mm, sheet_mm, tilt, view_mm, wall_mm};
+use super::geometry::{
+    back_mm, bore_mm, depth_mm, lower_top_mm, pocket_mm, sheet_mm, tilt, view_mm, wall_mm,
+};
 use super::known::{Known, down, up};
 use super::room::{HOLE_IN_RECESS_MM, half_mm, ring_count, ring_mm, spring_count, springs_reach_mm};
 use super::rule::{Rule, fixed, follows};
@@ -112,7 +114,8 @@ pub(super) const OUTLINE: &[Rule] = &[
     ),
     follows(
         "platforms.lower.clamp.hole_diameter_mm",
-        "for tapping the thinnest of M2 to M6 of which a set screw, sunk by three diameters, reaches the body",
+        "for tapping the thinnest of M2 to M6 of which a set screw, sunk by three diameters, reaches the body; where \
+         three such holes leave no wall at the bore, of two that stand nearer to the sides' middles",
         tapped,
     ),
     follows("platforms.lower.cable_exit.width_mm", "the cable and 0.7 mm", |k| {
@@ -135,7 +138,8 @@ pub(super) const OUTLINE: &[Rule] = &[
     ),
     follows(
         "platforms.lower.clamp.azimuth_deg",
-        "three, 120 degrees apart, so that they do not push the camera off the axis; between springs and wires",
+        "three, 120 degrees apart, so that they do not push the camera off the axis; two that face each other where the \
+         bore leaves no wall between three; between springs and wires",
         clamps,
     ),
     follows(
@@ -226,15 +230,38 @@ fn lip(k: &Known<'_>) -> Option<Value> {
     k.number(up((line + 0.05).max(covers), 0.01).min(top))
 }
 
-fn tapped(k: &Known<'_>) -> Option<Value> {
-    // tapped hole, and the longest common set screw with three diameters, mm
-    const REACHES_MM: [(f64, f64); 6] =
-        [(1.6, 16.0), (2.05, 19.5), (2.5, 25.0), (3.3, 32.0), (4.2, 40.0), (5.0, 48.0)];
+/// Tapped hole, and the longest common set screw with three diameters, mm.
+const REACHES_MM: [(f64, f64); 6] =
+    [(1.6, 16.0), (2.05, 19.5), (2.5, 25.0), (3.3, 32.0), (4.2, 40.0), (5.0, 48.0)];
+/// One of three screws stands at most so far off a side's middle, degrees.
+const OFF_SIDE_OF_THREE_DEG: f64 = 35.0;
+/// Two stand nearer to it.
+const OFF_SIDE_OF_TWO_DEG: f64 = 20.0;
+
+/// A set screw's way from the block's face to the body at most, mm.
+fn screw_way_mm(k: &Known<'_>, off_side_deg: f64) -> f64 {
     let half = 0.5 * k.at("platforms.outer_mm", 0).max(k.at("platforms.outer_mm", 1));
-    // no screw stands more than 35 degrees off a side's middle
-    let way = half / 35f64.to_radians().cos() - 0.5 * k.n("camera_body.diameter_mm");
-    let found = REACHES_MM.into_iter().find(|(_, reach)| way <= *reach).map_or(5.0, |(hole, _)| hole);
-    k.number(found.max(k.n("process.min_hole_diameter_mm")))
+    half / off_side_deg.to_radians().cos() - 0.5 * k.n("camera_body.diameter_mm")
+}
+
+/// Whether three holes of a diameter leave walls between them where they meet the bore, and their screws reach.
+fn three_fit(k: &Known<'_>, hole_mm: f64) -> bool {
+    let share = 0.5 * hole_mm / bore_mm(k).max(1e-3);
+    let between_rad = 120f64.to_radians() - 2.0 * share.min(1.0).asin();
+    let wall = 2.0 * bore_mm(k) * (0.5 * between_rad).sin();
+    let way = screw_way_mm(k, OFF_SIDE_OF_THREE_DEG);
+    let reaches = REACHES_MM.iter().any(|(hole, reach)| *hole <= hole_mm + 0.3 && way <= *reach);
+    share < 1.0 && wall >= 1.05 * k.n("process.min_wall_mm") && (reaches || hole_mm > 5.0)
+}
+
+fn tapped(k: &Known<'_>) -> Option<Value> {
+    let thinnest = |off_side_deg: f64| {
+        let way = screw_way_mm(k, off_side_deg);
+        let found = REACHES_MM.into_iter().find(|(_, reach)| way <= *reach).map_or(5.0, |(hole, _)| hole);
+        found.max(k.n("process.min_hole_diameter_mm"))
+    };
+    let of_three = thinnest(OFF_SIDE_OF_THREE_DEG);
+    k.number(if three_fit(k, of_three) { of_three } else { thinnest(OFF_SIDE_OF_TWO_DEG) })
 }
 
 /// Azimuth of a spring, degrees.
@@ -263,6 +290,8 @@ fn clamps(k: &Known<'_>) -> Option<Value> {
         .chain([k.n("platforms.lower.cable_exit.azimuth_deg")])
         .chain([45.0, 135.0, 225.0, 315.0])
         .collect();
+    let count = if three_fit(k, k.n("platforms.lower.clamp.hole_diameter_mm")) { 3 } else { 2 };
+    let step = 360.0 / f64::from(count);
     let room = |first: f64| {
         let of = |azimuth: f64| {
             busy.iter()
@@ -272,12 +301,15 @@ fn clamps(k: &Known<'_>) -> Option<Value> {
                 })
                 .fold(180.0, f64::min)
         };
-        (0..3).map(|i| of(first + 120.0 * f64::from(i))).fold(180.0, f64::min)
+        (0..count).map(|i| of(first + step * f64::from(i))).fold(180.0, f64::min)
     };
-    let best = (0..24).map(|i| 5.0 * f64::from(i)).fold((0.0, -1.0), |best, first| {
+    let off_side = |first: f64| (first + 45.0).rem_euclid(90.0) - 45.0;
+    let near_side = |first: &f64| count == 3 || off_side(*first).abs() <= OFF_SIDE_OF_TWO_DEG;
+    let turns = (0..).map(|i| 5.0 * f64::from(i)).take_while(|first| *first < step);
+    let best = turns.filter(near_side).fold((0.0, -1.0), |best, first| {
         if room(first) > best.1 + 1e-9 { (first, room(first)) } else { best }
     });
-    k.numbers(&[best.0, best.0 + 120.0, best.0 + 240.0])
+    k.numbers(&(0..count).map(|i| best.0 + step * f64::from(i)).collect::<Vec<_>>())
 }
 
 fn led_azimuths(k: &Known<'_>) -> Vec<f64> {

@@ -7,6 +7,9 @@ use super::known::{Known, down, up};
 use super::room::{HOLE_IN_RECESS_MM, first_deg, half_mm, ring_count, ring_mm, spring_count};
 use super::rule::{Rule, fixed, follows};
 
+/// So much of what the wire bears may the largest press use.
+const MAX_USED: f64 = 0.9;
+
 pub(super) const PURCHASED: &[Rule] = &[
     fixed("springs.outer_diameter_mm", "3.0", "a common size that fits beside the camera"),
     fixed("springs.free_length_mm", "5.0", "a common size; the camera's depth grows with it"),
@@ -47,14 +50,14 @@ pub(super) const RING: &[Rule] = &[
     ),
     follows(
         "springs.wire_diameter_mm",
-        "the largest claimed press takes 40 % of the length: k = F / (0.4 L n), d^4 = 8 D^3 n k / G, in steps of \
-         0.01 mm",
+        "the largest claimed press takes 40 % of the length: k = F / (0.4 L n), d^4 = 8 D^3 n k / G, or as much thicker \
+         as leaves it 90 % of what music wire bears, with Wahl's factor, in steps of 0.01 mm",
         wire,
     ),
     follows(
         "springs.wire.allowable_shear_mpa",
         "45 % of music wire's tensile strength, 0.45 * 2211 / d^0.145 MPa",
-        |k| k.number(down(0.45 * 2211.0 / k.n("springs.wire_diameter_mm").powf(0.145), 10.0)),
+        |k| k.number(borne_mpa(k.n("springs.wire_diameter_mm"))),
     ),
 ];
 
@@ -94,7 +97,7 @@ fn wire(k: &Known<'_>) -> Option<Value> {
         .into_iter()
         .flatten()
         .filter_map(|claim| claim.get("force_n")?.get(2)?.as_f64())
-        .fold(0.0, |hardest: f64, force| hardest.max(-force));
+        .fold(0.0, |largest: f64, force| largest.max(-force));
     let stiffness = press.max(0.1) / (0.4 * k.n("springs.free_length_mm") * spring_count(k).max(1) as f64);
     let (outer, coils) = (k.n("springs.outer_diameter_mm"), k.n("springs.active_coils"));
     // the mean diameter depends on the wire: a few rounds bring it far below a step
@@ -103,5 +106,22 @@ fn wire(k: &Known<'_>) -> Option<Value> {
         let mean = (outer - wire).max(0.1 * outer);
         wire = (8.0 * mean.powi(3) * coils * stiffness / k.n("springs.wire.shear_modulus_mpa")).powf(0.25);
     }
-    k.number(up(wire, 0.01))
+    let force = press / spring_count(k).max(1) as f64;
+    let mut wire = up(wire, 0.01);
+    while wire < 0.25 * outer && stress_mpa(force, outer - wire, wire) > MAX_USED * borne_mpa(wire) {
+        wire = up(wire + 0.01, 0.01);
+    }
+    k.number(wire)
+}
+
+/// What music wire of a diameter bears, MPa.
+fn borne_mpa(wire_mm: f64) -> f64 {
+    down(0.45 * 2211.0 / wire_mm.powf(0.145), 10.0)
+}
+
+/// Shear stress in the wire of a spring of a mean diameter under an axial force, with Wahl's factor, MPa.
+fn stress_mpa(force_n: f64, mean_mm: f64, wire_mm: f64) -> f64 {
+    let index = mean_mm / wire_mm;
+    let wahl = (4.0 * index - 1.0) / (4.0 * index - 4.0) + 0.615 / index;
+    wahl * 8.0 * force_n * mean_mm / (std::f64::consts::PI * wire_mm.powi(3))
 }

@@ -61,8 +61,8 @@ def rims(center, normal, radius):
     return center + radius * (np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second)
 
 
-def parts_of(folder):
-    """What may stand in a ray, by name, mm in the sensor frame at rest."""
+def parts_of(folder, every=False):
+    """What may stand in a ray, or every body but the sheet, by name, mm in the sensor frame at rest."""
     found = {name: trimesh.load_mesh(folder / "parts" / f"{name}.stl") for name in ("upper_platform", "lower_platform")}
     scene = trimesh.load_scene(folder / "parts" / "assembly.glb")
     # glTF: metres and Y up
@@ -70,7 +70,9 @@ def parts_of(folder):
     for node in scene.graph.nodes_geometry:
         transform, geometry = scene.graph[node]
         name = node if node in scene.graph.nodes_geometry else geometry
-        if any(word in name for word in ("platform", "sheet", "dome", "camera")):
+        name = name.removesuffix(" (closed)")
+        kept_out = ("platform", "sheet") if every else ("platform", "sheet", "dome", "camera")
+        if any(word in name for word in kept_out):
             continue
         mesh = scene.geometry[geometry].copy()
         mesh.apply_transform(to_sensor @ transform)
@@ -93,11 +95,8 @@ def blocked(meshes, pupil, ends):
     return names
 
 
-def check_build(folder):
-    constants = json.loads((folder / "constants/constants.json").read_text())
-    print(f"== {folder}: what the camera sees")
-    meshes = parts_of(folder)
-    print(f"     {len(meshes)} parts: {', '.join(sorted(meshes))}")
+def aims(constants):
+    """Points whose rays must be free, by what they belong to: dots with their rims, rims of the markers."""
     radius = constants["optics"]["dome_radius_mm"]
     dots = []
     for dot in constants["black_dots"]:
@@ -109,7 +108,15 @@ def check_build(folder):
         for marker in constants["white_markers"]
         for point in rims(np.array(marker["position_mm"]), np.array([0, 0, 1.0]), marker["diameter_mm"] / 2)
     ]
-    for what, points in (("dots", dots), ("white markers", markers)):
+    return {"dots": dots, "white markers": markers}
+
+
+def sights(folder):
+    """What is looked at, whether all of it is in sight, and how that was found."""
+    constants = json.loads((folder / "constants/constants.json").read_text())
+    meshes = parts_of(folder)
+    aimed = aims(constants)
+    for what, points in aimed.items():
         if not points:
             continue
         pupil, ends, sines = air_rays(constants, points)
@@ -120,12 +127,19 @@ def check_build(folder):
             worst = max(set(lost), key=lost.count)
             first = np.degrees(np.arcsin(min(s for s, n in zip(sines, names) if n is not None)))
             detail += f"; {len(lost)} blocked from {first:.1f} degrees, most by {worst}"
-        check(f"no {what[:-1] if what.endswith('s') else what} is behind a part", not lost, detail)
+        yield f"no {what[:-1]} is behind a part", not lost, detail
     # The check sees walls: rays spread by a third beyond the markers (the dome's rim without them) meet the platforms.
-    edge = markers or list(rims(np.zeros(3), np.array([0, 0, 1.0]), radius))
-    pupil, ends, _ = air_rays(constants, edge)
+    rim = list(rims(np.zeros(3), np.array([0, 0, 1.0]), constants["optics"]["dome_radius_mm"]))
+    pupil, ends, _ = air_rays(constants, aimed["white markers"] or rim)
     wide = pupil + (ends - pupil) * np.array([1.33, 1.33, 1.0])
-    check("wider rays do meet parts", any(n is not None for n in blocked(meshes, pupil, wide)))
+    yield "wider rays do meet parts", any(n is not None for n in blocked(meshes, pupil, wide)), ""
+
+
+def check_build(folder):
+    print(f"== {folder}: what the camera sees")
+    print(f"     {', '.join(sorted(parts_of(folder)))}")
+    for found in sights(folder):
+        check(*found)
 
 
 if __name__ == "__main__":

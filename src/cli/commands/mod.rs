@@ -69,13 +69,16 @@ enum Command {
         #[arg(long)]
         quick: bool,
     },
-    /// Write a starting design in which every field has its reason, and the schema for editors beside it.
+    /// Write a starting design, and the schema for editors beside it: with a radius, one of your own that leaves the rest
+    /// to rules; without, one in which every field has its reason.
     New {
         /// Name of the design.
         name: String,
         /// The design to start from [default: the paper's sensor, thumb24].
-        #[arg(long)]
+        #[arg(long, conflicts_with = "radius")]
         from: Option<PathBuf>,
+        #[command(flatten)]
+        own: new::OwnSensor,
         /// Where to write [default: designs/<name>.json, or <name>.json where there is no such folder].
         #[arg(long)]
         out: Option<PathBuf>,
@@ -236,7 +239,7 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::Accuracy { design, scene, out, quick } => {
             accuracy::run(output, design, scene.as_deref(), out.as_deref(), *quick)
         }
-        Command::New { name, from, out } => new::run(output, name, from.as_deref(), out.as_deref()),
+        Command::New { name, from, own, out } => new::run(output, name, from.as_deref(), own, out.as_deref()),
         Command::Explain { field, design } => explain::run(output, field, design.as_deref()),
         Command::List { kind, key } => list::run(output, *kind, key.as_deref()),
         Command::Compare { a, b } => compare::run(output, a, b),

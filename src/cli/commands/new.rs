@@ -4,19 +4,124 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use serde_json::json;
+use clap::Args;
+use serde_json::{Map, Value, json};
 
 use super::output::{Failure, Output};
-use domecast_design::DesignError;
+use domecast_design::calibration::{CalibrationHints, CameraCalibration};
+use domecast_design::catalogue::{self, CatalogueKind};
+use domecast_design::{Design, DesignError};
 
 /// The paper's sensor: every field is there, each with its reason.
 const START: &str = include_str!("../../../designs/thumb24.json");
 /// The schema's name beside the design; editors find it through `$schema`.
 const SCHEMA_NAME: &str = "domecast.schema.json";
 
+/// The few numbers that a sensor of one's own follows from.
+#[derive(Debug, Args)]
+pub struct OwnSensor {
+    /// Radius of the dome, mm; the rest follows by rules.
+    #[arg(long)]
+    radius: Option<f64>,
+    /// The camera: a calibration file (OpenCV, ROS, Kalibr), or a key of `domecast list cameras` [default: that of --body].
+    #[arg(long, requires = "radius")]
+    camera: Option<PathBuf>,
+    /// The camera's body: a key of `domecast list cameras`.
+    #[arg(long, requires = "radius")]
+    body: Option<String>,
+    /// Wanted number of dots; as many as come nearest are laid out.
+    #[arg(long, requires = "radius")]
+    dots: Option<u32>,
+    /// Kind of pattern: square, hexagonal, rings, fill.
+    #[arg(long, requires = "radius")]
+    pattern: Option<String>,
+}
+
+impl OwnSensor {
+    /// The design file: only what no rule can give, each with its reason.
+    fn design(&self, name: &str, radius_mm: f64) -> Result<Value, DesignError> {
+        let mut design = json!({ "$schema": SCHEMA_NAME, "version": 1, "name": name });
+        design["camera"] = self.camera()?;
+        if let Some(key) = &self.body {
+            let entry = catalogue::find(&[CatalogueKind::Cameras], key)?;
+            let mut body = Map::new();
+            let mut why = Map::new();
+            for (field, value) in entry.section("camera_body") {
+                body.insert(field.to_owned(), value.value.clone());
+                why.insert(field.to_owned(), json!(format!("{}: {}", entry.name, value.source)));
+            }
+            if body.is_empty() {
+                return Err(DesignError::at(
+                    "camera_body",
+                    json!(key),
+                    "this camera is a board, and the lower platform holds cylinders only",
+                    "a camera with a cylindrical body",
+                )
+                .with_help(
+                    "leave --body out, and give camera_body.diameter_mm and length_mm of the lens barrel yourself",
+                ));
+            }
+            body.insert("why".into(), Value::Object(why));
+            design["camera_body"] = Value::Object(body);
+        }
+        design["dome"] = json!({ "radius_mm": radius_mm, "why": "asked for with --radius" });
+        let mut pattern = Map::new();
+        let asked =
+            [("kind", self.pattern.as_ref().map(|kind| json!(kind))), ("count", self.dots.map(|n| json!(n)))];
+        for (field, value) in asked {
+            pattern.extend(value.map(|value| (field.to_owned(), value)));
+        }
+        if !pattern.is_empty() {
+            pattern.insert("why".into(), json!("asked for with --dots and --pattern"));
+            design["pattern"] = Value::Object(pattern);
+        }
+        Ok(design)
+    }
+
+    /// The camera's section with its numbers, so that the design needs no other file.
+    fn camera(&self) -> Result<Value, DesignError> {
+        let mut section = Map::new();
+        let key = match &self.camera {
+            Some(path) if path.is_file() || path.extension().is_some() => {
+                let found = CameraCalibration::load(path, &CalibrationHints::default())?;
+                section.extend(found.fields());
+                section.insert("why".into(), json!(format!("a calibration: {}", path.display())));
+                return Ok(Value::Object(section));
+            }
+            Some(key) => key.display().to_string(),
+            None => self.body.clone().ok_or_else(|| {
+                DesignError::at(
+                    "camera",
+                    "",
+                    "no camera is named",
+                    "--camera with a calibration file or a key",
+                )
+                .with_help("`domecast list cameras` shows the keys")
+            })?,
+        };
+        let entry = catalogue::find(&[CatalogueKind::Cameras], &key)?;
+        let mut why = Map::new();
+        for (field, value) in entry.section("camera") {
+            section.insert(field.to_owned(), value.value.clone());
+            why.insert(field.to_owned(), json!(format!("{}: {}", entry.name, value.source)));
+        }
+        section.insert("why".into(), Value::Object(why));
+        Ok(Value::Object(section))
+    }
+}
+
 /// Writes a starting design and the schema that lets an editor complete and check it. Nothing is overwritten but an
 /// earlier schema.
-pub fn run(output: &Output, name: &str, from: Option<&Path>, out: Option<&Path>) -> Result<(), Failure> {
+pub fn run(
+    output: &Output,
+    name: &str,
+    from: Option<&Path>,
+    own: &OwnSensor,
+    out: Option<&Path>,
+) -> Result<(), Failure> {
+    if let Some(radius_mm) = own.radius {
+        return run_own(output, name, own, radius_mm, out);
+    }
     let text = match from {
         None => START.to_owned(),
         Some(path) => domecast_design::read_text(path)?,
@@ -28,23 +133,59 @@ pub fn run(output: &Output, name: &str, from: Option<&Path>, out: Option<&Path>)
     })?;
     let fresh = renamed(&text, start.name(), name);
     domecast_design::Design::from_str(&fresh)?;
-    let path = out.map_or_else(
-        || {
-            let folder = if Path::new("designs").is_dir() { "designs" } else { "" };
-            Path::new(folder).join(format!("{name}.json"))
-        },
-        Path::to_path_buf,
-    );
-    let schema = path.with_file_name(SCHEMA_NAME);
-    write_new(&path, fresh.as_bytes())?;
-    std::fs::write(&schema, format!("{:#}\n", domecast_design::design_schema()))
-        .map_err(|error| refused(&schema, &error))?;
+    let path = place(name, out);
+    let schema = write_both(&path, fresh.as_bytes())?;
     output.say(&format!("{}: a start, equal to {} but in its name", path.display(), start.name()))?;
     output.say(&format!("{}: lets an editor complete and check it", schema.display()))?;
     output.say("change it, then:")?;
     output.say(&format!("  domecast build {} --watch", path.display()))?;
     output.say("  domecast explain FIELD")?;
     output.result(&json!({ "design": path.display().to_string(), "schema": schema.display().to_string() }))
+}
+
+/// Writes a design of one's own, after it was resolved and its dots laid out.
+fn run_own(
+    output: &Output,
+    name: &str,
+    own: &OwnSensor,
+    radius_mm: f64,
+    out: Option<&Path>,
+) -> Result<(), Failure> {
+    let text = format!("{:#}\n", own.design(name, radius_mm)?);
+    let design = Design::from_str(&text)?;
+    let laid_out = design.layout().map_err(DesignError::from)?.dots.len();
+    let path = place(name, out);
+    let schema = write_both(&path, text.as_bytes())?;
+    let derived = design.derived().len();
+    output.say(&format!("{}: {laid_out} dots, {derived} fields left to rules", path.display()))?;
+    if let Some(asked) = own.dots.filter(|asked| *asked as usize != laid_out) {
+        output
+            .say(&format!("{asked} dots were asked for; {laid_out} is the nearest that this pattern has"))?;
+    }
+    output.say("next:")?;
+    output.say(&format!("  domecast build {}", path.display()))?;
+    output.say(&format!("  domecast explain --design {}", path.display()))?;
+    output.result(&json!({
+        "design": path.display().to_string(),
+        "schema": schema.display().to_string(),
+        "dots": laid_out,
+        "derived": derived,
+    }))
+}
+
+/// Where a new design goes.
+fn place(name: &str, out: Option<&Path>) -> PathBuf {
+    let folder = if Path::new("designs").is_dir() { "designs" } else { "" };
+    out.map_or_else(|| Path::new(folder).join(format!("{name}.json")), Path::to_path_buf)
+}
+
+/// Writes the design, which must not be there yet, and the schema beside it.
+fn write_both(path: &PathBuf, bytes: &[u8]) -> Result<PathBuf, DesignError> {
+    let schema = path.with_file_name(SCHEMA_NAME);
+    write_new(path, bytes)?;
+    std::fs::write(&schema, format!("{:#}\n", domecast_design::design_schema()))
+        .map_err(|error| refused(&schema, &error))?;
+    Ok(schema)
 }
 
 fn refused(path: &Path, error: &std::io::Error) -> DesignError {

@@ -62,10 +62,13 @@ impl Pattern {
         let along = DVec2::from_angle(self.rotation_rad);
         let square = matches!(self.kind, PatternKind::Square);
         let up = DVec2::from_angle(self.rotation_rad + if square { PI / 2.0 } else { PI / 3.0 });
-        // A gap is the middle of a square cell, or of a triangle between three dots.
+        // A gap is the middle of a square cell, or half-way between two dots of a hexagonal lattice: about the middle
+        // of a triangle the lattice is not the same upside down, and its first row would not match its last. A fill
+        // starts from triangles, it is relaxed anyway.
         let centre = match self.centred_on {
             CentredOn::Dot => DVec2::ZERO,
             CentredOn::Gap if square => DVec2::splat(0.5),
+            CentredOn::Gap if matches!(self.kind, PatternKind::Hexagonal) => DVec2::new(0.5, 0.0),
             CentredOn::Gap => DVec2::splat(1.0 / 3.0),
         };
         (along, up, centre)

@@ -12,6 +12,9 @@ use crate::spec::sections::{CentredOn, PatternKind};
 /// Bound on the number of places of one pattern: ten times what a camera of 100 megapixels could tell apart.
 const MAX_DOTS: usize = 4_000_000;
 
+/// Share of the pitch by which a solved pitch stays on the finer side of the one at which places reach the edge.
+const EDGE_SHARE: f64 = 1e-6;
+
 impl Pattern {
     /// The places of all dots inside the edge, from the centre outwards and by angle.
     ///
@@ -140,7 +143,15 @@ impl Pattern {
                 break;
             }
         }
-        if count_at(best.1) == 0 { Err(PatternError::Empty) } else { Ok(best.1) }
+        let count = count_at(best.1);
+        if count == 0 {
+            return Err(PatternError::Empty);
+        }
+        // The search ends where places lie on the edge itself, where rounding lets some of equal places in and others
+        // not: a little finer, all of them are inside.
+        let inside = best.1 * (1.0 - EDGE_SHARE);
+        let converged = count_at(inside);
+        Ok(if converged == count || converged.abs_diff(wanted) <= best.0 { inside } else { best.1 })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+pub use crate::spec::Cure;
 use crate::spec::DesignError;
 use domecast_mesh::MeshError;
 
@@ -81,36 +82,6 @@ pub enum PartError {
         /// The design field to change first.
         field: String,
     },
-}
-
-/// A change of the design that takes a fault away.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cure {
-    /// The field, as a path from the top.
-    pub field: String,
-    /// Its new value.
-    pub value: serde_json::Value,
-}
-
-impl Cure {
-    /// A number for a field, rounded to 0.01 mm away from `from`, so that rounding never undoes it.
-    pub(super) fn length(field: impl Into<String>, from: f64, to: f64) -> Self {
-        let steps = 100.0 * to;
-        // A hundredth that is met but for rounding stays.
-        let rounded = if to >= from { (steps - 1e-6).ceil() } else { (steps + 1e-6).floor() };
-        Self { field: field.into(), value: serde_json::json!(rounded / 100.0) }
-    }
-
-    /// Any value for a field.
-    pub(super) fn value(field: impl Into<String>, value: serde_json::Value) -> Self {
-        Self { field: field.into(), value }
-    }
-}
-
-impl fmt::Display for Cure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {} would do", self.field, self.value)
-    }
 }
 
 impl PartError {
@@ -194,7 +165,7 @@ impl From<PartError> for DesignError {
                 format!("{part}: blocks the camera's view {when} from {angle_deg:.1} degrees: {shares}"),
                 "every ray of the image free from the pupil to the sheet, at rest and under every claimed load",
             )
-            .with_help(cure.to_string()),
+            .with_cure(cure),
             PartError::Unheld { part, by, problem, value_mm, limit_mm, cure } => Self::at(
                 cure.field.clone(),
                 "",
@@ -204,7 +175,7 @@ impl From<PartError> for DesignError {
                 ),
                 format!("a limit of {limit_mm:.3} mm"),
             )
-            .with_help(cure.to_string()),
+            .with_cure(cure),
             PartError::Several(faults) => {
                 let mut all = faults.into_iter().map(Self::from);
                 let first =

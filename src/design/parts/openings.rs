@@ -13,8 +13,8 @@ use super::{Measures, PartError, ViewCone, purchased};
 use crate::spec::Design;
 use crate::spec::sections::SpringPlaces;
 
-/// What is left of the wall's limit for the difference between circles and the shapes themselves.
-const SPARE: f64 = 1.05;
+/// Walls are asked to be this much thicker than the limit: the shapes themselves are not quite the circles.
+const WALL_FACTOR: f64 = 1.05;
 
 /// Least wall between the opening and points of a seat at a place, mm: sideways, less the opening's slope.
 fn wall_mm(view: &ViewCone, beside: DVec2, points_mm: &[DVec3]) -> f64 {
@@ -75,8 +75,9 @@ fn springs(design: &Design, m: &Measures) -> Option<PartError> {
         if wall(0.0) >= limit * (1.0 - 1e-3) {
             continue;
         }
-        let by = outwards_mm(SPARE * limit, 2.0 * m.outer_mm.max_element() + m.view.max_radius_mm(), wall);
-        if worst.is_none_or(|(_, most, _)| by > most) {
+        let by =
+            outwards_mm(WALL_FACTOR * limit, 2.0 * m.outer_mm.max_element() + m.view.max_radius_mm(), wall);
+        if worst.is_none_or(|(_, largest, _)| by > largest) {
             worst = Some((i, by, wall(0.0)));
         }
     }
@@ -124,8 +125,8 @@ fn lights(m: &Measures) -> Option<PartError> {
         if wall(0.0) >= limit * (1.0 - 1e-3) {
             continue;
         }
-        let by = outwards_mm(SPARE * limit, 2.0 * m.outer_mm.max_element(), wall);
-        if worst.is_none_or(|(_, most, _)| by > most) {
+        let by = outwards_mm(WALL_FACTOR * limit, 2.0 * m.outer_mm.max_element(), wall);
+        if worst.is_none_or(|(_, largest, _)| by > largest) {
             worst = Some((i, by, wall(0.0)));
         }
     }
@@ -163,7 +164,7 @@ fn mounting(m: &Measures) -> Option<PartError> {
             wall(by).min(head)
         };
         let far = 2.0 * m.outer_mm.max_element() + view.max_radius_mm();
-        let by = outwards_mm(SPARE * limit, far, with_head);
+        let by = outwards_mm(WALL_FACTOR * limit, far, with_head);
         let to = (at + way * (by + 0.01)).to_array().map(|x| (x * 100.0).round() / 100.0);
         let cure = Cure::value(format!("platforms.lower.mounting.at_mm[{i}]"), json!(to));
         let name = format!("mounting screw {i}");

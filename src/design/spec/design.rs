@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use super::derive::DerivedField;
 use super::error::DesignError;
 use super::sections::{CameraSection, DesignFile, SpringPlaces};
 use super::settings::Settings;
@@ -29,6 +30,7 @@ pub struct Design {
     pub(super) warnings: Vec<DesignWarning>,
     pub(super) lints: Vec<DesignWarning>,
     pub(super) settings: Settings,
+    pub(super) derived: Vec<DerivedField>,
 }
 
 impl Design {
@@ -61,6 +63,11 @@ impl Design {
     /// The settings that trade time for exactness, given or chosen.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// The fields that the file leaves out, each with the value that its rule gives.
+    pub fn derived(&self) -> &[DerivedField] {
+        &self.derived
     }
 
     /// Name of the design.

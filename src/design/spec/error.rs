@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use serde_json::{Value, json};
+
 /// A fault in a design file: where it is, what stands there, what is allowed, and what to do.
 ///
 /// The message is one line, so that it survives a terminal, a log and a bug report alike.
@@ -22,8 +24,40 @@ pub struct DesignError {
     pub allowed: String,
     /// What to do, where more than "change the value" can be said.
     pub help: Option<String>,
+    /// A value of a field that takes this fault away, where one is known.
+    pub cure: Option<Cure>,
     /// Further faults that were found in the same run.
     pub more: Vec<DesignError>,
+}
+
+/// A change of the design that takes a fault away.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cure {
+    /// The field, as a path from the top.
+    pub field: String,
+    /// Its new value.
+    pub value: Value,
+}
+
+impl Cure {
+    /// A number for a field, rounded to 0.01 mm away from `from`, so that rounding never undoes it.
+    pub(crate) fn length(field: impl Into<String>, from: f64, to: f64) -> Self {
+        let steps = 100.0 * to;
+        // A hundredth that is met but for rounding stays.
+        let rounded = if to >= from { (steps - 1e-6).ceil() } else { (steps + 1e-6).floor() };
+        Self { field: field.into(), value: json!(rounded / 100.0) }
+    }
+
+    /// Any value for a field.
+    pub(crate) fn value(field: impl Into<String>, value: Value) -> Self {
+        Self { field: field.into(), value }
+    }
+}
+
+impl fmt::Display for Cure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {} would do", self.field, self.value)
+    }
 }
 
 impl DesignError {
@@ -42,6 +76,7 @@ impl DesignError {
             problem: problem.into(),
             allowed: allowed.into(),
             help: None,
+            cure: None,
             more: Vec::new(),
         }
     }
@@ -50,6 +85,35 @@ impl DesignError {
     #[must_use]
     pub fn with_more(mut self, more: Vec<Self>) -> Self {
         self.more.extend(more);
+        self
+    }
+
+    /// All faults as one error, in their order, or none.
+    ///
+    /// # Errors
+    /// The first, which carries the others.
+    pub fn all(faults: Vec<Self>) -> Result<(), Self> {
+        let mut flat: Vec<Self> = Vec::new();
+        for mut fault in faults {
+            let more = std::mem::take(&mut fault.more);
+            flat.push(fault);
+            flat.extend(more);
+        }
+        let mut flat = flat.into_iter();
+        flat.next().map_or(Ok(()), |first| Err(first.with_more(flat.collect())))
+    }
+
+    /// The same fault, with a value of a field that takes it away.
+    #[must_use]
+    pub(super) fn cured_by(self, field: &str, value: impl Into<Value>) -> Self {
+        self.with_cure(Cure::value(field, value.into()))
+    }
+
+    /// The same fault, with the change that takes it away, which is its advice too.
+    #[must_use]
+    pub fn with_cure(mut self, cure: Cure) -> Self {
+        self.help = Some(cure.to_string());
+        self.cure = Some(cure);
         self
     }
 
@@ -68,9 +132,9 @@ impl DesignError {
     }
 
     /// The fault as a JSON object for programs.
-    pub fn to_json(&self) -> serde_json::Value {
+    pub fn to_json(&self) -> Value {
         let (line, column) = self.place.unzip();
-        serde_json::json!({
+        json!({
             "file": self.file.as_ref().map(|file| file.display().to_string()),
             "line": line,
             "column": column,
@@ -79,6 +143,7 @@ impl DesignError {
             "problem": self.problem,
             "allowed": self.allowed,
             "help": self.help,
+            "cure": self.cure.as_ref().map(|cure| json!({ "field": cure.field, "value": cure.value })),
             "message": self.to_string(),
             "more": self.more.iter().map(Self::to_json).collect::<Vec<_>>(),
         })

@@ -101,10 +101,15 @@ pub fn explain(field: &str, design: &Value) -> Result<Explained, DesignError> {
             .map_or("", |u| u.1),
         meaning: text(schema, "description").or_else(|| text(resolved, "description")).unwrap_or_default(),
         allowed: allowed(root, schema),
-        presence: match (required, schema.get("default").or_else(|| resolved.get("default"))) {
-            (_, Some(default)) if !default.is_null() => format!("may be left out; then {default}"),
-            (true, _) => "must be there".to_owned(),
-            (false, _) => "may be left out".to_owned(),
+        presence: match (
+            super::derive::rule_of(&path),
+            required,
+            schema.get("default").or_else(|| resolved.get("default")),
+        ) {
+            (Some(rule), ..) => format!("may be left out; then by a rule: {rule}"),
+            (_, _, Some(default)) if !default.is_null() => format!("may be left out; then {default}"),
+            (_, true, _) => "must be there".to_owned(),
+            (_, false, _) => "may be left out".to_owned(),
         },
         value: value.filter(|value| !value.is_null()).map(Value::to_string),
         why,

@@ -8,15 +8,18 @@
 mod body_rules;
 pub mod calibration;
 pub mod catalogue;
+mod derive;
 mod design;
 mod error;
 mod explain;
 mod fill;
+mod lens;
 mod lints;
 mod mount_rules;
 mod resolve;
 mod rules;
 mod schema;
+mod schema_faults;
 pub mod sections;
 pub mod settings;
 mod source;
@@ -30,8 +33,9 @@ use serde_json::Value;
 
 use domecast_optics::SensorOptics;
 
+pub use derive::{DerivedField, derive, rule_of};
 pub use design::{Design, DesignWarning};
-pub use error::DesignError;
+pub use error::{Cure, DesignError};
 pub use explain::{Explained, explain};
 pub use fill::{Filled, Filling, fill, read_filled};
 pub use schema::{design_schema, schema_of};
@@ -66,10 +70,10 @@ fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, DesignErro
     let mut value = parse_json(text)?;
     check_version(&value)?;
     let filling = fill(&mut value, folder)?;
-    if filling.fields.is_empty() {
-        return resolve::resolve(from_value(&value)?, text);
-    }
-    let mut design = resolve::resolve(from_value(&value)?, &format!("{value:#}\n"))?;
+    let filled = if filling.fields.is_empty() { None } else { Some(format!("{value:#}\n")) };
+    schema::check(schema::open_schema(), &value, "")?;
+    let derived = derive(&mut value)?;
+    let mut design = resolve::resolve(from_value(&value)?, filled.as_deref().unwrap_or(text), derived)?;
     design.warnings.extend(filling.warnings);
     Ok(design)
 }
@@ -102,6 +106,15 @@ pub fn optics_from_text(text: &str) -> Result<SensorOptics, DesignError> {
 
 fn filled_optics(text: &str, folder: Option<&Path>) -> Result<SensorOptics, DesignError> {
     let mut value = parse_json(text)?;
+    // where the camera stands may follow from the whole design
+    let is_whole = |path: &str| value.pointer(path).is_some();
+    let given = ["/camera/position_mm", "/optics/layers"].into_iter().all(is_whole);
+    let seen = ["/camera/field_of_view_deg", "/camera/calibration", "/camera/from"].into_iter().any(is_whole);
+    if !(given && seen) {
+        fill(&mut value, folder)?;
+        schema::check(schema::open_schema(), &value, "")?;
+        derive(&mut value)?;
+    }
     if let Value::Object(map) = &mut value {
         map.retain(|key, _| OPTICS_FIELDS.contains(&key.as_str()));
     }

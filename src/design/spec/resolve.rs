@@ -3,14 +3,15 @@
 use serde_json::json;
 
 use super::body_rules;
+use super::derive::DerivedField;
 use super::design::{Design, DesignWarning, sensor_from_camera, with_lints};
 use super::error::DesignError;
+use super::lens::lens_spec;
 use super::lints::lints;
 use super::mount_rules;
 use super::rules;
-use super::sections::{CameraSection, DesignFile, DomeSection, ModelName, OpticsSection};
+use super::sections::{CameraSection, DesignFile, DomeSection, OpticsSection};
 use super::settings::Settings;
-use domecast_optics::camera::{LensModel, LensSpec};
 use domecast_optics::{FlatLayer, OpticsSpec, SensorOptics};
 
 /// The optics of a design.
@@ -27,19 +28,7 @@ pub(super) fn optics(
         thickness_mm: layer.thickness_mm,
     });
     let spec = OpticsSpec {
-        lens: LensSpec {
-            model: match camera.model {
-                ModelName::Pinhole => LensModel::Pinhole,
-                ModelName::BrownConrady => LensModel::BrownConrady,
-                ModelName::KannalaBrandt => LensModel::KannalaBrandt,
-            },
-            width: camera.width,
-            height: camera.height,
-            matrix: camera.matrix,
-            distortion: camera.distortion.clone(),
-            field_of_view_rad: camera.field_of_view_deg.to_radians(),
-            pupil_shift_mm: camera.pupil_shift_mm.clone(),
-        },
+        lens: lens_spec(camera),
         sensor_from_camera: sensor_from_camera(camera),
         layers: layers.collect(),
         dome_radius_mm: dome.radius_mm,
@@ -59,7 +48,11 @@ pub(super) fn optics(
 }
 
 /// Checks the rules between fields and computes what follows from them.
-pub(super) fn resolve(mut sections: DesignFile, text: &str) -> Result<Design, DesignError> {
+pub(super) fn resolve(
+    mut sections: DesignFile,
+    text: &str,
+    derived: Vec<DerivedField>,
+) -> Result<Design, DesignError> {
     check_name(&sections.name)?;
     let optics = optics(&sections.camera, &sections.optics, &sections.dome)
         .map_err(|fault| with_lints(fault, &lints(&sections, None)))?;
@@ -73,7 +66,7 @@ pub(super) fn resolve(mut sections: DesignFile, text: &str) -> Result<Design, De
     sections.tolerances.samples = Some(settings.samples.value);
     mount_rules::check(&sections).map_err(|fault| with_lints(fault, &lints))?;
     body_rules::check(&sections).map_err(|fault| with_lints(fault, &lints))?;
-    let design = Design { sections, text: text.to_owned(), optics, warnings, lints, settings };
+    let design = Design { sections, text: text.to_owned(), optics, warnings, lints, settings, derived };
     rules::check(&design).map_err(|fault| design.with_lints(fault))?;
     Ok(design)
 }

@@ -1,7 +1,7 @@
 //! The rules that hold between the fields of a design.
 
 use glam::DVec2;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::design::Design;
 use super::error::DesignError;
@@ -11,14 +11,13 @@ use super::sections::{CameraSection, LayerSection, OpticsSection, SpringEnds};
 /// below anything that can be made.
 const ROUNDING_MM: f64 = 1e-6;
 
-/// Checks all of them; the error is the first that does not hold.
+/// Checks all of them; the error carries every one that does not hold.
 pub(super) fn check(design: &Design) -> Result<(), DesignError> {
-    sizes(design)?;
-    dome_on_platform(design)?;
-    envelope(design)?;
-    pattern(design)?;
-    springs(design)?;
-    white_markers(design)
+    let mut faults = Vec::new();
+    for rule in [sizes, dome_on_platform, envelope, pattern, springs, white_markers] {
+        rule(design, &mut faults);
+    }
+    DesignError::all(faults)
 }
 
 /// Every layer has a thickness but the last, which fills the dome.
@@ -69,7 +68,7 @@ pub(super) fn camera_below_sheet(camera: &CameraSection, optics: &OpticsSection)
 }
 
 /// Side lengths, which the schema cannot bound inside a list.
-fn sizes(design: &Design) -> Result<(), DesignError> {
+fn sizes(design: &Design, faults: &mut Vec<DesignError>) {
     let sections = design.sections();
     let lists: [(&str, &[f64]); 7] = [
         ("envelope.size_mm", &sections.envelope.size_mm),
@@ -82,7 +81,7 @@ fn sizes(design: &Design) -> Result<(), DesignError> {
     ];
     for (field, values) in lists {
         if values.iter().any(|value| !(*value > 0.0 && *value <= 1e4)) {
-            return Err(DesignError::at(
+            faults.push(DesignError::at(
                 field,
                 json!(values),
                 "the value is out of range",
@@ -96,34 +95,34 @@ fn sizes(design: &Design) -> Result<(), DesignError> {
     ];
     for (field, values) in deviations {
         if values.iter().any(|value| !(0.0..=100.0).contains(value)) {
-            return Err(DesignError::at(field, json!(values), "the value is out of range", "0 to 100"));
+            faults.push(DesignError::at(field, json!(values), "the value is out of range", "0 to 100"));
         }
     }
-    Ok(())
 }
 
-fn dome_on_platform(design: &Design) -> Result<(), DesignError> {
+fn dome_on_platform(design: &Design, faults: &mut Vec<DesignError>) {
     let sections = design.sections();
     let smallest_mm = DVec2::from_array(sections.platforms.outer_mm)
         .min_element()
         .min(DVec2::from_array(sections.sheet.size_mm).min_element());
     let radius_mm = sections.dome.radius_mm;
     if 2.0 * radius_mm > smallest_mm {
-        return Err(DesignError::at(
-            "dome.radius_mm",
-            radius_mm,
-            format!("the dome is {} mm wide, wider than the platform or its sheet", 2.0 * radius_mm),
-            format!(
-                "at most {} (half of the smallest of platforms.outer_mm and sheet.size_mm)",
-                smallest_mm / 2.0
-            ),
-        )
-        .with_help("radius for diameter?"));
+        faults.push(
+            DesignError::at(
+                "dome.radius_mm",
+                radius_mm,
+                format!("the dome is {} mm wide, wider than the platform or its sheet", 2.0 * radius_mm),
+                format!(
+                    "at most {} (half of the smallest of platforms.outer_mm and sheet.size_mm)",
+                    smallest_mm / 2.0
+                ),
+            )
+            .with_help("radius for diameter?"),
+        );
     }
-    Ok(())
 }
 
-fn envelope(design: &Design) -> Result<(), DesignError> {
+fn envelope(design: &Design, faults: &mut Vec<DesignError>) {
     let [low, high] = design.bounds_mm();
     let size = (high - low).to_array();
     let allowed = design.sections().envelope.size_mm;
@@ -131,35 +130,37 @@ fn envelope(design: &Design) -> Result<(), DesignError> {
     for axis in 0..3 {
         if size[axis] > allowed[axis] + ROUNDING_MM {
             let name = ["x", "y", "z"][axis];
-            return Err(DesignError::at(
-                "envelope.size_mm",
-                json!(allowed),
-                format!("the sensor is {} mm along {name}", rounded(size[axis])),
-                format!("an envelope of at least that, or a smaller sensor (`{}`)", fields[axis]),
-            ));
+            faults.push(
+                DesignError::at(
+                    "envelope.size_mm",
+                    json!(allowed),
+                    format!("the sensor is {} mm along {name}", rounded(size[axis])),
+                    format!("an envelope of at least that, or a smaller sensor (`{}`)", fields[axis]),
+                )
+                .cured_by(&format!("envelope.size_mm[{axis}]"), tenth_up(size[axis])),
+            );
         }
     }
-    Ok(())
 }
 
-fn pattern(design: &Design) -> Result<(), DesignError> {
+fn pattern(design: &Design, faults: &mut Vec<DesignError>) {
     let pattern = &design.sections().pattern;
-    let one_of = |names: [&str; 2], given: [bool; 2]| {
+    let mut one_of = |names: [&str; 2], given: [bool; 2]| {
         let problem = match given {
             [true, true] => "both are given",
             [false, false] => "neither is given",
-            _ => return Ok(()),
+            _ => return,
         };
         let fields = format!("pattern.{} / pattern.{}", names[0], names[1]);
-        Err(DesignError::at(fields, "", problem, "exactly one of the two"))
+        faults.push(DesignError::at(fields, "", problem, "exactly one of the two"));
     };
-    one_of(["pitch_px", "count"], [pattern.pitch_px.is_some(), pattern.count.is_some()])?;
+    one_of(["pitch_px", "count"], [pattern.pitch_px.is_some(), pattern.count.is_some()]);
     one_of(
         ["dot_diameter_px", "dot_diameter_mm"],
         [pattern.dot_diameter_px.is_some(), pattern.dot_diameter_mm.is_some()],
-    )?;
+    );
     if pattern.polar_angle_deg.is_none() && pattern.image_radius_px.is_none() {
-        return Err(DesignError::at(
+        faults.push(DesignError::at(
             "pattern.polar_angle_deg",
             "",
             "the pattern has no end",
@@ -169,37 +170,45 @@ fn pattern(design: &Design) -> Result<(), DesignError> {
     if let (Some(pitch_px), Some(diameter_px)) = (pattern.pitch_px, pattern.dot_diameter_px)
         && diameter_px >= pitch_px
     {
-        return Err(DesignError::at(
-            "pattern.dot_diameter_px",
-            diameter_px,
-            "the dots would touch",
-            format!("less than the pitch, {pitch_px} px"),
-        ));
+        faults.push(
+            DesignError::at(
+                "pattern.dot_diameter_px",
+                diameter_px,
+                "the dots would touch",
+                format!("less than the pitch, {pitch_px} px"),
+            )
+            .cured_by("pattern.dot_diameter_px", rounded(0.5 * pitch_px)),
+        );
     }
     let print = &design.sections().print;
     if print.wrap_warn_deg > print.wrap_limit_deg {
-        return Err(DesignError::at(
-            "print.wrap_warn_deg",
-            print.wrap_warn_deg,
-            "the warning would come after the limit",
-            format!("at most print.wrap_limit_deg, {}", print.wrap_limit_deg),
-        ));
+        faults.push(
+            DesignError::at(
+                "print.wrap_warn_deg",
+                print.wrap_warn_deg,
+                "the warning would come after the limit",
+                format!("at most print.wrap_limit_deg, {}", print.wrap_limit_deg),
+            )
+            .cured_by("print.wrap_warn_deg", print.wrap_limit_deg),
+        );
     }
-    Ok(())
 }
 
-fn springs(design: &Design) -> Result<(), DesignError> {
-    if design.sections().mount.is_rigid() {
-        return Ok(());
+fn springs(design: &Design, faults: &mut Vec<DesignError>) {
+    if design.is_rigid() {
+        return;
     }
     let springs = &design.sections().springs;
     if springs.outer_diameter_mm <= 2.0 * springs.wire_diameter_mm {
-        return Err(DesignError::at(
-            "springs.outer_diameter_mm",
-            springs.outer_diameter_mm,
-            "no room is left inside the coil",
-            format!("more than twice the wire, {}", 2.0 * springs.wire_diameter_mm),
-        ));
+        faults.push(
+            DesignError::at(
+                "springs.outer_diameter_mm",
+                springs.outer_diameter_mm,
+                "no room is left inside the coil",
+                format!("more than twice the wire, {}", 2.0 * springs.wire_diameter_mm),
+            )
+            .cured_by("springs.outer_diameter_mm", tenth_up(6.0 * springs.wire_diameter_mm)),
+        );
     }
     // coils that stand in the solid height beside the active ones (Shigley, compression-spring ends)
     let dead_coils = match springs.ends {
@@ -209,29 +218,34 @@ fn springs(design: &Design) -> Result<(), DesignError> {
     };
     let solid_mm = (springs.active_coils + dead_coils) * springs.wire_diameter_mm;
     if springs.free_length_mm <= solid_mm {
-        return Err(DesignError::at(
-            "springs.free_length_mm",
-            springs.free_length_mm,
-            "the spring is solid already",
-            format!("more than its solid height, {} mm", rounded(solid_mm)),
-        ));
+        faults.push(
+            DesignError::at(
+                "springs.free_length_mm",
+                springs.free_length_mm,
+                "the spring is solid already",
+                format!("more than its solid height, {} mm", rounded(solid_mm)),
+            )
+            .cured_by("springs.free_length_mm", tenth_up(2.0 * solid_mm)),
+        );
     }
     let reach_mm = DVec2::from_array(design.sections().platforms.outer_mm) / 2.0;
     let coil_mm = springs.outer_diameter_mm / 2.0;
     for (index, at_mm) in design.springs_at_mm().into_iter().enumerate() {
         if (at_mm.abs() + coil_mm).cmpgt(reach_mm).any() {
-            return Err(DesignError::at(
-                "springs.places",
-                json!(at_mm.to_array().map(rounded)),
-                format!("spring {index} reaches out of the platforms"),
-                format!("within {} x {} mm, coils included", 2.0 * reach_mm.x, 2.0 * reach_mm.y),
-            ));
+            faults.push(
+                DesignError::at(
+                    "springs.places",
+                    json!(at_mm.to_array().map(rounded)),
+                    format!("spring {index} reaches out of the platforms"),
+                    format!("within {} x {} mm, coils included", 2.0 * reach_mm.x, 2.0 * reach_mm.y),
+                )
+                .cured_by("platforms.outer_mm", room_for(at_mm.abs() + coil_mm, reach_mm)),
+            );
         }
     }
-    Ok(())
 }
 
-fn white_markers(design: &Design) -> Result<(), DesignError> {
+fn white_markers(design: &Design, faults: &mut Vec<DesignError>) {
     let sections = design.sections();
     let radius_mm = sections.white_markers.diameter_mm / 2.0;
     let half = DVec2::from_array(sections.sheet.size_mm) / 2.0;
@@ -240,36 +254,59 @@ fn white_markers(design: &Design) -> Result<(), DesignError> {
         let at = DVec2::from_array(*place);
         let field = format!("white_markers.positions_mm[{index}]");
         if at.length() - radius_mm < sections.dome.radius_mm {
-            return Err(DesignError::at(
-                field,
-                json!(place),
-                "the marker lies under the dome and would hide dots",
-                format!("at least {} mm from the axis", rounded(sections.dome.radius_mm + radius_mm)),
-            ));
+            faults.push(
+                DesignError::at(
+                    field.clone(),
+                    json!(place),
+                    "the marker lies under the dome and would hide dots",
+                    format!("at least {} mm from the axis", rounded(sections.dome.radius_mm + radius_mm)),
+                )
+                .cured_by(&field, outwards(at, sections.dome.radius_mm + radius_mm)),
+            );
         }
         if (at.abs() + radius_mm).cmpgt(half).any() {
-            return Err(DesignError::at(
-                field,
-                json!(place),
-                "the marker reaches over the sheet's edge",
-                format!("within {} x {} mm, its radius included", 2.0 * half.x, 2.0 * half.y),
-            ));
+            faults.push(
+                DesignError::at(
+                    field.clone(),
+                    json!(place),
+                    "the marker reaches over the sheet's edge",
+                    format!("within {} x {} mm, its radius included", 2.0 * half.x, 2.0 * half.y),
+                )
+                .cured_by("sheet.size_mm", room_for(at.abs() + radius_mm, half)),
+            );
         }
         let clash =
             places[..index].iter().position(|other| DVec2::from_array(*other).distance(at) < 2.0 * radius_mm);
         if let Some(other) = clash {
-            return Err(DesignError::at(
-                field,
+            faults.push(DesignError::at(
+                field.clone(),
                 json!(place),
                 format!("the marker overlaps marker {other}"),
                 "markers that are apart by a diameter or more",
             ));
         }
     }
-    Ok(())
 }
 
 /// Numbers in messages are for people: to a nanometre, without the tail of binary fractions.
 fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
+}
+
+/// A tenth of a millimetre above.
+fn tenth_up(value: f64) -> f64 {
+    rounded((10.0 * value - 1e-6).ceil() / 10.0)
+}
+
+/// Sides that leave room for what reaches so far from the axis, none smaller than they are.
+fn room_for(reach_mm: DVec2, half_mm: DVec2) -> Value {
+    let sides = (2.0 * reach_mm.max(half_mm)).to_array().map(tenth_up);
+    json!(sides)
+}
+
+/// A place moved away from the axis to at least a distance; one on the axis goes along x.
+fn outwards(at_mm: DVec2, distance_mm: f64) -> Value {
+    let way = at_mm.try_normalize().unwrap_or(DVec2::X);
+    let place = (way * (distance_mm + 0.01)).to_array();
+    json!(place.map(|side| rounded((100.0 * side).round() / 100.0)))
 }

@@ -12,13 +12,16 @@ use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value};
 
 use super::error::DesignError;
+use super::schema_faults::{
+    first_sentence, join, kind_of, listed, missing, not_a_choice, type_words, unknown_key,
+};
 use super::sections::DesignFile;
 
 /// The JSON schema (draft 2020-12) of the design file.
 pub fn design_schema() -> &'static Value {
     static SCHEMA: OnceLock<Value> = OnceLock::new();
     SCHEMA.get_or_init(|| {
-        let mut schema = strict_schema().clone();
+        let mut schema = open_schema().clone();
         super::fill::relax(&mut schema);
         schema
     })
@@ -28,6 +31,41 @@ pub fn design_schema() -> &'static Value {
 pub(super) fn strict_schema() -> &'static Value {
     static SCHEMA: OnceLock<Value> = OnceLock::new();
     SCHEMA.get_or_init(schema_of::<DesignFile>)
+}
+
+/// The schema of a design of which rules give what it leaves out.
+pub(super) fn open_schema() -> &'static Value {
+    static SCHEMA: OnceLock<Value> = OnceLock::new();
+    SCHEMA.get_or_init(|| {
+        let mut schema = strict_schema().clone();
+        for field in super::derive::fields() {
+            let keys: Vec<&str> = field.split('.').collect();
+            // a section of which every field may be left out may be left out itself
+            for depth in (1..=keys.len()).rev() {
+                let (above, last) = keys[..depth].split_at(depth - 1);
+                if !not_required(&mut schema, above, last[0]) {
+                    break;
+                }
+            }
+        }
+        schema
+    })
+}
+
+/// Takes a key from what the object at a path requires; whether that object then requires nothing more.
+fn not_required(schema: &mut Value, path: &[&str], key: &str) -> bool {
+    let mut place = String::new();
+    for step in path {
+        place += &format!("/properties/{step}");
+        let Some(name) = schema.pointer(&place).and_then(|found| found.get("$ref")?.as_str()) else {
+            continue;
+        };
+        place = name.trim_start_matches('#').to_owned();
+    }
+    let Some(object) = schema.pointer_mut(&place) else { return false };
+    let Some(required) = object.get_mut("required").and_then(Value::as_array_mut) else { return true };
+    required.retain(|name| name != key);
+    required.is_empty()
 }
 
 /// The schema of any type of ours, without the `null` that optional fields would allow: in a
@@ -62,7 +100,7 @@ fn forbid_null(schema: &mut Schema) {
     }
 }
 
-/// Checks `value` against the schema of `T`, naming the first fault by its path below `at`.
+/// Checks `value` against the schema of `T`, naming every fault by its path below `at`.
 ///
 /// # Errors
 /// Unknown keys (with the nearest known one), missing fields, wrong types, values out of range.
@@ -184,9 +222,11 @@ impl<'a> Walk<'a> {
             ));
         }
         if let Some(each) = schema.get("items") {
-            for (index, item) in items.iter().enumerate() {
-                self.visit(each, item, &format!("{at}[{index}]"))?;
-            }
+            let visited = items
+                .iter()
+                .enumerate()
+                .map(|(index, item)| self.visit(each, item, &format!("{at}[{index}]")));
+            return DesignError::all(visited.filter_map(Result::err).collect());
         }
         Ok(())
     }
@@ -209,16 +249,19 @@ impl<'a> Walk<'a> {
             .filter_map(|source| source.get("properties")?.as_object())
             .flat_map(|properties| properties.iter().map(|(key, value)| (key.clone(), value.clone())))
             .collect();
+        let mut faults = Vec::new();
         for (key, value) in map {
             let found = sources
                 .iter()
                 .flatten()
                 .find_map(|source| source.get("properties").and_then(|all| all.get(key)));
             match (found, schema.get("additionalProperties")) {
-                (Some(field), _) => self.visit(field, value, &join(at, key))?,
-                (None, Some(rest @ Value::Object(_))) => self.visit(rest, value, &join(at, key))?,
+                (Some(field), _) => faults.extend(self.visit(field, value, &join(at, key)).err()),
+                (None, Some(rest @ Value::Object(_))) => {
+                    faults.extend(self.visit(rest, value, &join(at, key)).err());
+                }
                 (None, None | Some(Value::Bool(true))) if known.is_empty() => {}
-                (None, _) => return Err(unknown_key(key, value, &known, at)),
+                (None, _) => faults.push(unknown_key(key, value, &known, at)),
             }
         }
         for source in sources.iter().flatten() {
@@ -227,7 +270,7 @@ impl<'a> Walk<'a> {
                     let about =
                         known.get(name).and_then(|field| field.get("description")).and_then(Value::as_str);
                     let fault = missing(name, at);
-                    return Err(match about {
+                    faults.push(match about {
                         Some(about) => fault.with_help(format!("it says: {}", first_sentence(about))),
                         None => fault,
                     });
@@ -237,10 +280,10 @@ impl<'a> Walk<'a> {
         if let Some(Value::Object(reasons)) = map.get("why") {
             // a reason for a field that does not exist is a misspelt field
             if let Some((key, value)) = reasons.iter().find(|(key, _)| !known.contains_key(*key)) {
-                return Err(unknown_key(key, value, &known, &join(at, "why")));
+                faults.push(unknown_key(key, value, &known, &join(at, "why")));
             }
         }
-        Ok(())
+        DesignError::all(faults)
     }
 }
 
@@ -329,67 +372,4 @@ fn check_range(schema: &Value, number: f64, value: &Value, at: &str) -> Result<(
         );
     }
     Err(fault)
-}
-
-fn unknown_key(key: &str, value: &Value, known: &Map<String, Value>, at: &str) -> DesignError {
-    // Jaro-Winkler forgives swapped letters and a missing unit suffix, as people mistype keys
-    let nearest = known
-        .keys()
-        .map(|name| (strsim::jaro_winkler(name, key), name))
-        .filter(|(likeness, _)| *likeness > 0.75)
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    let names: Vec<&str> = known.keys().map(String::as_str).collect();
-    let fault = DesignError::at(join(at, key), value, "unknown key", names.join(", "));
-    match nearest {
-        Some((_, name)) => fault.with_help(format!("did you mean \"{name}\"?")),
-        None => fault,
-    }
-}
-
-fn missing(name: &str, at: &str) -> DesignError {
-    DesignError::at(join(at, name), "", "the field is missing", "")
-}
-
-fn not_a_choice(choices: &[&Value], value: &Value, at: &str) -> DesignError {
-    DesignError::at(at, value, "not one of the known choices", listed(choices))
-}
-
-fn listed(values: &[&Value]) -> String {
-    values.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-}
-
-fn kind_of(value: &Value) -> &'static str {
-    match value {
-        Value::Null => "null",
-        Value::Bool(_) => "true or false",
-        Value::Number(number) if number.as_f64().is_some_and(|n| n.fract() != 0.0) => "a fraction",
-        Value::Number(_) => "a number",
-        Value::String(_) => "text",
-        Value::Array(_) => "a list",
-        Value::Object(_) => "an object",
-    }
-}
-
-fn type_words(schema: &Value) -> &'static str {
-    match schema.get("type").and_then(Value::as_str) {
-        Some("number") => "a number",
-        Some("integer") => "a whole number",
-        Some("string") => "text",
-        Some("boolean") => "true or false",
-        Some("array") => "a list",
-        Some("object") => "an object",
-        _ => "another kind of value",
-    }
-}
-
-fn first_sentence(text: &str) -> &str {
-    text.split_once(".\n")
-        .or_else(|| text.split_once(". "))
-        .map_or(text, |(first, _)| first)
-        .trim_end_matches('.')
-}
-
-/// `a.b` from `a` and `b`.
-pub fn join(at: &str, key: &str) -> String {
-    if at.is_empty() { key.to_owned() } else { format!("{at}.{key}") }
 }

@@ -16,6 +16,7 @@
 //! ```
 
 pub mod check;
+mod claims;
 mod manifest;
 mod measured;
 mod tree;
@@ -39,9 +40,6 @@ use domecast_design::parts;
 use domecast_design::parts::PartError;
 use domecast_design::settings::SAFETY;
 use domecast_design::{Design, DesignError, DesignWarning};
-use domecast_design::{claims_of, suspension_of};
-use domecast_optics::numeric::Rigid;
-use domecast_springs::Check;
 
 /// Why a build could not be made.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -163,7 +161,7 @@ fn make(
     let sha256 = sha256_hex(design.text().as_bytes());
 
     step("trying the claimed loads");
-    let sight = try_claims(design)?;
+    let sight = claims::try_claims(design)?;
     step("laying out the dots");
     let (spec, layout) = lay_out(design)?;
     step("writing the constants");
@@ -175,12 +173,7 @@ fn make(
     let draw = || artwork::files(&spec, &layout);
     let judge = || LayoutReport::new(design, &spec, &layout);
     let make_parts = || make_parts(design, &layout, &springs);
-    // What a frame resolves hangs on how the markers stand out in it.
-    let load = || {
-        let light = LightCheck::of(design)?;
-        let noise_px: Vec<f64> = light.report.markers.iter().map(|marker| marker.centroid_sd_px).collect();
-        Ok::<_, DesignError>((light, constants::force_report(design, &springs, &noise_px)?))
-    };
+    let load = || light_and_forces(design, &springs);
     let ((films, judged), (parts, loaded)) =
         rayon::join(|| rayon::join(draw, judge), || rayon::join(make_parts, load));
     for file in films? {
@@ -192,11 +185,9 @@ fn make(
         tree.add(file.path, file.bytes);
     }
     let (light, forces) = loaded?;
-    for (path, bytes) in light.files() {
+    let force_files = forces.files().into_iter().map(|(path, text)| (path, text.into_bytes()));
+    for (path, bytes) in light.files().into_iter().chain(force_files) {
         tree.add(path, bytes);
-    }
-    for (path, text) in forces.files() {
-        tree.add(path, text.into_bytes());
     }
     step("writing what other programs read");
     tree.add(
@@ -235,6 +226,17 @@ fn make(
     let mut headlines = judged.headlines();
     headlines.extend(averaging(design, &forces));
     Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines })
+}
+
+/// The lit sensor, and what a frame of it resolves, which hangs on how the markers stand out in it.
+fn light_and_forces(
+    design: &Design,
+    springs: &constants::DesignSprings,
+) -> Result<(LightCheck, constants::ForceReport), DesignError> {
+    let light = LightCheck::of(design)?;
+    let noise_px: Vec<f64> = light.report.markers.iter().map(|marker| marker.centroid_sd_px).collect();
+    let forces = constants::force_report(design, springs, &noise_px)?;
+    Ok((light, forces))
 }
 
 /// The design's own warnings, then those of the assembled parts, of the constants' formats, of the pattern and of the light.
@@ -304,52 +306,6 @@ fn make_parts(
     let files = parts::files(design, measures, &made, &assembly)?;
     let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
     Ok(MadeParts { made, assembly, checked, files, poses })
-}
-
-/// Puts every claimed load on the springs: none may pass a limit, and every white marker must stay visible. Returns the
-/// check of the markers.
-fn try_claims(design: &Design) -> Result<constants::MarkerSight, DesignError> {
-    let sight = constants::MarkerSight::of(design);
-    sight.require(design, &Rigid::identity(), "at rest")?;
-    if design.is_rigid() {
-        return Ok(sight);
-    }
-    let suspension = suspension_of(design)?;
-    for (index, (claim, case)) in
-        design.sections().loads.claims.iter().zip(claims_of(design, &suspension)).enumerate()
-    {
-        let field = format!("loads.claims[{index}]");
-        let passed = case.passed().next().map(|check| {
-            let Check { limit, part, value, bound, unit } = check;
-            DesignError::at(
-                field.clone(),
-                serde_json::json!(claim),
-                format!(
-                    "the load \"{}\" passes a limit: {} at {part}, {value:.3} {unit}",
-                    claim.name,
-                    limit.as_str()
-                ),
-                format!("at most {bound:.3} {unit}"),
-            )
-            .with_help(
-                "claim less, or change `springs`, `magnets.grip_force_n` or the heights of the platforms",
-            )
-        });
-        if let Some(error) = passed {
-            return Err(error);
-        }
-        let balance = case.equilibrium.map_err(|error| {
-            DesignError::at(
-                field,
-                serde_json::json!(claim),
-                error.to_string(),
-                "a load that the springs carry",
-            )
-        })?;
-        let pose = balance.displacement.to_pose(suspension.at_mm());
-        sight.require(design, &pose, &format!("under the load \"{}\"", claim.name))?;
-    }
-    Ok(sight)
 }
 
 /// The layout of a design's dots, and what it was made from.

@@ -86,7 +86,7 @@ fn the_bound_names_the_weak_axes() {
 fn the_table_is_near_the_law() {
     let design = thumb("thumb24.json");
     let suspension = suspension_of(&design).unwrap();
-    let springs = springs(&design).constants;
+    let springs = springs(&design).constants.unwrap();
     for load in claimed_loads(&design, &suspension, &MarkerSight::of(&design)) {
         let d = domecast_springs::Displacement::of_pose(&load.pose, suspension.at_mm());
         let by_table = wrench_by_table(&springs, &d);

@@ -3,9 +3,9 @@
 
 use serde_json::json;
 
-use super::LightReport;
+use super::levels::{LightReport, MarkerLevels};
 use crate::numbers::{percent, typeset};
-use domecast_design::{Design, DesignError};
+use domecast_design::{Cure, Design, DesignError};
 use domecast_runtime::track::MIN_MARKER_RISE_LEVELS;
 
 /// A dot's ink gives back a twentieth of the membrane's light at most: what is left of the level is the dot's contrast,
@@ -18,12 +18,20 @@ const MIN_MEDIAN_LEVEL: f64 = 25.0;
 /// More shadowed or saturated places than this share are worth a word.
 const MAX_SHARE: f64 = 0.005;
 
+/// A paint whiter than this is none.
+const MAX_REFLECTANCE: f64 = 0.9;
+/// Lights this many times brighter are other lights.
+const MAX_BRIGHTER: f64 = 1e3;
+
 /// Refuses a sensor that its own camera could not read.
 pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), DesignError> {
     let (dome, leds) = (&report.dome, &design.sections().leds);
     if dome.median_level < MIN_DOME_LEVEL {
-        let factor = MIN_DOME_LEVEL / dome.median_level.max(f64::MIN_POSITIVE);
-        let flux = leds.radiant_flux_mw.to_array().map(|mw| json!(round_up(1.1 * factor * mw)));
+        // Light from outside does not grow with the lights.
+        let stray = 255.0 * design.sections().exposure.stray_level;
+        let factor = (MIN_DOME_LEVEL - stray) / (dome.median_level - stray).max(f64::MIN_POSITIVE);
+        let cure = brighter(design, 1.1 * factor.max(1.0));
+        let text = format!("{cure}, or a larger exposure.max_level_per_mw_mm2 where the camera has it");
         return Err(DesignError::at(
             "leds.radiant_flux_mw",
             json!(leds.radiant_flux_mw),
@@ -33,16 +41,14 @@ pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), Desig
             ),
             format!("a median of at least {}", typeset(MIN_DOME_LEVEL)),
         )
-        .with_help(format!(
-            "{} mW would do, or a larger `exposure.max_level_per_mw_mm2` where the camera has it",
-            json!(flux)
-        )));
+        .with_cure(cure)
+        .with_help(text));
     }
     let dimmest = report.markers.iter().min_by(|a, b| a.contrast_levels.total_cmp(&b.contrast_levels));
     let Some(marker) = dimmest.filter(|marker| marker.contrast_levels < MIN_MARKER_RISE_LEVELS) else {
         return Ok(());
     };
-    Err(DesignError::at(
+    let fault = DesignError::at(
         format!("white_markers.positions_mm[{}]", marker.id),
         json!(design.sections().white_markers.positions_mm.get(marker.id)),
         format!(
@@ -51,11 +57,41 @@ pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), Desig
             typeset(marker.contrast_levels)
         ),
         format!("at least {} above it", typeset(MIN_MARKER_RISE_LEVELS)),
-    )
-    .with_help(
-        "place the markers where more light reaches them, nearer to the dome's rim, or darken what is around them \
-         (`exposure.surround_level`)",
-    ))
+    );
+    const ELSE: &str = "place the markers where more light reaches them, nearer to the dome's rim, or darken what is \
+                        around them (`exposure.surround_level`)";
+    Err(match seen_by(design, report, marker) {
+        Some(cure) => {
+            let text = format!("{cure}; or {ELSE}");
+            fault.with_cure(cure).with_help(text)
+        }
+        None => fault.with_help(ELSE),
+    })
+}
+
+/// Lights so many times brighter.
+fn brighter(design: &Design, factor: f64) -> Cure {
+    let [r, g, b] = design.sections().leds.radiant_flux_mw.to_array().map(|mw| round_up(factor * mw));
+    Cure { field: "leds.radiant_flux_mw".into(), value: json!({ "r": r, "g": g, "b": b }) }
+}
+
+/// What makes a marker stand out by what `track` needs and half of that again: surroundings as dark as that asks for;
+/// where none are dark enough, more light if the camera cannot expose longer, and else a whiter paint.
+fn seen_by(design: &Design, report: &LightReport, marker: &MarkerLevels) -> Option<Cure> {
+    const FULL: f64 = 255.0;
+    let wanted = 1.5 * MIN_MARKER_RISE_LEVELS;
+    let sections = design.sections();
+    if marker.level >= wanted {
+        let level = (1e4 * (marker.level - wanted) / FULL).floor() / 1e4;
+        return Some(Cure { field: "exposure.surround_level".into(), value: json!(level) });
+    }
+    let factor = (wanted + FULL * sections.exposure.surround_level) / marker.level.max(f64::MIN_POSITIVE);
+    if report.is_exposure_at_limit && factor < MAX_BRIGHTER {
+        return Some(brighter(design, factor));
+    }
+    let reflectance = factor * sections.white_markers.reflectance;
+    (reflectance <= MAX_REFLECTANCE)
+        .then(|| Cure { field: "white_markers.reflectance".into(), value: json!(round_up(reflectance)) })
 }
 
 /// What its maker should know.

@@ -265,3 +265,41 @@ fn the_pinhole_alone_misses_by_what_is_known() {
     assert!(comparison.image_px.nearest.variation > 0.03, "{comparison:?}");
     assert_eq!(own.image_px, own.even_frame_px);
 }
+
+/// Whether turning (and, if asked, mirroring) the places about their centre gives the same places.
+fn is_same(places: &[DVec2], turn_rad: f64, mirrored: bool) -> bool {
+    places.iter().all(|place| {
+        let seen = if mirrored { DVec2::new(place.x, -place.y) } else { *place };
+        let image = DVec2::from_angle(turn_rad).rotate(seen);
+        places.iter().any(|other| other.distance(image) < 1e-6)
+    })
+}
+
+#[test]
+fn patterns_are_symmetric_about_the_axis() {
+    use crate::layout::boundary::Boundary;
+    use crate::layout::pattern::Pattern;
+    use crate::sections::{CentredOn, PatternKind};
+    // an edge as a projection makes it: round but for rounding
+    let edge = Boundary::new(|way: DVec2| 180.0 * (1.0 + 2e-10 * f64::sin(37.0 * way.x)));
+    for (kind, centred_on, turns) in [
+        (PatternKind::Square, CentredOn::Gap, 4),
+        (PatternKind::Square, CentredOn::Dot, 4),
+        (PatternKind::Hexagonal, CentredOn::Gap, 2),
+        (PatternKind::Hexagonal, CentredOn::Dot, 6),
+    ] {
+        for wanted in [60, 170, 300, 301] {
+            let pattern =
+                Pattern { kind, pitch_px: 1.0, centred_on, rotation_rad: 0.0, wanted: Some(wanted) };
+            let pitch_px = pattern.pitch_for_count(wanted, &edge).unwrap();
+            let places = Pattern { pitch_px, ..pattern }.places(&edge).unwrap();
+            let named = format!("{kind:?} {centred_on:?} {wanted}: {} places", places.len());
+            assert!(places.len().abs_diff(wanted) <= 12, "{named}");
+            for turn in 0..turns {
+                let turn_rad = std::f64::consts::TAU * f64::from(turn) / f64::from(turns);
+                assert!(is_same(&places, turn_rad, false), "{named}");
+                assert!(is_same(&places, turn_rad, true), "{named}, mirrored");
+            }
+        }
+    }
+}

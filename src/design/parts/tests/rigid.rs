@@ -63,7 +63,10 @@ fn a_rigid_mount_has_nothing_of_springs() {
         assert!(fault.field == field && fault.to_string().contains("rigid mount"), "{fault}");
     }
     assert_eq!(fault(&[("loads", thumb["loads"].clone())]).field, "loads.claims");
-    assert_eq!(fault(&[("white_markers", thumb["white_markers"].clone())]).field, "white_markers.positions_mm");
+    assert_eq!(
+        fault(&[("white_markers", thumb["white_markers"].clone())]).field,
+        "white_markers.positions_mm"
+    );
     assert_eq!(fault(&[("mount.at_mm", json!([[9, 9]]))]).field, "mount.at_mm");
     assert_eq!(fault(&[("mount.at_mm", json!([[9, 9], [99, 0]]))]).field, "mount.at_mm[1]");
     assert_eq!(fault(&[("mount.at_mm", json!([[9, 9], [9, 8]]))]).field, "mount.at_mm[1]");

@@ -239,7 +239,7 @@ fn a_deep_camera_looks_through_a_cone() {
     let tree = edited(&deep());
     let checked = verdict(&tree).unwrap_or_else(|faults| panic!("{faults:#?}"));
     assert!(checked.sight.iter().flat_map(|pose| &pose.counts).all(|count| count.blocked == 0));
-    // The same camera down a plain bore is blind, and told so.
+    // The same camera down a plain bore is blind, and refused.
     let design = Design::from_str(&tree.to_string()).unwrap();
     let mut m = Measures::of(&design).unwrap();
     assert!(m.lower_view.take().is_some());

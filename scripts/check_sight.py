@@ -129,8 +129,8 @@ def sights(folder):
             detail += f"; {len(lost)} blocked from {first:.1f} degrees, most by {worst}"
         yield f"no {what[:-1]} is behind a part", not lost, detail
     # The check sees walls: rays spread by a third beyond the markers (the dome's rim without them) meet the platforms.
-    rim = rims(np.zeros(3), np.array([0, 0, 1.0]), constants["optics"]["dome_radius_mm"])
-    pupil, ends, _ = air_rays(constants, aimed["white markers"] or list(rim))
+    rim = list(rims(np.zeros(3), np.array([0, 0, 1.0]), constants["optics"]["dome_radius_mm"]))
+    pupil, ends, _ = air_rays(constants, aimed["white markers"] or rim)
     wide = pupil + (ends - pupil) * np.array([1.33, 1.33, 1.0])
     yield "wider rays do meet parts", any(n is not None for n in blocked(meshes, pupil, wide)), ""
 

@@ -54,8 +54,8 @@ impl OwnSensor {
                 return Err(DesignError::at(
                     "camera_body",
                     json!(key),
-                    "this camera is a board, and the lower platform holds cylinders only",
-                    "a camera with a cylindrical body",
+                    "the catalogue has nothing of this camera's body",
+                    "a camera whose body it has",
                 )
                 .with_help(
                     "leave --body out, and give camera_body.diameter_mm and length_mm of the lens barrel yourself",

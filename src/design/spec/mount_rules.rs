@@ -41,9 +41,6 @@ pub(super) fn check(sections: &DesignFile) -> Result<(), DesignError> {
             ))
         };
     }
-    let cannot = |field: &str, value: Value, problem: &str, allowed: &str| {
-        Err(DesignError::at(field, value, format!("rigid mount: {problem}"), allowed))
-    };
     for (field, is_none) in &parts[..3] {
         if !is_none {
             return cannot(field, Value::Null, "nothing springs or holds springs", "no such section");
@@ -69,6 +66,12 @@ pub(super) fn check(sections: &DesignFile) -> Result<(), DesignError> {
         let problem = "the upper platform stands on too few posts";
         return cannot("mount.at_mm", json!(mount.at_mm), problem, "two posts or more");
     }
+    posts(sections)
+}
+
+/// Posts stand on the platforms, apart from each other.
+fn posts(sections: &DesignFile) -> Result<(), DesignError> {
+    let mount = &sections.mount;
     let half = 0.5 * DVec2::from_array(sections.platforms.outer_mm) - 0.5 * mount.post_diameter_mm;
     for (i, at) in mount.at_mm.iter().enumerate() {
         let place = DVec2::from_array(*at);
@@ -88,4 +91,8 @@ pub(super) fn check(sections: &DesignFile) -> Result<(), DesignError> {
         }
     }
     Ok(())
+}
+
+fn cannot(field: &str, value: Value, problem: &str, allowed: &str) -> Result<(), DesignError> {
+    Err(DesignError::at(field, value, format!("rigid mount: {problem}"), allowed))
 }

@@ -195,7 +195,7 @@ fn pattern(design: &Design, faults: &mut Vec<DesignError>) {
 }
 
 fn springs(design: &Design, faults: &mut Vec<DesignError>) {
-    if design.sections().mount.is_rigid() {
+    if design.is_rigid() {
         return;
     }
     let springs = &design.sections().springs;

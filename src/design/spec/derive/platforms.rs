@@ -119,7 +119,8 @@ pub(super) const OUTLINE: &[Rule] = &[
         tapped,
     ),
     follows("platforms.lower.cable_exit.width_mm", "the cable and 0.7 mm", |k| {
-        k.number(k.n("camera_body.cable_diameter_mm") + 0.7)
+        let flat = k.has("camera_body.cable_width_mm");
+        k.number(k.n(if flat { "camera_body.cable_width_mm" } else { "camera_body.cable_diameter_mm" }) + 0.7)
     }),
     follows(
         "platforms.lower.cable_exit.height_mm",
@@ -275,14 +276,24 @@ fn spring_azimuth_deg(k: &Known<'_>, index: usize) -> f64 {
     at(1).atan2(at(0)).to_degrees().rem_euclid(360.0)
 }
 
+/// Room below a board for the heads of its screws, mm.
+const MIN_HEAD_MM: f64 = 3.0;
+
 fn bottom(k: &Known<'_>) -> Option<Value> {
     let channel = k.n("platforms.lower.cable_exit.height_mm");
     let screws = channel + k.n("platforms.lower.clamp.hole_diameter_mm") + 2.0 * (wall_mm(k) + 0.2);
-    let body = back_mm(k) - channel;
+    let mut body = back_mm(k) - channel;
+    if k.has("camera_body.board") {
+        let parts = k.n("camera_body.board.components_height_mm").max(MIN_HEAD_MM);
+        body = back_mm(k) - k.n("camera_body.board.thickness_mm") - parts.max(channel);
+    }
     k.number(down(body.min(lower_top_mm(k) - screws), 0.1))
 }
 
 fn clamps(k: &Known<'_>) -> Option<Value> {
+    if k.has("camera_body.board") {
+        return Some(Value::Array(Vec::new()));
+    }
     // half-way between a light's wires and the next spring for three springs, between two springs for six
     let busy: Vec<f64> = (0..spring_count(k))
         .map(|index| spring_azimuth_deg(k, index))

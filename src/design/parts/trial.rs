@@ -10,26 +10,44 @@ use crate::layout::PrintPass;
 use crate::spec::{Cure, Design};
 
 /// Changes of a field that are tried, smallest first; each up and down.
-const SHARES: [f64; 8] = [0.02, 0.05, 0.1, 0.15, 0.25, 0.4, 0.6, 1.0];
-/// Fields that are tried at most.
-const MAX_FIELDS: usize = 6;
+const SHARES: [f64; 4] = [0.04, 0.12, 0.3, 0.6];
+/// Fields that are tried at most for a fault.
+const MAX_FIELDS: usize = 4;
+/// Changes that are tried at most in a run: each makes a part.
+const MAX_TRIED: usize = 24;
 
 /// The faults, each that names fields and no change with the first change that was found to help.
 pub(super) fn with_cures(design: &Design, passes: &[PrintPass], faults: Vec<PartError>) -> Vec<PartError> {
+    let mut left = MAX_TRIED;
+    // What stands in a seat's way often makes thin walls too: with the seats mended the walls are looked at again.
+    let seats = faults.iter().flat_map(PartError::faults).any(|fault| fault.cure().is_some());
+    if seats {
+        left = 0;
+    }
     faults
         .into_iter()
         .flat_map(|fault| match fault {
             PartError::Several(several) => several,
             one => vec![one],
         })
-        .map(|fault| match cure_of(design, passes, &fault) {
+        .map(|fault| match at_limit(design, &fault).or_else(|| cure_of(design, passes, &fault, &mut left)) {
             Some(cure) => PartError::Cured { fault: Box::new(fault), cure },
             None => fault,
         })
         .collect()
 }
 
-fn cure_of(design: &Design, passes: &[PrintPass], fault: &PartError) -> Option<Cure> {
+/// The limit itself, where a fault is that of a field's own value.
+pub(super) fn at_limit(design: &Design, fault: &PartError) -> Option<Cure> {
+    let PartError::Infeasible { field, value_mm, limit_mm, .. } = fault else { return None };
+    let sections = serde_json::to_value(design.sections()).ok()?;
+    let given = field.split('.').try_fold(&sections, |place, key| place.get(key))?.as_f64()?;
+    ((given - value_mm).abs() <= 1e-9 * given.abs().max(1.0))
+        .then(|| Cure { field: field.clone(), value: json!(limit_mm) })
+}
+
+/// The first change of a field that was tried and helps, of as many as are left.
+fn cure_of(design: &Design, passes: &[PrintPass], fault: &PartError, tries_left: &mut usize) -> Option<Cure> {
     let (part, fields) = match fault {
         PartError::Infeasible { part, field, .. } | PartError::Broken { part, field, .. } => (part, field),
         _ => return None,
@@ -49,7 +67,9 @@ fn cure_of(design: &Design, passes: &[PrintPass], fault: &PartError) -> Option<C
             })
         })
         .map(|(field, value)| Cure { field, value })
+        .take(*tries_left)
         .collect();
+    *tries_left = tries_left.saturating_sub(tried.len());
     // In pieces, so that the smallest change that helps ends the search.
     let helps = |cure: &Cure| makes(&given, cure, part, passes);
     tried.chunks(8).find_map(|some| some.par_iter().find_first(|cure| helps(cure)).cloned())

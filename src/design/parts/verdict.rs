@@ -56,7 +56,11 @@ pub fn check_sensor(
         faults.push(fault);
         Vec::new()
     });
-    PartError::all(faults)?;
+    let cured = |fault: &PartError| match trial::at_limit(design, fault) {
+        Some(cure) => PartError::Cured { fault: Box::new(fault.clone()), cure },
+        None => fault.clone(),
+    };
+    PartError::all(faults.iter().flat_map(PartError::faults).map(cured).collect())?;
     let notes = seats::notes(m).into_iter().chain(board_seat::notes(m)).collect();
     Ok(CheckedSensor { sight, notes })
 }

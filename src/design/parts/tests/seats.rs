@@ -42,7 +42,10 @@ pub(super) fn verdict(tree: &Value) -> Result<CheckedSensor, Vec<PartError>> {
 
 /// The fault whose cure is in a field.
 pub(super) fn fault_in(faults: &[PartError], field: &str) -> Option<PartError> {
-    faults.iter().find(|fault| fault.cure().is_some_and(|cure| cure.field == field)).cloned()
+    // a wall's fault may be cured by a seat's field: that is another fault
+    let of_seat = |fault: &&PartError| !matches!(fault, PartError::Cured { .. });
+    let here = |fault: &&PartError| fault.cure().is_some_and(|cure| cure.field == field);
+    faults.iter().filter(of_seat).find(here).cloned()
 }
 
 #[track_caller]

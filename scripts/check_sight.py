@@ -128,8 +128,9 @@ def sights(folder):
             first = np.degrees(np.arcsin(min(s for s, n in zip(sines, names) if n is not None)))
             detail += f"; {len(lost)} blocked from {first:.1f} degrees, most by {worst}"
         yield f"no {what[:-1]} is behind a part", not lost, detail
-    # The check sees walls: rays spread by a third beyond the markers meet the platforms.
-    pupil, ends, _ = air_rays(constants, aimed["white markers"] or aimed["dots"])
+    # The check sees walls: rays spread by a third beyond the markers (the dome's rim without them) meet the platforms.
+    rim = rims(np.zeros(3), np.array([0, 0, 1.0]), constants["optics"]["dome_radius_mm"])
+    pupil, ends, _ = air_rays(constants, aimed["white markers"] or list(rim))
     wide = pupil + (ends - pupil) * np.array([1.33, 1.33, 1.0])
     yield "wider rays do meet parts", any(n is not None for n in blocked(meshes, pupil, wide)), ""
 

@@ -26,6 +26,7 @@
 //! | replace nominal numbers by measured ones | [`calibrate`] |
 //! | turn frames into markers, pose, wrench and displacement | [`Tracker`]; [`track`] |
 //! | simulate what the sensor sees | [`Scene`]; [`sim`] |
+//! | look at the lit sensor before it is made | [`light`] |
 //! | do all of it | [`build`], and [`report`] for its page; [`compare`] two of them |
 //!
 //! Each module comes from a crate of its own (`domecast-optics`, `domecast-runtime`, ..): a robot that only tracks
@@ -49,7 +50,7 @@ pub use nalgebra;
 pub use domecast_contact as contact;
 pub use domecast_design as design;
 pub use domecast_design::{layout, parts, transfer};
-pub use domecast_fab::{artwork, build, compare, report};
+pub use domecast_fab::{artwork, build, compare, light, report};
 pub use domecast_mesh as mesh;
 pub use domecast_optics as optics;
 pub use domecast_optics::{camera, numeric, pose};

@@ -9,7 +9,18 @@ use std::process::Command;
 use common::domecast;
 use serde_json::Value;
 
-const DESIGNS: [&str; 3] = ["thumb24", "thumb24-fisheye", "thumb24-pinhole"];
+const DESIGNS: [&str; 5] = ["thumb24", "thumb24-fisheye", "thumb24-pinhole", "thumb24-wide", "endoscope-r5"];
+
+/// What a design gives or leaves to a rule.
+fn given(built: &Path, name: &str, field: &str) -> Value {
+    let pointer = format!("/{}", field.replace('.', "/"));
+    if let Some(value) = json(&design_path(name)).pointer(&pointer) {
+        return value.clone();
+    }
+    let derived = json(&built.join("derived.json"));
+    let list = derived.as_array().expect("a list");
+    list.iter().find(|one| one["field"] == field).map(|one| one["value"].clone()).expect("a rule")
+}
 
 fn design_path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("designs").join(format!("{name}.json"))
@@ -40,7 +51,8 @@ fn dots_lie_on_the_dome_and_project_to_their_pixels() {
     for name in DESIGNS {
         let constants = json(&build(name, folder.path()).join("constants/constants.json"));
         let dots = constants["black_dots"].as_array().expect("dots");
-        assert!(dots.len() > 100, "{name} has {} dots", dots.len());
+        let least = if name == "endoscope-r5" { 60 } else { 100 };
+        assert!(dots.len() >= least, "{name} has {} dots", dots.len());
         let radius_mm = constants["optics"]["dome_radius_mm"].as_f64().expect("a radius");
         let mut points = String::new();
         for dot in dots {
@@ -87,7 +99,9 @@ fn a_lattice_is_even_in_the_image() {
         let spacings: Vec<f64> = (0..places.len()).map(nearest).collect();
         let (min, max) =
             spacings.iter().fold((f64::INFINITY, 0.0_f64), |(min, max), s| (min.min(*s), max.max(*s)));
-        let pitch_px = json(&design_path(name))["pattern"]["pitch_px"].as_f64().expect("a pitch");
+        let asked = json(&design_path(name))["pattern"]["pitch_px"].as_f64();
+        let layout = json(&folder.path().join(name).join("artwork/layout.json"));
+        let pitch_px = asked.unwrap_or_else(|| layout["pitch_px"].as_f64().expect("a pitch"));
         assert!((max - min) / min < 1e-6, "{name}: {min} to {max} px");
         assert!((min - pitch_px).abs() < 1e-6 * pitch_px, "{name}: {min} px instead of {pitch_px}");
     }
@@ -103,26 +117,45 @@ fn the_artwork_lands_on_the_dots() {
         let constants = json(&out.join("constants/constants.json"));
         let dots = constants["black_dots"].as_array().expect("dots");
         let radius_mm = constants["optics"]["dome_radius_mm"].as_f64().expect("a radius");
-        let drawing = fs::read_to_string(out.join("artwork/dots.svg")).expect("the drawing");
+        let layout = json(&out.join("artwork/layout.json"));
+        let passes = layout["hits"].as_array().expect("passes");
         let attribute = |element: &str, name: &str| -> f64 {
             let from = element.find(&format!(" {name}=\"")).expect("the attribute") + name.len() + 3;
             let to = from + element[from..].find('"').expect("its end");
             element[from..to].parse().expect("a number")
         };
-        let elements: Vec<&str> =
-            drawing.split('<').filter(|element| element.contains(" data-id=")).collect();
-        assert_eq!(elements.len(), dots.len(), "{name}: every dot is drawn once");
-        for element in elements {
-            let dot = &dots[attribute(element, "data-id") as usize];
-            let (x, y) = (attribute(element, "data-x-mm"), attribute(element, "data-y-mm"));
-            let landed = [x, y, (radius_mm * radius_mm - x * x - y * y).sqrt()];
-            assert!(distance(landed, numbers(&dot["surface_mm"])) < 1e-4, "{name}: {element}");
-            assert!(distance([x, y], numbers(&dot["plate_mm"])) < 1e-9, "{name}: {element}");
+        let mut drawn: Vec<usize> = Vec::new();
+        for (index, pass) in passes.iter().enumerate() {
+            let film = if index == 0 { "dots.svg".to_owned() } else { format!("dots-{}.svg", index + 1) };
+            let drawing = fs::read_to_string(out.join("artwork").join(film)).expect("the drawing");
+            let elements: Vec<&str> =
+                drawing.split('<').filter(|element| element.contains(" data-id=")).collect();
+            // the stroke comes along (sin t cos a, sin t sin a, cos t); the film's x and y are turned with it
+            let angle = |field: &str| pass[field].as_f64().expect("an angle").to_radians().sin_cos();
+            let ((tilt_sin, tilt_cos), (azimuth_sin, azimuth_cos)) =
+                (angle("tilt_deg"), angle("azimuth_deg"));
+            for element in elements {
+                let id = attribute(element, "data-id") as usize;
+                drawn.push(id);
+                let (x, y) = (attribute(element, "data-x-mm"), attribute(element, "data-y-mm"));
+                let z = (radius_mm * radius_mm - x * x - y * y).sqrt();
+                let (along, across) = (azimuth_cos * x + azimuth_sin * y, azimuth_cos * y - azimuth_sin * x);
+                let (along, up) = (tilt_cos * along + tilt_sin * z, tilt_cos * z - tilt_sin * along);
+                let landed = [
+                    azimuth_cos * along - azimuth_sin * across,
+                    azimuth_sin * along + azimuth_cos * across,
+                    up,
+                ];
+                assert!(distance(landed, numbers(&dots[id]["surface_mm"])) < 1e-4, "{name}: {element}");
+                assert!(distance([x, y], numbers(&dots[id]["plate_mm"])) < 1e-9, "{name}: {element}");
+            }
+            for layer in ["dots", "registration", "notes"] {
+                assert!(drawing.contains(&format!("inkscape:label=\"{layer}\"")), "{name}: layer {layer}");
+            }
+            assert!(drawing.contains("width=\"") && drawing.contains("mm\""), "{name}: true millimetres");
         }
-        for layer in ["dots", "registration", "notes"] {
-            assert!(drawing.contains(&format!("inkscape:label=\"{layer}\"")), "{name}: layer {layer}");
-        }
-        assert!(drawing.contains("width=\"") && drawing.contains("mm\""), "{name}: true millimetres");
+        drawn.sort_unstable();
+        assert!(drawn.iter().copied().eq(0..dots.len()), "{name}: every dot is drawn once");
     }
 }
 
@@ -130,27 +163,32 @@ fn the_artwork_lands_on_the_dots() {
 fn the_whole_sensor_fits_its_envelope() {
     let folder = tempfile::tempdir().expect("a folder");
     for name in DESIGNS {
-        let manifest = json(&build(name, folder.path()).join("manifest.json"));
-        let design = json(&design_path(name));
+        let built = build(name, folder.path());
+        let manifest = json(&built.join("manifest.json"));
+        let given = |field: &str| given(&built, name, field);
         let corner = |part: &str, end: usize| -> [f64; 3] {
             let parts = manifest["parts"].as_array().expect("parts");
             let part = parts.iter().find(|entry| entry["name"] == part).expect("the part");
             numbers(&part["bbox_mm"][end])
         };
         let (upper, lower) = (corner("upper_platform", 1), corner("lower_platform", 0));
-        let pole_mm = design["dome"]["radius_mm"].as_f64().expect("a radius")
-            + design["elastomer"]["membrane_thickness_mm"].as_f64().expect("a thickness");
+        let pole_mm = given("dome.radius_mm").as_f64().expect("a radius")
+            + given("elastomer.membrane_thickness_mm").as_f64().expect("a thickness");
         let size = [
             corner("lower_platform", 1)[0].max(upper[0]) - lower[0].min(corner("upper_platform", 0)[0]),
             corner("lower_platform", 1)[1].max(upper[1]) - lower[1].min(corner("upper_platform", 0)[1]),
             pole_mm - lower[2],
         ];
-        let allowed: [f64; 3] = numbers(&design["envelope"]["size_mm"]);
-        assert_eq!(allowed, [24.0, 24.0, 26.0]);
+        let allowed: [f64; 3] = numbers(&given("envelope.size_mm"));
+        if name.starts_with("thumb24") {
+            assert_eq!(allowed, [24.0, 24.0, 26.0]);
+        }
         for axis in 0..3 {
             // float32 of a 24 mm part
             assert!(size[axis] <= allowed[axis] + 2e-6, "{name}: {size:?}");
-            assert!(size[axis] > allowed[axis] - 0.01, "{name} uses its envelope: {size:?}");
+            // a rule rounds up to a tenth
+            let spare = if name.starts_with("thumb24") { 0.01 } else { 0.1 };
+            assert!(size[axis] > allowed[axis] - spare, "{name} uses its envelope: {size:?}");
         }
     }
 }

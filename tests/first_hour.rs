@@ -56,9 +56,11 @@ fn a_new_design_builds_like_the_one_it_starts_from() {
 fn fields_are_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     let text = said(&["explain", "springs.wire_diameter_mm"], folder.path());
-    for part in ["0.3", "paper: 0.3 mm wire", "unit: mm", "must be there"] {
+    for part in ["0.3", "paper: 0.3 mm wire", "unit: mm", "may be left out; then by a rule: "] {
         assert!(text.contains(part), "{part}: {text}");
     }
+    let needed = said(&["explain", "dome.radius_mm"], folder.path());
+    assert!(needed.contains("must be there"), "{needed}");
     assert!(said(&["explain"], folder.path()).contains("white_markers"));
     let wrong = domecast(&["explain", "spring.wire"], folder.path());
     assert_eq!(wrong.status.code(), Some(1));

@@ -25,9 +25,18 @@ fn fault(section: &str, error: &SpecError) -> DesignError {
 /// The platform on its springs.
 ///
 /// # Errors
-/// Numbers that make no spring, no magnet or no stable platform.
+/// Numbers that make no spring, no magnet or no stable platform; a rigid mount.
 pub fn suspension_of(design: &Design) -> Result<Suspension, DesignError> {
     let sections = design.sections();
+    if design.is_rigid() {
+        let problem = "rigid mount: no springs carry the platform, and no net wrench is promised";
+        return Err(DesignError::at(
+            "mount.kind",
+            "rigid",
+            problem,
+            "\"springs\" for what works with loads and poses",
+        ));
+    }
     let (springs, magnets) = (&sections.springs, &sections.magnets);
     let spring = Spring::new(SpringSpec {
         wire_diameter_mm: springs.wire_diameter_mm,

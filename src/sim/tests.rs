@@ -298,7 +298,7 @@ fn a_contact_at_its_bound_is_told_with_what_is_left() {
     let contact = Contact::new(elastomer_of(still.design()), Level::Geometric).expect("a level");
     let ball = Indenter::rigid(ContactSolid::sphere(4.0).expect("a ball"));
     let at = Rigid::from_translation(DVec3::new(0.0, 0.0, 13.2));
-    let mut pressed = contact.press(&ball, still.suspension(), &at, None).expect("pressed");
+    let mut pressed = contact.press(&ball, still.suspension().expect("springs"), &at, None).expect("pressed");
     pressed.state.status = Status::BoundReached;
     (pressed.state.residual_mm, pressed.state.penetration_mm) = (3.2e-3, 1.5e-2);
     let reported = ContactTruth::of(&pressed);

@@ -42,7 +42,7 @@ impl ListKind {
                 ("width px", "camera.width"),
                 ("height px", "camera.height"),
                 ("view deg", "camera.field_of_view_deg"),
-                ("body", "body.kind"),
+                ("body", "camera_body.kind"),
             ],
             Self::Leds => &[("package mm", "leds.package_mm"), ("height mm", "leds.package_height_mm")],
             Self::Silicones => &[

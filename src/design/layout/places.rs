@@ -150,8 +150,8 @@ impl Pattern {
         // The search ends where places lie on the edge itself, where rounding lets some of equal places in and others
         // not: a little finer, all of them are inside.
         let inside = best.1 * (1.0 - EDGE_SHARE);
-        let settled = count_at(inside);
-        Ok(if settled == count || settled.abs_diff(wanted) <= best.0 { inside } else { best.1 })
+        let converged = count_at(inside);
+        Ok(if converged == count || converged.abs_diff(wanted) <= best.0 { inside } else { best.1 })
     }
 }
 

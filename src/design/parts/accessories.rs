@@ -6,6 +6,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use super::measures::Measures;
 use super::{Blueprint, Feature, PartError};
 use crate::layout::PrintPass;
+use crate::spec::DesignWarning;
 use domecast_mesh::{Fit, Shape};
 
 /// The clear sheet, in the sensor frame: cut by laser, so no process limits of
@@ -68,7 +69,11 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
     let c = &m.coupon;
     let mut b = Blueprint::new(
         "fit_coupon",
-        "test piece: magnet pockets and camera bores in steps of diameter, smallest at the cut corner; printed",
+        if m.spring_axes_mm.is_empty() {
+            "test piece: camera bores in steps of diameter, smallest at the cut corner; printed"
+        } else {
+            "test piece: magnet pockets and camera bores in steps of diameter, smallest at the cut corner; printed"
+        },
         m.chord,
     );
     let (pocket, depth) = m.pocket_mm();
@@ -76,7 +81,8 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
     let steps = i64::from(c.steps);
     let grow = 0.5 * c.step_mm * steps as f64;
     let wall = (2.0 * m.process.min_wall_mm).max(0.5 * pocket);
-    if pocket <= grow {
+    let has_magnets = !m.spring_axes_mm.is_empty();
+    if has_magnets && pocket <= grow {
         return Err(b.infeasible("radius of the smallest pocket", pocket - grow, 0.0, "coupon.step_mm"));
     }
     let pitch = 2.0 * (bore.max(pocket) + grow) + wall;
@@ -102,13 +108,15 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
         let i = usize::try_from(k + steps).unwrap_or(0);
         let x = pitch * k as f64;
         let d = 0.5 * c.step_mm * k as f64;
-        let y = low_y + 0.5 * rows.x;
-        let shape = Shape::cylinder(pocket + d, height - depth, height + over, Fit::Outside);
-        b.cut.push(Feature::new("magnet pocket", "coupon.step_mm", shape).numbered(i).at(x, y));
-        if push_out > 0.0 {
-            let hole = Shape::cylinder(push_out, -over, height - 0.5 * depth, Fit::Outside);
-            b.cut.push(Feature::new("push-out hole", "coupon.step_mm", hole).numbered(i).at(x, y));
-            b.genus += 1;
+        if has_magnets {
+            let y = low_y + 0.5 * rows.x;
+            let shape = Shape::cylinder(pocket + d, height - depth, height + over, Fit::Outside);
+            b.cut.push(Feature::new("magnet pocket", "coupon.step_mm", shape).numbered(i).at(x, y));
+            if push_out > 0.0 {
+                let hole = Shape::cylinder(push_out, -over, height - 0.5 * depth, Fit::Outside);
+                b.cut.push(Feature::new("push-out hole", "coupon.step_mm", hole).numbered(i).at(x, y));
+                b.genus += 1;
+            }
         }
         let y = -low_y - 0.5 * rows.y;
         let shape = Shape::cylinder(bore + d, -over, height + over, Fit::Outside);
@@ -116,6 +124,66 @@ pub(super) fn coupon(m: &Measures) -> Result<Blueprint, PartError> {
         b.genus += 1;
     }
     Ok(b)
+}
+
+/// The block of a jig that holds the sheet, in the sensor frame, mm.
+struct JigBlock {
+    /// Half sides of the sheet's recess.
+    recess: DVec2,
+    /// Wall round the recess.
+    rim: f64,
+    /// Half sides of the block.
+    block: DVec2,
+    /// Depth of the recess.
+    grip: f64,
+    /// Height of the recess's floor.
+    seat: f64,
+    /// Height of the block's top.
+    top: f64,
+}
+
+impl JigBlock {
+    fn of(m: &Measures) -> Self {
+        let recess = 0.5 * m.sheet_size_mm + DVec2::splat(m.jig.clearance_mm);
+        let rim = (3.0 * m.process.min_wall_mm).max(0.15 * recess.min_element());
+        // The sheet's top stands clear of the grip, so that the pad can wrap.
+        let grip = 0.6 * m.sheet_thickness_mm;
+        let seat = -m.sheet_thickness_mm;
+        Self { recess, rim, block: recess + DVec2::splat(rim), grip, seat, top: seat + grip }
+    }
+
+    /// The highest corner of sheet and block along a stroke, from the dome's centre, mm.
+    fn height_mm(&self, m: &Measures, pass: &PrintPass) -> f64 {
+        let up = pass.pass_from_sensor.transpose().z_axis;
+        let corner = |half: DVec2, z: f64| up.truncate().abs().dot(half) + up.z * z;
+        corner(0.5 * m.sheet_size_mm, 0.0).max(corner(self.block, self.top))
+    }
+}
+
+/// The print passes whose pad would meet sheet or jig before the dome: tilted so far that a corner of them stands higher
+/// along the stroke than the dome's top.
+pub fn stroke_notes(m: &Measures, passes: &[PrintPass]) -> Vec<DesignWarning> {
+    const STEP_DEG: f64 = 0.5;
+    let block = JigBlock::of(m);
+    let note = |pass: &PrintPass| {
+        let over_mm = block.height_mm(m, pass) - m.dome_radius_mm;
+        if over_mm <= 0.0 {
+            return None;
+        }
+        let (tilt_deg, azimuth_deg) = (pass.tilt_rad.to_degrees(), pass.azimuth_rad.to_degrees());
+        let lower = (1..).map(|step| tilt_deg - STEP_DEG * f64::from(step)).take_while(|deg| *deg > 0.0);
+        let clear = lower.into_iter().find(|deg| {
+            block.height_mm(m, &PrintPass::new(deg.to_radians(), pass.azimuth_rad)) <= m.dome_radius_mm
+        });
+        let cure =
+            clear.map_or_else(String::new, |deg| format!("; up to {deg:.1} degrees they stay below it"));
+        let message = format!(
+            "the pad of the pass tilted by {tilt_deg:.1} degrees towards {azimuth_deg:.0} meets sheet or jig before the dome: a \
+             corner of them stands {over_mm:.2} mm higher along the stroke{cure}"
+        );
+        Some(DesignWarning { field: "print.max_tilt_deg".into(), message })
+    };
+    passes.iter().filter_map(note).collect()
 }
 
 /// The pad-printing jig for one print pass: it holds sheet and dome rigidly from
@@ -129,13 +197,7 @@ pub(super) fn jig(m: &Measures, name: &str, pass: &PrintPass) -> Result<Blueprin
         Blueprint::new(name, "pad-printing jig: holds sheet and dome under the pad; printed", m.chord);
     b.may_meet = &[("below", "pin hole"), ("sheet recess", "finger slot")];
     let over = m.overcut_mm;
-    let recess = 0.5 * m.sheet_size_mm + DVec2::splat(j.clearance_mm);
-    let rim = (3.0 * m.process.min_wall_mm).max(0.15 * recess.min_element());
-    let block = recess + DVec2::splat(rim);
-    // The sheet's top stands clear of the grip, so that the pad can wrap.
-    let grip = 0.6 * m.sheet_thickness_mm;
-    let (seat, top) = (-m.sheet_thickness_mm, -m.sheet_thickness_mm + grip);
-
+    let JigBlock { recess, rim, block, grip, seat, top } = JigBlock::of(m);
     let turn = pass.pass_from_sensor;
     let lowest = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)]
         .map(|(x, y)| (turn * DVec3::new(x * block.x, y * block.y, seat)).z)

@@ -68,7 +68,9 @@ impl Assembly {
                 .map(|mesh| mesh.transformed(&piece.part_from_shape))
                 .map_err(|error| PartError::Mesh { part: piece.name.clone(), error })
         };
-        a.push("camera", [0.12, 0.12, 0.13, 1.0], Body::Fixed, piece(&purchased::camera(m))?, -0.35 * lift);
+        let camera = purchased::camera_mesh(m)
+            .map_err(|error| PartError::Mesh { part: "camera".to_owned(), error })?;
+        a.push("camera", [0.12, 0.12, 0.13, 1.0], Body::Fixed, camera, -0.35 * lift);
         a.push("dome", [0.93, 0.93, 0.90, 0.55], Body::Moving, piece(&purchased::dome(m))?, 1.4 * lift);
         for i in 0..m.spring_axes_mm.len() {
             let [upper, lower] = purchased::magnets(m, i);

@@ -55,6 +55,9 @@ fn skin_mm(m: &Measures) -> f64 {
 /// Length of the bore that stands round the camera's body.
 fn bore(m: &Measures, lower: &RayTarget) -> Option<PartError> {
     let body = &m.camera_body;
+    if body.board.is_some() {
+        return None;
+    }
     let reach = m.bore_radius_mm() + skin_mm(m);
     let engaged = (0..HEIGHTS)
         .filter(|&h| {
@@ -114,8 +117,8 @@ fn border(m: &Measures, upper: &RayTarget) -> Option<PartError> {
         supported.count() as f64 / f64::from(BORDER)
     };
     let shares = [0, 1, 2, 3].map(side);
-    let (all, least) = (shares.iter().sum::<f64>() / 4.0, shares.iter().copied().fold(1.0, f64::min));
-    if all >= MIN_SUPPORTED && least >= MIN_SUPPORTED_SIDE {
+    let (all, worst_side) = (shares.iter().sum::<f64>() / 4.0, shares.iter().copied().fold(1.0, f64::min));
+    if all >= MIN_SUPPORTED && worst_side >= MIN_SUPPORTED_SIDE {
         return None;
     }
     let needed = 2.0 * (m.view.half_extent_mm() + DVec2::splat(m.process.min_wall_mm));
@@ -124,7 +127,7 @@ fn border(m: &Measures, upper: &RayTarget) -> Option<PartError> {
     let problem = format!(
         "{:.0} % of its border lies on the seat, {:.0} % of the worst side, at least {:.0} % and {:.0} %; its length",
         100.0 * all,
-        100.0 * least,
+        100.0 * worst_side,
         100.0 * MIN_SUPPORTED,
         100.0 * MIN_SUPPORTED_SIDE
     );
@@ -268,7 +271,7 @@ fn mounting_heads(m: &Measures, upper: &RayTarget, found: &mut Vec<PartError>) {
                 let [from, to] = [floor, top].map(|z| platform_from_rest.transform_point3(at.extend(z)));
                 if let Some((share, _)) = upper.first_hit(from, to) {
                     let deep = (1.0 - share) * (top - floor);
-                    if worst.is_none_or(|(_, most, _)| deep > most) {
+                    if worst.is_none_or(|(_, deepest, _)| deep > deepest) {
                         worst = Some((i, deep, pose.name.as_str()));
                     }
                 }

@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 
 use super::Part;
+use super::board::BoardSeat;
 use super::measures::Measures;
+use super::mount;
 use crate::spec::Design;
 use crate::spec::sections::LedColor;
 
@@ -32,6 +34,19 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
             "bought",
             "platforms.lower.clamp",
         ]);
+    }
+    if let Some(seat) = BoardSeat::of(m)
+        && let Some(thread) = seat.thread
+    {
+        let size = format!(
+            "{} x {:.0}, for a hole of {}",
+            thread.name,
+            (seat.board.thickness_mm + seat.hole_depth_mm).floor(),
+            thread.tap_mm
+        );
+        let count = seat.holes_mm.len().to_string();
+        let what = "thread-forming, holds the camera's board";
+        table.row(["board screw", &count, "piece", what, &size, "", "steel", "bought", "camera_body.board"]);
     }
     table.0
 }
@@ -117,13 +132,33 @@ fn made(design: &Design, m: &Measures, parts: &[Part], table: &mut Table) {
 fn purchased(design: &Design, m: &Measures, table: &mut Table) {
     let sections = design.sections();
     let body = &m.camera_body;
-    let camera = format!("diameter {} x {}", body.diameter_mm, body.length_mm);
+    let camera = match &body.board {
+        None => format!("diameter {} x {}", body.diameter_mm, body.length_mm),
+        Some(board) => format!(
+            "board {} x {} x {}, lens diameter {} x {}",
+            board.size_mm[0], board.size_mm[1], board.thickness_mm, body.diameter_mm, body.length_mm
+        ),
+    };
     let lens = format!(
         "camera {} x {} px, {} degrees",
         sections.camera.width, sections.camera.height, sections.camera.field_of_view_deg
     );
     let bore = format!("diameter +{}/-any", 2.0 * body.bore_clearance_mm);
     table.row(["camera", "1", "piece", &lens, &camera, &bore, "", "bought", "camera_body"]);
+    if m.mount.is_rigid() {
+        let count = m.mount.at_mm.len().to_string();
+        let size = mount::thread(m).map_or_else(String::new, |thread| {
+            let through = m.platforms.upper.underside_z_mm - m.platforms.lower.underside_z_mm;
+            format!(
+                "{} x {:.0}, heads sunk",
+                thread.name,
+                (through - thread.nominal_mm).floor() + 2.0 * thread.nominal_mm
+            )
+        });
+        let what = "thread-forming, holds the upper platform on its posts";
+        table.row(["post screw", &count, "piece", what, &size, "", "steel", "bought", "mount"]);
+        return;
+    }
     let count = m.spring_axes_mm.len().to_string();
     let springs = &sections.springs;
     let size = format!(

@@ -226,7 +226,7 @@ impl Scene {
         for item in &assembly.items {
             let solid = match item.name.as_str() {
                 "dome" => coarse(&purchased::dome(m))?,
-                "camera" => coarse(&purchased::camera(m))?,
+                "camera" => purchased::camera(m).solid(chord).map_err(|e| mesh_error("camera", e))?,
                 _ if item.body == Body::Spring => continue,
                 _ => item.solid().map_err(|e| mesh_error(&item.name, e))?,
             };

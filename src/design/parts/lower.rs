@@ -2,9 +2,33 @@
 
 use glam::{DAffine3, DVec3};
 
+use super::board::BoardSeat;
 use super::measures::{Measures, polar};
+use super::mount;
 use super::{Blueprint, Feature, PartError};
 use domecast_mesh::{Fit, Profile, Shape};
+
+/// A bore is crossed by what leads into it; push-out holes may end in the cable's channel or the board's pocket.
+const MAY_MEET: &[(&str, &str)] = &[
+    ("camera bore", "clamp hole"),
+    ("camera bore", "cable exit"),
+    ("push-out hole", "cable exit"),
+    ("camera bore", "view cone"),
+    ("camera bore", "marker view"),
+    ("view cone", "marker view"),
+    ("marker view", "marker view"),
+    ("board pocket", "camera bore"),
+    ("board pocket", "board recess"),
+    ("board pocket", "board screw hole"),
+    ("board pocket", "cable exit"),
+    ("board pocket", "push-out hole"),
+    ("board recess", "board recess"),
+    ("board recess", "camera bore"),
+    ("board recess", "cable exit"),
+    ("board recess", "push-out hole"),
+    ("board recess", "view cone"),
+    ("board recess", "marker view"),
+];
 
 pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     let lower = &m.platforms.lower;
@@ -12,20 +36,14 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     let h = 0.5 * m.outer_mm;
     let mut b = Blueprint::new(
         "lower_platform",
-        "lower platform: camera bore, clamp, magnet pockets, mounting holes, cable exit; printed",
+        if m.mount.is_rigid() {
+            "lower platform: camera seat, posts, mounting holes, cable exit; printed"
+        } else {
+            "lower platform: camera bore, clamp, magnet pockets, mounting holes, cable exit; printed"
+        },
         m.chord,
     );
-    // A bore is crossed by what leads into it; push-out holes may end in the
-    // cable's channel.
-    b.may_meet = &[
-        ("camera bore", "clamp hole"),
-        ("camera bore", "cable exit"),
-        ("push-out hole", "cable exit"),
-        ("camera bore", "view cone"),
-        ("camera bore", "marker view"),
-        ("view cone", "marker view"),
-        ("marker view", "marker view"),
-    ];
+    b.may_meet = MAY_MEET;
     if top <= bottom {
         return Err(b.infeasible(
             "height",
@@ -48,6 +66,9 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     );
     b.genus += 1;
 
+    if let Some(seat) = BoardSeat::of(m) {
+        seat.cut(m, reach, &mut b);
+    }
     view_opening(m, &mut b);
 
     let clamp = &lower.clamp;
@@ -64,6 +85,7 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     }
 
     m.cut_magnet_pockets(&mut b, top, bottom - over);
+    mount::lower(m, &mut b);
 
     mounting_holes(m, &mut b)?;
     if lower.wire_hole_diameter_mm > 0.0 {

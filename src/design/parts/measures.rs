@@ -8,7 +8,7 @@ use super::{Blueprint, Feature, PartError};
 use crate::spec::Design;
 use crate::spec::sections::{
     CameraBodySection, CouponSection, JigSection, LedsSection, MagnetPocketsSection, MagnetsSection,
-    MouldSection, PlatformsSection, ProcessSection, SheetSection, StencilSection,
+    MouldSection, MountSection, PlatformsSection, ProcessSection, SheetSection, StencilSection,
 };
 use domecast_mesh::{Chord, Fit, Shape};
 use domecast_optics::SensorOptics;
@@ -29,6 +29,8 @@ pub struct Measures {
     pub sheet: SheetSection,
     /// The mould.
     pub mould: MouldSection,
+    /// How the upper platform stands on the lower one.
+    pub mount: MountSection,
     /// The camera's housing.
     pub camera_body: CameraBodySection,
     /// Limits of the process.
@@ -162,6 +164,7 @@ impl Measures {
             pockets: sections.magnet_pockets.clone(),
             sheet: sections.sheet.clone(),
             mould: sections.mould.clone(),
+            mount: sections.mount.clone(),
             camera_body: sections.camera_body.clone(),
             process: sections.process.clone(),
             shrinkage: 0.01 * sections.elastomer.shrinkage_percent,

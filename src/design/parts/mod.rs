@@ -23,6 +23,8 @@
 mod accessories;
 mod assembly;
 mod bearing;
+mod board;
+mod board_seat;
 mod bom;
 mod checks;
 mod drawing;
@@ -34,6 +36,7 @@ mod lower;
 mod measures;
 mod meeting;
 mod mould;
+mod mount;
 mod openings;
 mod poses;
 mod process;
@@ -58,6 +61,7 @@ use std::io::{self, Write};
 use glam::DAffine3;
 use rayon::prelude::*;
 
+pub use accessories::stroke_notes;
 pub use assembly::{Assembly, AssemblyItem};
 pub use checks::check_assembly;
 pub use error::{Cure, PartError};
@@ -101,14 +105,17 @@ pub struct Part {
 
 type Maker = fn(&Measures) -> Result<Blueprint, PartError>;
 
-/// The parts that every design has, by name, in their order.
+/// Name of the part that only a design with white markers has.
+const STENCIL: &str = "marker_stencil";
+
+/// The parts of a design by name, in their order.
 const MAKERS: [(&str, Maker); 7] = [
     ("upper_platform", upper::blueprint),
     ("lower_platform", lower::blueprint),
     ("mould_cavity", mould::cavity),
     ("mould_base", mould::base),
     ("acrylic_sheet", accessories::sheet),
-    ("marker_stencil", accessories::stencil),
+    (STENCIL, accessories::stencil),
     ("fit_coupon", accessories::coupon),
 ];
 
@@ -230,12 +237,18 @@ pub fn platform_from_led(leds: &LedsSection, i: usize) -> DAffine3 {
 /// # Errors
 /// Why parts cannot be made: the first fault of each, in that order.
 pub fn build(m: &Measures, passes: &[PrintPass]) -> Result<Vec<Part>, PartError> {
-    let results: Vec<Result<Part, PartError>> = (0..MAKERS.len() + passes.len())
+    let makers: Vec<Maker> = MAKERS
+        .iter()
+        // No markers, no stencil.
+        .filter(|(name, _)| *name != STENCIL || !m.markers_mm.is_empty())
+        .map(|(_, make)| *make)
+        .collect();
+    let results: Vec<Result<Part, PartError>> = (0..makers.len() + passes.len())
         .into_par_iter()
         .filter_map(|i| {
-            let maker = MAKERS.get(i).map(|(_, make)| make(m));
+            let maker = makers.get(i).map(|make| make(m));
             let jig = |i: usize| accessories::jig(m, &jig_name(i, passes), &passes[i]);
-            maker.or_else(|| Some(jig(i.checked_sub(MAKERS.len())?)))
+            maker.or_else(|| Some(jig(i.checked_sub(makers.len())?)))
         })
         .map(|blueprint| blueprint?.build(m))
         .collect();

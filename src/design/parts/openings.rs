@@ -77,7 +77,7 @@ fn springs(design: &Design, m: &Measures) -> Option<PartError> {
         }
         let by =
             outwards_mm(WALL_FACTOR * limit, 2.0 * m.outer_mm.max_element() + m.view.max_radius_mm(), wall);
-        if worst.is_none_or(|(_, most, _)| by > most) {
+        if worst.is_none_or(|(_, largest, _)| by > largest) {
             worst = Some((i, by, wall(0.0)));
         }
     }
@@ -126,7 +126,7 @@ fn lights(m: &Measures) -> Option<PartError> {
             continue;
         }
         let by = outwards_mm(WALL_FACTOR * limit, 2.0 * m.outer_mm.max_element(), wall);
-        if worst.is_none_or(|(_, most, _)| by > most) {
+        if worst.is_none_or(|(_, largest, _)| by > largest) {
             worst = Some((i, by, wall(0.0)));
         }
     }

@@ -41,8 +41,12 @@ fn axial_travel_mm(design: &Design, suspension: &Suspension) -> f64 {
 /// Rest first, then straight down to the end of the travel, the balance under every load that the design claims,
 /// and the corners of the load envelope: presses, pulls, pushes, tilts and twists, each driven until the first
 /// limit of the springs, the stops, the lens or the mask ends it. The window is no such limit here, for it is cut
-/// for all of these.
+/// for all of these. A rigid mount has rest alone.
 pub(super) fn poses(design: &Design) -> Result<Vec<Pose>, PartError> {
+    if design.is_rigid() {
+        let rest_from_platform = Rigid::identity();
+        return Ok(vec![Pose { name: "at rest".to_owned(), rest_from_platform, is_claimed: true }]);
+    }
     let fault = |problem: String| PartError::View { problem, field: "loads.claims".into() };
     let suspension = suspension_of(design).map_err(|error| fault(error.to_string()))?;
     let travel_mm = axial_travel_mm(design, &suspension);

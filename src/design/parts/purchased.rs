@@ -4,13 +4,29 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DQuat, DVec2, DVec3};
 
+use super::board::BoardSeat;
 use super::measures::Measures;
 use super::screws::Thread;
 use domecast_mesh::{Chord, Construction, Fit, MeshError, Piece, Profile, ProfileEdge, Shape, TriMesh};
 use domecast_optics::numeric::Rigid;
 
-/// The camera's housing, about the camera's axis, in the sensor frame at rest.
-pub(super) fn camera(m: &Measures) -> Piece {
+/// The camera, about its axis, in the sensor frame at rest.
+pub(super) fn camera(m: &Measures) -> Construction {
+    let alone = || Construction { added: vec![barrel(m)], cut: Vec::new() };
+    BoardSeat::of(m).map_or_else(alone, |seat| seat.stand_in(m))
+}
+
+/// The camera's mesh, sensor frame at rest.
+pub(super) fn camera_mesh(m: &Measures) -> Result<TriMesh, MeshError> {
+    if m.camera_body.board.is_some() {
+        return camera(m).solid(m.chord).map(|solid| solid.to_mesh());
+    }
+    let piece = barrel(m);
+    piece.shape.triangulate(&piece.name, m.chord).map(|mesh| mesh.transformed(&piece.part_from_shape))
+}
+
+/// The cylinder about the camera's axis: its housing, or the lens barrel of a board.
+fn barrel(m: &Measures) -> Piece {
     let body = &m.camera_body;
     let front = body.front_from_pupil_mm;
     let shape = Shape::cylinder(0.5 * body.diameter_mm, front - body.length_mm, front, Fit::Inside);
@@ -28,7 +44,7 @@ pub(super) fn camera_housing(m: &Measures) -> Option<Construction> {
     let back = front - body.length_mm - over;
     let glass = Shape::cylinder(0.5 * body.lens_diameter_mm, back, front + over, Fit::Outside);
     let cut = Piece::new("front glass", glass).placed(m.sensor_from_camera);
-    Some(Construction { added: vec![camera(m)], cut: vec![cut] })
+    Some(Construction { added: vec![barrel(m)], cut: vec![cut] })
 }
 
 /// The cap heads of the mounting screws, on the lower platform's top or in their counterbores, rest frame.

@@ -37,7 +37,9 @@ pub(super) fn faults(design: &Design, m: &Measures) -> Vec<PartError> {
     found.extend(camera_in_block(m));
     set_screws(m, &mut found);
     cable_exit(m, &mut found);
-    magnets_and_springs(design, m, &mut found);
+    if !design.is_rigid() {
+        magnets_and_springs(design, m, &mut found);
+    }
     lights(m, &mut found);
     mounting(m, &mut found);
     mould_pins(m, &mut found);
@@ -77,6 +79,9 @@ pub(super) fn min_engaged_mm(m: &Measures) -> f64 {
 }
 
 fn camera_in_block(m: &Measures) -> Option<PartError> {
+    if m.camera_body.board.is_some() {
+        return None;
+    }
     let [low, high] = held_z_mm(m);
     let limit = min_engaged_mm(m);
     if high - low >= limit * (1.0 - 1e-9) {
@@ -208,13 +213,15 @@ fn off_center(m: &Measures) -> Option<DesignWarning> {
 
 /// The cable fits the channel that is cut for it.
 fn cable_exit(m: &Measures, found: &mut Vec<PartError>) {
-    let (cable, exit) = (m.camera_body.cable_diameter_mm, &m.platforms.lower.cable_exit);
+    let (body, exit) = (&m.camera_body, &m.platforms.lower.cable_exit);
+    let cable = body.cable_diameter_mm;
+    let wide = body.cable_width_mm.unwrap_or(cable);
     if exit.width_mm <= 0.0 || exit.height_mm <= 0.0 {
         return;
     }
-    for (what, value, field) in [
-        ("width", exit.width_mm, "platforms.lower.cable_exit.width_mm"),
-        ("height", exit.height_mm, "platforms.lower.cable_exit.height_mm"),
+    for (what, value, cable, field) in [
+        ("width", exit.width_mm, wide, "platforms.lower.cable_exit.width_mm"),
+        ("height", exit.height_mm, cable, "platforms.lower.cable_exit.height_mm"),
     ] {
         if value < cable {
             let problem = format!("{what} of the cable's exit, at least the cable's diameter");
@@ -223,9 +230,9 @@ fn cable_exit(m: &Measures, found: &mut Vec<PartError>) {
         }
     }
     let bore = 2.0 * m.bore_radius_mm();
-    if cable > bore {
+    if wide > bore && body.board.is_none() {
         let cure = Cure::length("camera_body.cable_diameter_mm", cable, bore);
-        found.push(unheld(["cable", "lower_platform"], "diameter, at most the bore's", [cable, bore], cure));
+        found.push(unheld(["cable", "lower_platform"], "diameter, at most the bore's", [wide, bore], cure));
     }
 }
 
@@ -233,7 +240,8 @@ fn cable_exit(m: &Measures, found: &mut Vec<PartError>) {
 /// straight down through the bore, which what the sensor stands on must let it.
 fn cable_bend(m: &Measures) -> Option<DesignWarning> {
     let (body, lower) = (&m.camera_body, &m.platforms.lower);
-    if lower.cable_exit.width_mm <= 0.0 || lower.cable_exit.height_mm <= 0.0 {
+    // A board's cable leaves beside the board, not below the lens.
+    if lower.cable_exit.width_mm <= 0.0 || lower.cable_exit.height_mm <= 0.0 || body.board.is_some() {
         return None;
     }
     let bend = body.cable_bend_radius_mm.unwrap_or(MIN_BEND_DIAMETERS * body.cable_diameter_mm);

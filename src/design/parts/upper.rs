@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::measures::Measures;
+use super::mount;
 use super::{Blueprint, Feature, PartError};
 use domecast_mesh::{Fit, Profile, Shape};
 
@@ -43,7 +44,11 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
     let top = m.upper_top_z_mm();
     let mut b = Blueprint::new(
         "upper_platform",
-        "upper platform: sheet seat, window, LED seats, magnet pockets; printed",
+        if m.mount.is_rigid() {
+            "upper platform: sheet seat, window, LED seats, screw holes; printed"
+        } else {
+            "upper platform: sheet seat, window, LED seats, magnet pockets; printed"
+        },
         m.chord,
     );
     // All of it is open to the recess above; pockets and wire holes must keep
@@ -93,6 +98,7 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
 
     // Their push-out holes lead up into window, recess or rim: open above.
     m.cut_magnet_pockets(&mut b, bottom, top + over);
+    mount::upper(m, &mut b);
     for i in 0..m.leds.list.len() {
         led_seat(m, i, &mut b);
     }

@@ -1,7 +1,10 @@
 //! Everything that is checked of the assembled sensor, with all faults in one answer.
 
 use super::traced::{PoseSight, trace_sight};
-use super::{Assembly, Measures, Part, PartError, bearing, build, check_assembly, openings, seats, trial};
+use super::{
+    Assembly, Measures, Part, PartError, bearing, board_seat, build, check_assembly, mount, openings, seats,
+    trial,
+};
 use crate::layout::{Dot, PrintPass};
 use crate::spec::{Design, DesignWarning};
 
@@ -20,6 +23,8 @@ pub struct CheckedSensor {
 /// All faults of the seats, and those of the parts that cannot be made.
 pub fn build_seated(design: &Design, m: &Measures, passes: &[PrintPass]) -> Result<Vec<Part>, PartError> {
     let mut faults = seats::faults(design, m);
+    faults.extend(board_seat::faults(m));
+    faults.extend(mount::faults(m));
     let made = build(m, passes);
     if let Err(fault) = &made {
         // A wall's thickness alone does not tell where its neighbours should be.
@@ -44,6 +49,8 @@ pub fn check_sensor(
     let (whole, sight) =
         rayon::join(|| check_assembly(m, parts, assembly), || trace_sight(design, m, assembly, dots));
     let mut faults = bearing::faults(m, assembly);
+    faults.extend(board_seat::bearing(m, assembly));
+    faults.extend(mount::bearing(m, assembly));
     faults.extend(whole.err());
     let sight = sight.unwrap_or_else(|fault| {
         faults.push(fault);
@@ -54,5 +61,6 @@ pub fn check_sensor(
         None => fault.clone(),
     };
     PartError::all(faults.iter().flat_map(PartError::faults).map(cured).collect())?;
-    Ok(CheckedSensor { sight, notes: seats::notes(m) })
+    let notes = seats::notes(m).into_iter().chain(board_seat::notes(m)).collect();
+    Ok(CheckedSensor { sight, notes })
 }

@@ -85,9 +85,17 @@ impl Design {
         -self.sheet_thickness_mm()
     }
 
-    /// Height of the lower platform's top at rest: one free spring length below the upper platform, mm.
+    /// Whether the upper platform stands on posts, and no net wrench is promised.
+    pub fn is_rigid(&self) -> bool {
+        self.sections.mount.is_rigid()
+    }
+
+    /// Height of the lower platform's top at rest: one free spring length below the upper platform, or the height of a
+    /// rigid mount's posts, mm.
     pub fn lower_top_z_mm(&self) -> f64 {
-        self.sections.platforms.upper.underside_z_mm - self.sections.springs.free_length_mm
+        let mount = &self.sections.mount;
+        let gap_mm = if mount.is_rigid() { mount.height_mm } else { self.sections.springs.free_length_mm };
+        self.sections.platforms.upper.underside_z_mm - gap_mm
     }
 
     /// x, y of every spring's axis, mm.
@@ -114,10 +122,11 @@ impl Design {
         sensor_from_camera(&self.sections.camera)
     }
 
-    /// Height of the camera's back on its axis, mm.
+    /// Height of the camera's back on its axis, mm; of a board that of what stands on its back.
     pub fn camera_back_z_mm(&self) -> f64 {
         let body = &self.sections.camera_body;
-        self.sections.camera.position_mm[2] + body.front_from_pupil_mm - body.length_mm
+        let board_mm = body.board.as_ref().map_or(0.0, |b| b.thickness_mm + b.components_height_mm);
+        self.sections.camera.position_mm[2] + body.front_from_pupil_mm - body.length_mm - board_mm
     }
 
     /// Lowest and highest corner of the whole sensor at rest, mm.

@@ -5,6 +5,7 @@
 //! checked and derived values are computed once. What later modules see is valid by construction;
 //! they never check again, and they never see a default that the file does not state.
 
+mod body_rules;
 pub mod calibration;
 pub mod catalogue;
 mod derive;
@@ -14,9 +15,11 @@ mod explain;
 mod fill;
 mod lens;
 mod lints;
+mod mount_rules;
 mod resolve;
 mod rules;
 mod schema;
+mod schema_faults;
 pub mod sections;
 pub mod settings;
 mod source;

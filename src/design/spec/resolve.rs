@@ -2,11 +2,13 @@
 
 use serde_json::json;
 
+use super::body_rules;
 use super::derive::DerivedField;
 use super::design::{Design, DesignWarning, sensor_from_camera, with_lints};
 use super::error::DesignError;
 use super::lens::lens_spec;
 use super::lints::lints;
+use super::mount_rules;
 use super::rules;
 use super::sections::{CameraSection, DesignFile, DomeSection, OpticsSection};
 use super::settings::Settings;
@@ -62,6 +64,8 @@ pub(super) fn resolve(
     sections.mesh.chord_tolerance_mm = Some(settings.chord_tolerance_mm.value);
     sections.mesh.optical_chord_tolerance_mm = Some(settings.optical_chord_tolerance_mm.value);
     sections.tolerances.samples = Some(settings.samples.value);
+    mount_rules::check(&sections).map_err(|fault| with_lints(fault, &lints))?;
+    body_rules::check(&sections).map_err(|fault| with_lints(fault, &lints))?;
     let design = Design { sections, text: text.to_owned(), optics, warnings, lints, settings, derived };
     rules::check(&design).map_err(|fault| design.with_lints(fault))?;
     Ok(design)

@@ -195,6 +195,9 @@ fn pattern(design: &Design, faults: &mut Vec<DesignError>) {
 }
 
 fn springs(design: &Design, faults: &mut Vec<DesignError>) {
+    if design.sections().mount.is_rigid() {
+        return;
+    }
     let springs = &design.sections().springs;
     if springs.outer_diameter_mm <= 2.0 * springs.wire_diameter_mm {
         faults.push(

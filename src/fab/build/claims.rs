@@ -21,6 +21,9 @@ const MIN_SHARE: f64 = 1e-3;
 pub(super) fn try_claims(design: &Design) -> Result<MarkerSight, DesignError> {
     let sight = MarkerSight::of(design);
     sight.require(design, &Rigid::identity(), "at rest")?;
+    if design.is_rigid() {
+        return Ok(sight);
+    }
     let suspension = suspension_of(design)?;
     let limits = limits_of(design);
     let mut faults = Vec::new();

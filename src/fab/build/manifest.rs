@@ -12,6 +12,8 @@ use domecast_design::DesignError;
 pub const MANIFEST_NAME: &str = "manifest.json";
 /// The exact copy of the design file, in the folder of a build.
 pub const DESIGN_NAME: &str = "design.json";
+/// The fields that the design file leaves to rules, with values and rules; only where there are some.
+pub const DERIVED_NAME: &str = "derived.json";
 /// Marks the file for readers.
 const FORMAT: &str = "domecast-manifest";
 /// Raised when a reader of an earlier version would misread the file.

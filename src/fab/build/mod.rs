@@ -23,7 +23,9 @@ mod tree;
 
 pub use crate::hash::sha256_hex;
 pub use domecast_files::{WriteError, list_files};
-pub use manifest::{DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning};
+pub use manifest::{
+    DERIVED_NAME, DESIGN_NAME, DesignRecord, FileRecord, MANIFEST_NAME, Manifest, PartRecord, Warning,
+};
 pub use measured::Measured;
 pub use tree::Tree;
 
@@ -158,6 +160,9 @@ fn make(
         tree.add(path.as_str(), bytes.clone());
     }
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
+    if !design.derived().is_empty() {
+        tree.add(DERIVED_NAME, derived(design));
+    }
     let sha256 = sha256_hex(design.text().as_bytes());
 
     step("trying the claimed loads");
@@ -173,12 +178,7 @@ fn make(
     let draw = || artwork::files(&spec, &layout);
     let judge = || LayoutReport::new(design, &spec, &layout);
     let make_parts = || make_parts(design, &layout, &springs);
-    // What a frame resolves hangs on how the markers stand out in it.
-    let load = || {
-        let light = LightCheck::of(design)?;
-        let noise_px: Vec<f64> = light.report.markers.iter().map(|marker| marker.centroid_sd_px).collect();
-        Ok::<_, DesignError>((light, constants::force_report(design, &springs, &noise_px)?))
-    };
+    let load = || light_and_forces(design, &springs);
     let ((films, judged), (parts, loaded)) =
         rayon::join(|| rayon::join(draw, judge), || rayon::join(make_parts, load));
     for file in films? {
@@ -190,11 +190,9 @@ fn make(
         tree.add(file.path, file.bytes);
     }
     let (light, forces) = loaded?;
-    for (path, bytes) in light.files() {
+    let force_files = forces.files().into_iter().map(|(path, text)| (path, text.into_bytes()));
+    for (path, bytes) in light.files().into_iter().chain(force_files) {
         tree.add(path, bytes);
-    }
-    for (path, text) in forces.files() {
-        tree.add(path, text.into_bytes());
     }
     step("writing what other programs read");
     tree.add(
@@ -235,6 +233,17 @@ fn make(
     Ok(Build { tree, manifest, dot_count: layout.dots.len(), headlines })
 }
 
+/// The lit sensor, and what a frame of it resolves, which hangs on how the markers stand out in it.
+fn light_and_forces(
+    design: &Design,
+    springs: &constants::DesignSprings,
+) -> Result<(LightCheck, constants::ForceReport), DesignError> {
+    let light = LightCheck::of(design)?;
+    let noise_px: Vec<f64> = light.report.markers.iter().map(|marker| marker.centroid_sd_px).collect();
+    let forces = constants::force_report(design, springs, &noise_px)?;
+    Ok((light, forces))
+}
+
 /// The design's own warnings, then those of the assembled parts, of the constants' formats, of the pattern and of the light.
 fn warnings(
     design: &Design,
@@ -272,6 +281,12 @@ fn averaging(design: &Design, forces: &constants::ForceReport) -> Option<String>
     ))
 }
 
+/// The fields that rules gave, for programs that read `design.json`.
+fn derived(design: &Design) -> Vec<u8> {
+    let told = |one: &domecast_design::DerivedField| serde_json::json!({ "field": one.field, "value": one.value, "rule": one.rule });
+    pretty(&design.derived().iter().map(told).collect::<Vec<_>>())
+}
+
 /// A file for programs.
 fn pretty(value: &impl serde::Serialize) -> Vec<u8> {
     // numbers, strings and lists only: nothing here can fail to be written
@@ -298,7 +313,8 @@ fn make_parts(
     let measures = springs.sight.measures()?;
     let made = parts::build_seated(design, measures, &layout.passes)?;
     let assembly = parts::Assembly::of(measures, &made)?;
-    let checked = parts::check_sensor(design, measures, &made, &assembly, &layout.dots)?;
+    let mut checked = parts::check_sensor(design, measures, &made, &assembly, &layout.dots)?;
+    checked.notes.extend(parts::stroke_notes(measures, &layout.passes));
     let files = parts::files(design, measures, &made, &assembly)?;
     let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
     Ok(MadeParts { made, assembly, checked, files, poses })

@@ -24,6 +24,9 @@ const PAPER_N: f64 = 17.0;
 /// Mixes of push and press along the border in the picture.
 const BORDER_POINTS: u32 = 31;
 
+/// What is said of forces where nothing moves.
+pub const RIGID: &str = "rigid mount: no net wrench";
+
 /// One line of the load table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EnvelopeLine {
@@ -138,6 +141,10 @@ pub fn force_report(
     springs: &DesignSprings,
     noise_px: &[f64],
 ) -> Result<ForceReport, DesignError> {
+    if design.is_rigid() {
+        let json = json!({ "mount": "rigid", "status": RIGID });
+        return Ok(ForceReport { lines: Vec::new(), border: Vec::new(), frames_to_average: None, json });
+    }
     let suspension = suspension_of(design)?;
     let limits = limits_of(design);
     let sight = &springs.sight;
@@ -188,7 +195,7 @@ pub fn force_report(
             "solid_height_mm": spring.solid_height_mm(),
             "rest_compression_mm": suspension.rest_compression_mm(),
         },
-        "stiffness": springs.constants.stiffness,
+        "stiffness": springs.constants.as_ref().map(|constants| constants.stiffness),
         "envelope": lines,
         "border_push_press_n": border.iter().map(|(p, l)| json!({
             "push_n": p[0], "press_n": p[1], "ended_by": l.map(Limit::as_str),
@@ -225,6 +232,9 @@ impl ForceReport {
     /// The report's files: path in the build's tree, and content.
     pub fn files(&self) -> Vec<(String, String)> {
         let json = serde_json::to_string_pretty(&self.json).unwrap_or_default() + "\n";
+        if self.lines.is_empty() && self.border.is_empty() {
+            return vec![("report/force.json".into(), json)];
+        }
         vec![
             ("report/force.json".into(), json),
             ("report/load_envelope.csv".into(), self.csv()),

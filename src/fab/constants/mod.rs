@@ -23,7 +23,7 @@ mod springs;
 
 use serde_json::json;
 
-pub use force_report::{EnvelopeLine, ForceReport, force_report};
+pub use force_report::{EnvelopeLine, ForceReport, RIGID, force_report};
 pub use resolution::{DesignChoice, Resolution, design_choices, frames_to_average, resolution_at};
 pub use sight::{MarkerSight, markers_of};
 pub use springs::{DesignSprings, claimed_loads, springs_of};
@@ -108,7 +108,7 @@ pub fn with_springs(
                 neighbors: dot.neighbors.iter().map(|id| *id as usize).collect(),
             })
             .collect(),
-        springs: Some(springs.constants.clone()),
+        springs: springs.constants.clone(),
         tolerances: Some(priors_of(design)),
         calibrations: Vec::new(),
     })

@@ -102,7 +102,13 @@ fn the_table_is_near_the_law() {
 fn noise_leaves_the_bound_on_every_design_and_claim() {
     let mut random = SeededRandom::new(1);
     let mut normal = || random.normal();
-    for name in ["thumb24.json", "thumb24-fisheye.json", "thumb24-pinhole.json"] {
+    for name in [
+        "thumb24.json",
+        "thumb24-fisheye.json",
+        "thumb24-pinhole.json",
+        "thumb24-wide.json",
+        "endoscope-r5.json",
+    ] {
         let design = thumb(name);
         let suspension = suspension_of(&design).unwrap();
         let (markers, at) = (markers_of(&design), suspension.at_mm());

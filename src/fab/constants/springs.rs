@@ -16,8 +16,8 @@ const COMPRESSION_STEP_MM: f64 = 0.5;
 /// The springs of a design for its constants, and the fit for the plain runtime where the claimed loads allow one.
 #[derive(Debug, Clone)]
 pub struct DesignSprings {
-    /// What goes into the constants.
-    pub constants: SpringConstants,
+    /// What goes into the constants; `None` of a rigid mount.
+    pub constants: Option<SpringConstants>,
     /// The fit behind `plain_runtime`.
     pub plain: Option<PlainFit>,
     /// What the camera sees of the markers; it costs to compute, so it is passed on.
@@ -52,6 +52,9 @@ pub fn claimed_loads(design: &Design, suspension: &Suspension, sight: &MarkerSig
 /// # Errors
 /// [`DesignError`] where the springs have no stiffness at rest.
 pub fn springs_of(design: &Design, sight: MarkerSight) -> Result<DesignSprings, DesignError> {
+    if design.is_rigid() {
+        return Ok(DesignSprings { constants: None, plain: None, sight });
+    }
     let suspension = suspension_of(design)?;
     let fault = |error: domecast_springs::MechanicsError| {
         DesignError::at("springs", "", error.to_string(), "springs that stand at rest")
@@ -86,5 +89,5 @@ pub fn springs_of(design: &Design, sight: MarkerSight) -> Result<DesignSprings, 
         offset: None,
         plain_runtime,
     };
-    Ok(DesignSprings { constants, plain, sight })
+    Ok(DesignSprings { constants: Some(constants), plain, sight })
 }

@@ -3,7 +3,7 @@
 
 use serde_json::json;
 
-use super::{LightReport, MarkerLevels};
+use super::levels::{LightReport, MarkerLevels};
 use crate::numbers::{percent, typeset};
 use domecast_design::{Cure, Design, DesignError};
 use domecast_runtime::track::MIN_MARKER_RISE_LEVELS;
@@ -27,9 +27,11 @@ const MAX_BRIGHTER: f64 = 1e3;
 pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), DesignError> {
     let (dome, leds) = (&report.dome, &design.sections().leds);
     if dome.median_level < MIN_DOME_LEVEL {
-        let factor = MIN_DOME_LEVEL / dome.median_level.max(f64::MIN_POSITIVE);
-        let cure = brighter(design, 1.1 * factor);
-        let text = format!("{cure}, or a larger `exposure.max_level_per_mw_mm2` where the camera has it");
+        // Light from outside does not grow with the lights.
+        let stray = 255.0 * design.sections().exposure.stray_level;
+        let factor = (MIN_DOME_LEVEL - stray) / (dome.median_level - stray).max(f64::MIN_POSITIVE);
+        let cure = brighter(design, 1.1 * factor.max(1.0));
+        let text = format!("{cure}, or a larger exposure.max_level_per_mw_mm2 where the camera has it");
         return Err(DesignError::at(
             "leds.radiant_flux_mw",
             json!(leds.radiant_flux_mw),

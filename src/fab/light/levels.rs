@@ -3,7 +3,7 @@
 use glam::DVec2;
 use serde::Serialize;
 
-use super::marker_outlines;
+use super::rest::marker_outlines;
 use domecast_design::Design;
 use domecast_design::sections::ExposureSection;
 use domecast_sim::light::RestLight;
@@ -18,6 +18,19 @@ const EDGE_PX: f64 = 2.2;
 /// Below this part of direct light a place counts as in shadow: its colour says more of the rest of the dome than of its own
 /// slope.
 const SHADOW_PART: f64 = 0.2;
+
+/// What the frame of the lit sensor at rest shows; levels are grey values of 0 to 255 before clipping.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LightReport {
+    /// Exposure and gain that the frame is taken with: level (of full scale) of a white surface for each mW/mm^2 on it.
+    pub level_per_mw_mm2: f64,
+    /// Whether that is the camera's largest, and the frame darker than wanted.
+    pub is_exposure_at_limit: bool,
+    /// The dome between the dots.
+    pub dome: DomeLevels,
+    /// Each white marker.
+    pub markers: Vec<MarkerLevels>,
+}
 
 /// Grey levels of the dome between the dots, inside of the mask.
 #[derive(Debug, Clone, PartialEq, Serialize)]

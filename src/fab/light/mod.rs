@@ -15,38 +15,16 @@
 mod frame;
 mod judge;
 mod levels;
+mod rest;
 
-use std::path::Path;
-
-use glam::DVec2;
-use serde::Serialize;
 use serde_json::json;
 
-use domecast_design::layout::frame::UndistortedFrame;
-use domecast_design::parts::markers_of;
 use domecast_design::{Design, DesignError};
 use domecast_sim::light::RestLight;
-use domecast_sim::scene::SceneFile;
-use domecast_sim::{Scene, SimError};
 
-pub use levels::{DomeLevels, MarkerLevels};
+pub use levels::{DomeLevels, LightReport, MarkerLevels};
 use levels::{dome_levels, marker_levels};
-
-/// Places of the image at which the dome's light is looked at are this far apart, px.
-const STEP_PX: u32 = 4;
-
-/// What the frame of the lit sensor at rest shows; levels are grey values of 0 to 255 before clipping.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LightReport {
-    /// Exposure and gain that the frame is taken with: level (of full scale) of a white surface for each mW/mm^2 on it.
-    pub level_per_mw_mm2: f64,
-    /// Whether that is the camera's largest, and the frame darker than wanted.
-    pub is_exposure_at_limit: bool,
-    /// The dome between the dots.
-    pub dome: DomeLevels,
-    /// Each white marker.
-    pub markers: Vec<MarkerLevels>,
-}
+use rest::{fault, pixels, scene};
 
 /// The report with the frame, a map, and what its maker should know.
 #[derive(Debug, Clone)]
@@ -115,59 +93,4 @@ impl LightCheck {
 /// As [`LightCheck::of`].
 pub fn marker_noise_px(design: &Design) -> Result<Vec<f64>, DesignError> {
     Ok(LightCheck::of(design)?.report.markers.iter().map(|marker| marker.centroid_sd_px).collect())
-}
-
-/// The sensor at rest under its lights with an exposure.
-fn scene(design: &Design, level_per_mw_mm2: f64, stray_level: f64) -> Result<Scene, DesignError> {
-    let exposure = &design.sections().exposure;
-    let file: SceneFile = serde_json::from_value(json!({
-        "version": 1,
-        "name": "rest",
-        "design": "",
-        "frames": { "count": 1, "rate_hz": 30 },
-        "tolerance": { "px": 0.1, "grey": 1 },
-        "light": {
-            "surround_level": exposure.surround_level,
-            "leds": {
-                "level_per_mw_mm2": level_per_mw_mm2,
-                "stray_level": stray_level,
-                "crosstalk": exposure.crosstalk,
-            },
-        },
-    }))
-    .map_err(|error| {
-        DesignError::at("exposure", "", error.to_string(), "an exposure as the schema has it")
-    })?;
-    Scene::new(file, Path::new(""), design.clone()).map_err(fault)
-}
-
-/// Places inside of the runtime's mask.
-fn pixels(design: &Design) -> impl Iterator<Item = DVec2> {
-    let lens = design.optics().lens();
-    let (width, height) = (lens.spec().width, lens.spec().height);
-    let matrix = design.undistorted_matrix();
-    let [[_, _, cx], [_, _, cy], _] = matrix;
-    let undistorted = UndistortedFrame::new(&matrix);
-    let radius_px = design.sections().runtime.mask_radius_px;
-    let columns = move |y: u32| {
-        (0..width).step_by(STEP_PX as usize).map(move |x| DVec2::new(f64::from(x), f64::from(y)))
-    };
-    (0..height).step_by(STEP_PX as usize).flat_map(columns).filter(move |pixel| {
-        let place = undistorted.as_ref().and_then(|frame| frame.from_raw(lens, *pixel).ok());
-        place.is_some_and(|place| place.distance(DVec2::new(cx, cy)) <= radius_px)
-    })
-}
-
-/// What the simulator refuses is a fault of the design: of its lights, as a rule.
-fn fault(error: SimError) -> DesignError {
-    match error {
-        SimError::Input(error) => *error,
-        other => DesignError::at("leds", "", other.to_string(), "lights that can be computed"),
-    }
-}
-
-/// Outlines of the design's white markers in the raw image, px; empty where the lens does not see one whole.
-fn marker_outlines(design: &Design) -> Vec<Vec<DVec2>> {
-    let outline = |marker: &domecast_optics::pose::Marker| marker.outline_px(design.optics());
-    markers_of(design).iter().map(|marker| outline(marker).map(Vec::from).unwrap_or_default()).collect()
 }

@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::subject::ReportSubject;
+use crate::constants::RIGID;
 use crate::html::{Html, bar, figure, html, table};
 use crate::numbers::{percent, typeset};
 
@@ -29,6 +30,14 @@ fn words(name: &str) -> String {
 
 /// The springs, each claim with how near it comes to its limits, the envelope, and other springs.
 pub(super) fn loads(subject: &ReportSubject<'_>) -> Html {
+    if subject.design.is_rigid() {
+        return html!(
+            "<p><strong>{}.</strong> The upper platform stands on {} posts and does not move; what a load does is seen \
+             in the dots alone.</p>",
+            RIGID,
+            subject.design.sections().mount.at_mm.len()
+        );
+    }
     let json = &subject.forces.json;
     let lines: Vec<Vec<Html>> = subject
         .forces
@@ -134,6 +143,12 @@ fn six(json: &Value, name: &str, path: &str) -> Vec<Html> {
 
 /// Standard deviations of pose and wrench, and what changes of the design do to them.
 pub(super) fn resolution(subject: &ReportSubject<'_>) -> Html {
+    if subject.design.is_rigid() {
+        return html!(
+            "<p><strong>{}</strong>, and no pose: there are no white markers to find it from.</p>",
+            RIGID
+        );
+    }
     const WRENCH: [&str; 7] = ["", "Fx, N", "Fy, N", "Fz, N", "Mx, N·mm", "My, N·mm", "Mz, N·mm"];
     const POSE: [&str; 7] = ["", "tx, mm", "ty, mm", "tz, mm", "rx, °", "ry, °", "rz, °"];
     let json = &subject.forces.json;

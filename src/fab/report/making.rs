@@ -85,12 +85,16 @@ fn printing_and_casting(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
         ),
         step(
             "Paint the white markers",
-            html!(
-                "Lay the marker stencil on the bare sheet and paint its {} holes, {} mm across, white and opaque, \
+            if s.white_markers.positions_mm.is_empty() {
+                html!("None on a rigid mount.")
+            } else {
+                html!(
+                    "Lay the marker stencil on the bare sheet and paint its {} holes, {} mm across, white and opaque, \
                  on the face that will carry the dome.",
-                s.white_markers.positions_mm.len(),
-                n(s.white_markers.diameter_mm),
-            ),
+                    s.white_markers.positions_mm.len(),
+                    n(s.white_markers.diameter_mm),
+                )
+            },
         ),
         step(
             "Seal the mould",
@@ -142,32 +146,35 @@ fn dots_and_assembly(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
                 n(skin_mm2(subject).round()),
             ),
         ),
-        step(
-            "Magnets and springs",
-            html!(
-                "Glue {} magnets ({} × {} mm) into their pockets, every facing pair attracting; the holes behind them \
+        if s.mount.is_rigid() {
+            step(
+                "Posts",
+                html!(
+                    "Lay the upper platform on the {} posts and screw it to them from below ({} mm holes).",
+                    s.mount.at_mm.len(),
+                    n(s.mount.hole_diameter_mm),
+                ),
+            )
+        } else {
+            step(
+                "Magnets and springs",
+                html!(
+                    "Glue {} magnets ({} × {} mm) into their pockets, every facing pair attracting; the holes behind them \
                  let a wrong one out again. Set {} springs ({} mm wire, {} mm outside, {} mm long, {} active coils) on \
                  the lower magnets, lower the upper platform on to them.",
-                2 * springs,
-                n(s.magnets.diameter_mm),
-                n(s.magnets.thickness_mm),
-                springs,
-                n(s.springs.wire_diameter_mm),
-                n(s.springs.outer_diameter_mm),
-                n(s.springs.free_length_mm),
-                n(s.springs.active_coils),
-            ),
-        ),
+                    2 * springs,
+                    n(s.magnets.diameter_mm),
+                    n(s.magnets.thickness_mm),
+                    springs,
+                    n(s.springs.wire_diameter_mm),
+                    n(s.springs.outer_diameter_mm),
+                    n(s.springs.free_length_mm),
+                    n(s.springs.active_coils),
+                ),
+            )
+        },
         step("Lights", lights_text(subject)),
-        step(
-            "Camera",
-            html!(
-                "Push the camera in from below until its front stands {} mm above the entrance pupil's place at z = {} mm, and \
-                 clamp it. Image axes are the sensor's axes.",
-                n(s.camera_body.front_from_pupil_mm),
-                n(s.camera.position_mm[2]),
-            ),
-        ),
+        step("Camera", camera_text(subject)),
         step(
             "Calibrate",
             html!(
@@ -178,6 +185,26 @@ fn dots_and_assembly(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
             ),
         ),
     ]
+}
+
+fn camera_text(subject: &ReportSubject<'_>) -> Html {
+    let s = subject.design.sections();
+    let n = typeset;
+    match &s.camera_body.board {
+        None => html!(
+            "Push the camera in from below until its front stands {} mm above the entrance pupil's place at z = {} mm, and \
+             clamp it. Image axes are the sensor's axes.",
+            n(s.camera_body.front_from_pupil_mm),
+            n(s.camera.position_mm[2]),
+        ),
+        Some(board) => html!(
+            "Lay the board into its pocket from below, the lens barrel in the bore, and screw it against its {} posts. The \
+             front glass then stands {} mm above the entrance pupil's place at z = {} mm. Image axes are the sensor's axes.",
+            board.holes_mm.len(),
+            n(s.camera_body.front_from_pupil_mm),
+            n(s.camera.position_mm[2]),
+        ),
+    }
 }
 
 /// Area of the dome's surface, mm^2.

@@ -48,10 +48,10 @@ pub(super) fn fits(subject: &ReportSubject<'_>) -> Html {
     let s = subject.design.sections();
     let n = typeset;
     let pocket = s.magnets.diameter_mm + s.magnet_pockets.diameter_clearance_mm;
-    let rows = [
+    let fits = [
         ("magnet in its pocket", s.magnets.diameter_mm, pocket, "magnet_pockets.diameter_clearance_mm"),
         (
-            "camera in its bore",
+            if s.camera_body.board.is_some() { "lens barrel in its bore" } else { "camera in its bore" },
             s.camera_body.diameter_mm,
             s.camera_body.diameter_mm + 2.0 * s.camera_body.bore_clearance_mm,
             "camera_body.bore_clearance_mm",
@@ -68,8 +68,9 @@ pub(super) fn fits(subject: &ReportSubject<'_>) -> Html {
             s.leds.package_mm[0] + 2.0 * s.leds.clearance_mm,
             "leds.clearance_mm",
         ),
-    ]
-    .map(|(fit, inner, outer, field)| {
+    ];
+    let there = fits.into_iter().filter(|fit| fit.1 > 0.0);
+    let row = |(fit, inner, outer, field): (&str, f64, f64, &str)| {
         vec![
             fit.into(),
             n(inner).into(),
@@ -77,7 +78,8 @@ pub(super) fn fits(subject: &ReportSubject<'_>) -> Html {
             format!("{} ± {}", n(0.5 * (outer - inner)), n(s.process.tolerance_mm)).into(),
             html!("<code>{}</code>", field),
         ]
-    });
+    };
+    let rows: Vec<Vec<Html>> = there.map(row).collect();
     let limits = [
         ("thinnest wall", s.process.min_wall_mm),
         ("smallest hole", s.process.min_hole_diameter_mm),

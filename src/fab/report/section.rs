@@ -305,7 +305,12 @@ fn dimensions(design: &Design, low: DVec3, high: DVec3) -> String {
     let right = |k: f64| high.x + step * k;
     art += &upright(left(1.0), -s.dome.radius_mm, [0.0, s.dome.radius_mm], "dome");
     art += &upright(left(1.0), 0.0, [pupil_z, 0.0], "pupil to dome");
-    art += &upright(left(2.0), low.x, [lower_top, underside], "springs");
+    art += &upright(
+        left(2.0),
+        low.x,
+        [lower_top, underside],
+        if design.is_rigid() { "posts" } else { "springs" },
+    );
     art += &upright(right(1.0), high.x, [low.z, lower_top], "lower platform");
     art += &upright(right(1.0), high.x, [design.sheet_underside_z_mm(), 0.0], "sheet");
     art += &upright(right(2.0), high.x, [low.z, high.z], "height");

@@ -102,7 +102,8 @@ impl<'a> Stepper<'a> {
             Ok(Touch { state, contact: None, solved: ContactTruth::away() })
         };
         let Some(object) = self.scene.objects().first() else { return free(self.scene) };
-        let suspension = self.scene.suspension();
+        // Objects on a rigid mount are refused when the scene is read.
+        let Some(suspension) = self.scene.suspension() else { return free(self.scene) };
         let radius_mm = self.scene.optics().dome_radius_mm();
         let before = self.last.as_ref();
         let solved = match object.hold_at(time_s) {

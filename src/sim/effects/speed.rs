@@ -28,7 +28,7 @@ fn platform_mm_per_s(scene: &Scene) -> f64 {
         MotionSection::Wrench(_) => CURVED,
         MotionSection::Pose(_) => 1.0,
     };
-    let at_mm = scene.suspension().at_mm();
+    let at_mm = scene.reference_mm();
     let lever_mm = scene.optics().dome_radius_mm() + at_mm.length() + 1.0;
     let keys = key_displacements(scene, motion);
     let speed = |a: &(f64, Displacement), b: &(f64, Displacement)| {
@@ -41,7 +41,8 @@ fn platform_mm_per_s(scene: &Scene) -> f64 {
 
 /// Displacements of the platform at the keys of a motion; of a load without a balance the last before it.
 fn key_displacements(scene: &Scene, motion: &MotionSection) -> Vec<(f64, Displacement)> {
-    let suspension = scene.suspension();
+    // A rigid mount has no motion.
+    let Some(suspension) = scene.suspension() else { return Vec::new() };
     match motion {
         MotionSection::Pose(motion) => motion.pose.iter().map(pose_key).collect(),
         MotionSection::Wrench(motion) => {

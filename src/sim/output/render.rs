@@ -149,7 +149,7 @@ impl<'a> Renderer<'a> {
         work: &mut Work,
     ) -> Result<SensorState, SimError> {
         let state = match &shape.touch {
-            Some(touch) => touch.state(self.scene.suspension().at_mm()),
+            Some(touch) => touch.state(self.scene.reference_mm()),
             None => self.scene.state_at(frame, time_s)?,
         };
         SensorState::new(&self.eye, self.pipeline.geometry, time_s, state, shape, work)

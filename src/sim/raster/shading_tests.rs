@@ -48,7 +48,7 @@ fn levels(scene: &Scene, frame: u32, tolerances: &[f32]) -> (Vec<Levels>, Vec<(u
     let touches: Vec<Touch> =
         (0..=frame).map(|k| stepper.next(k, scene.time_s(k), &mut work).unwrap()).collect();
     let around = Between::at_frame(touches.last().unwrap().clone());
-    let state = around.state(scene.suspension().at_mm());
+    let state = around.state(scene.reference_mm());
     let step = Some(map_step_mm(Some(level)));
     let shape = SkinShape::of(Some(around), scene.optics().dome_radius_mm(), step, &mut work);
     let time_s = scene.time_s(frame);
@@ -188,7 +188,7 @@ fn what_is_filled_in_is_what_each_ray_shows() {
 
 #[test]
 fn long_objects_are_filled_in_as_each_ray_shows_them() {
-    for design in ["thumb24", "thumb24-pinhole", "thumb24-fisheye"] {
+    for design in ["thumb24", "thumb24-pinhole", "thumb24-fisheye", "thumb24-wide"] {
         for object in OBJECTS {
             for level in ["geometric", "closed_form", "linear"] {
                 // The closed form knows balls.

@@ -38,7 +38,7 @@ pub struct Scene {
     pub(super) folder: PathBuf,
     pub(super) design: Design,
     pub(super) layout: Layout,
-    pub(super) suspension: Suspension,
+    pub(super) suspension: Option<Suspension>,
     pub(super) dots: Vec<SceneDot>,
     pub(super) markers: Vec<Marker>,
     pub(super) motion: Motion,
@@ -95,9 +95,14 @@ impl Scene {
         &self.layout
     }
 
-    /// The platform on its springs.
-    pub fn suspension(&self) -> &Suspension {
-        &self.suspension
+    /// The platform on its springs; `None` of a rigid mount.
+    pub fn suspension(&self) -> Option<&Suspension> {
+        self.suspension.as_ref()
+    }
+
+    /// The point that wrenches and displacements are stated about, mm: that of the springs, or the origin.
+    pub fn reference_mm(&self) -> DVec3 {
+        self.suspension.as_ref().map_or(DVec3::ZERO, Suspension::at_mm)
     }
 
     /// The dots as printed, in the layout's order.
@@ -120,7 +125,7 @@ impl Scene {
     /// # Errors
     /// A load without balance, named with the frame.
     pub fn state_at(&self, frame: u32, time_s: f64) -> Result<State, SimError> {
-        let state = self.motion.at(&self.suspension, time_s);
+        let state = self.motion.at(self.suspension.as_ref(), time_s);
         state.map_err(|error| SimError::Frame { frame, problem: error.to_string() })
     }
 

@@ -66,12 +66,13 @@ impl Motion {
     pub(super) fn new(
         section: Option<&MotionSection>,
         design: &domecast_design::Design,
-        suspension: &Suspension,
+        suspension: Option<&Suspension>,
     ) -> Self {
+        let at_mm = suspension.map_or(DVec3::ZERO, Suspension::at_mm);
         let course = match section {
             None => Course::Still,
             Some(MotionSection::Wrench(motion)) => {
-                Course::Wrench(motion.wrench.iter().map(|key| wrench_key(key, suspension.at_mm())).collect())
+                Course::Wrench(motion.wrench.iter().map(|key| wrench_key(key, at_mm)).collect())
             }
             Some(MotionSection::Pose(motion)) => Course::Pose(motion.pose.iter().map(pose_key).collect()),
         };
@@ -108,11 +109,14 @@ impl Motion {
         }
     }
 
-    /// Pose and load at a time, without objects.
+    /// Pose and load at a time, without objects; without springs (a rigid mount) the platform rests.
     ///
     /// # Errors
     /// A load that has no balance, or a pose beyond the springs' model.
-    pub fn at(&self, suspension: &Suspension, time_s: f64) -> Result<State, MechanicsError> {
+    pub fn at(&self, suspension: Option<&Suspension>, time_s: f64) -> Result<State, MechanicsError> {
+        let Some(suspension) = suspension else {
+            return Ok(State { pose: Rigid::identity(), wrench: Wrench::default(), held: None });
+        };
         let (wrench, pose) = self.load_at(time_s);
         if let Some(displacement) = pose {
             let wrench = suspension.wrench_at(&displacement)?;

@@ -64,7 +64,10 @@ fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
 fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimError> {
     check(&file)?;
     let layout = Layout::of_design(&design)?;
-    let suspension = suspension_of(&design)?;
+    if design.is_rigid() {
+        rests(&file)?;
+    }
+    let suspension = if design.is_rigid() { None } else { Some(suspension_of(&design)?) };
     let mut dots: Vec<SceneDot> = layout.dots.iter().map(|dot| scene_dot(dot, design.optics())).collect();
     for (index, broken) in file.ink.broken.iter().enumerate() {
         let count = dots.len();
@@ -74,7 +77,7 @@ fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimE
         })?;
         dot.cut = Some((broken.left, broken.direction_deg.to_radians()));
     }
-    let motion = Motion::new(file.motion.as_ref(), &design, &suspension);
+    let motion = Motion::new(file.motion.as_ref(), &design, suspension.as_ref());
     let diameter_mm = design.sections().white_markers.diameter_mm;
     let numbered = (0..).zip(design.white_markers_mm());
     let markers = numbered.map(|(id, position_mm)| Marker { id, position_mm, diameter_mm }).collect();
@@ -82,7 +85,9 @@ fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimE
         SceneObject::new(section, &format!("objects[{index}]"), folder)
     };
     let objects = file.objects.iter().enumerate().map(object).collect::<Result<Vec<_>, _>>()?;
-    check_loads(&motion, &suspension, &file)?;
+    if let Some(suspension) = &suspension {
+        check_loads(&motion, suspension, &file)?;
+    }
     Ok(Scene {
         file,
         folder: folder.to_path_buf(),
@@ -151,6 +156,22 @@ fn check(file: &SceneFile) -> Result<(), DesignError> {
                 "no `motion` beside objects: what they press is what the springs carry",
             ));
         }
+    }
+    Ok(())
+}
+
+/// A scene of a rigid mount shows the sensor at rest: the platform does not move, and what objects press is not computed
+/// without springs.
+fn rests(file: &SceneFile) -> Result<(), DesignError> {
+    let fault = |field: &str, problem: &str| {
+        let problem = format!("rigid mount: {problem}");
+        Err(DesignError::at(field, "", problem, "a scene at rest, or a design with mount.kind = \"springs\""))
+    };
+    if file.motion.is_some() {
+        return fault("motion", "the platform does not move");
+    }
+    if !file.objects.is_empty() {
+        return fault("objects", "contact is computed on springs only");
     }
     Ok(())
 }

@@ -6,25 +6,70 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::super::*;
 use super::spec;
+use crate::spec::sections::TolerancesSection;
 use domecast_optics::camera::LensModel;
 use domecast_optics::numeric::Rigid;
+
+/// No tolerance but those of `change`.
+fn tolerances(change: serde_json::Value) -> TolerancesSection {
+    let mut json = serde_json::json!({
+        "pupil_mm": [0.0, 0.0, 0.0], "camera_rotation_deg": [0.0, 0.0, 0.0], "dome_radius_mm": 0.0,
+        "layer_thickness_mm": 0.0, "index": 0.0, "white_marker_mm": 0.0, "black_dot_mm": 0.0,
+        "print_registration_mm": 0.0, "print_rotation_deg": 0.0, "print_scatter_mm": 0.0,
+        "wire_diameter_mm": 0.0, "spring_diameter_mm": 0.0, "samples": 40, "seed": 5,
+    });
+    for (key, value) in change.as_object().unwrap() {
+        json[key] = value.clone();
+    }
+    serde_json::from_value(json).unwrap()
+}
+
+/// Each pass is registered by itself: an offset on its plate and a turn about its own axis. What they do to the distance
+/// of two neighbours of different passes is worked out here from the plates alone.
+#[test]
+fn each_print_pass_has_its_own_registration() {
+    let mut spec =
+        spec(LensModel::KannalaBrandt, serde_json::json!({"polar_angle_deg": 75.0, "pitch_px": 18.0}));
+    spec.print.wrap_limit_deg = 80.0;
+    let one = Layout::new(&spec).unwrap();
+    spec.print.wrap_limit_deg = 45.0;
+    spec.print.hits = crate::spec::sections::PrintPasses::Split;
+    let split = Layout::new(&spec).unwrap();
+    assert!(one.passes.len() == 1 && split.passes.len() > 3 && one.dots.len() == split.dots.len());
+    let added = |layout: &Layout, change: serde_json::Value, name: &str| {
+        let report = tolerances::under_tolerances(&spec, layout, &tolerances(change)).unwrap();
+        assert_eq!(report.blind, 0);
+        report.ranking.iter().find(|share| share.tolerance == name).unwrap().clone()
+    };
+    let offset = |layout: &Layout| {
+        added(layout, serde_json::json!({"print_registration_mm": 0.02}), "print_registration_mm")
+    };
+    let turn =
+        |layout: &Layout| added(layout, serde_json::json!({"print_rotation_deg": 0.3}), "print_rotation_deg");
+    // One pass moves as a whole; several come apart at their borders.
+    assert!(offset(&split).added_variation > 2.0 * offset(&one).added_variation);
+    assert!(turn(&split).added_variation > 2.0 * turn(&one).added_variation);
+    // A turn moves a dot by its distance from the pass's axis: E|angle| = sd sqrt(2 / pi).
+    for layout in [&one, &split] {
+        let step = 1e-4;
+        let moved = |dot: &Dot| {
+            let plate = DVec2::from_angle(step).rotate(dot.plate_mm);
+            let on_pass = layout.transfer.dome_from_plate(plate).unwrap();
+            let surface = layout.passes[dot.pass].pass_from_sensor.transpose() * on_pass;
+            spec.optics.project(surface).unwrap().distance(dot.image_px) / step
+        };
+        let lever_px = layout.dots.iter().map(moved).sum::<f64>() / layout.dots.len() as f64;
+        let want_px = lever_px * 0.3_f64.to_radians() * (2.0 / std::f64::consts::PI).sqrt();
+        // 40 sensors know a mean of |angle| to 0.6 / sqrt(40) of the spread for one pass
+        let found_px = turn(layout).mean_shift_px;
+        assert!((found_px / want_px - 1.0).abs() < 0.3, "{found_px} {want_px}");
+    }
+}
 
 #[test]
 fn tolerances_show_what_they_do() {
     let spec = spec(LensModel::KannalaBrandt, serde_json::json!({"polar_angle_deg": 50.0}));
     let layout = Layout::new(&spec).unwrap();
-    let tolerances = |change: serde_json::Value| {
-        let mut json = serde_json::json!({
-            "pupil_mm": [0.0, 0.0, 0.0], "camera_rotation_deg": [0.0, 0.0, 0.0], "dome_radius_mm": 0.0,
-            "layer_thickness_mm": 0.0, "index": 0.0, "white_marker_mm": 0.0, "black_dot_mm": 0.0,
-            "print_registration_mm": 0.0, "print_rotation_deg": 0.0, "print_scatter_mm": 0.0,
-            "wire_diameter_mm": 0.0, "spring_diameter_mm": 0.0, "samples": 40, "seed": 5,
-        });
-        for (key, value) in change.as_object().unwrap() {
-            json[key] = value.clone();
-        }
-        serde_json::from_value(json).unwrap()
-    };
     // Without tolerances nothing moves.
     let none = tolerances::under_tolerances(&spec, &layout, &tolerances(serde_json::json!({}))).unwrap();
     assert!(none.nearest_variation_p95 < 1e-9 && none.mean_shift_px < 1e-9, "{none:?}");

@@ -1,8 +1,11 @@
+mod boards;
 mod checks;
 mod exactness;
 mod mechanism;
 mod random_designs;
+mod rigid;
 mod seats;
+mod strokes;
 mod sweep;
 mod walls;
 

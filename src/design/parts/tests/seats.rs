@@ -18,7 +18,7 @@ fn edited(edits: &[(&str, Value)]) -> Value {
 }
 
 /// Sets a field by the path that messages give: `platforms.lower.mounting.at_mm[2]`.
-fn set(tree: &mut Value, field: &str, value: Value) {
+pub(super) fn set(tree: &mut Value, field: &str, value: Value) {
     let mut at = tree;
     for name in field.replace('[', ".").replace(']', "").split('.') {
         at = match name.parse::<usize>() {
@@ -30,7 +30,7 @@ fn set(tree: &mut Value, field: &str, value: Value) {
 }
 
 /// Everything that is at fault with a design's parts, and what is noted where nothing is.
-fn verdict(tree: &Value) -> Result<CheckedSensor, Vec<PartError>> {
+pub(super) fn verdict(tree: &Value) -> Result<CheckedSensor, Vec<PartError>> {
     let design = Design::from_str(&tree.to_string()).unwrap();
     let all = |error: PartError| error.faults().to_vec();
     let m = Measures::of(&design).map_err(all)?;
@@ -41,7 +41,7 @@ fn verdict(tree: &Value) -> Result<CheckedSensor, Vec<PartError>> {
 }
 
 /// The fault whose cure is in a field.
-fn fault_in(faults: &[PartError], field: &str) -> Option<PartError> {
+pub(super) fn fault_in(faults: &[PartError], field: &str) -> Option<PartError> {
     // a wall's fault may be cured by a seat's field: that is another fault
     let of_seat = |fault: &&PartError| !matches!(fault, PartError::Cured { .. });
     let here = |fault: &&PartError| fault.cure().is_some_and(|cure| cure.field == field);
@@ -50,7 +50,11 @@ fn fault_in(faults: &[PartError], field: &str) -> Option<PartError> {
 
 #[track_caller]
 fn refused(field: &str, words: &[&str], edits: &[(&str, Value)]) {
-    let mut tree = edited(edits);
+    refused_tree(field, words, edited(edits));
+}
+
+#[track_caller]
+pub(super) fn refused_tree(field: &str, words: &[&str], mut tree: Value) {
     let faults = verdict(&tree).expect_err("a broken design");
     let said: Vec<String> = faults.iter().map(ToString::to_string).collect();
     let Some(fault) = fault_in(&faults, field) else { panic!("{field} is not in {said:#?}") };

@@ -2,7 +2,7 @@
 //!
 //! The entries are data (`data/*.json`, compiled in). A field is named by the section and the field that it fills:
 //! `camera_body.diameter_mm`, `magnets.thickness_mm`; `layer` stands for a layer of `optics.layers`. What no section
-//! takes yet stands under `body` (a camera's board), `sensor` and `sheet`. Numbers that are not from a source which can
+//! takes yet stands under `sensor` and `sheet`. Numbers that are not from a source which can
 //! be named are marked `estimate:` with the reason.
 //!
 //! In a design, a section names an entry by its key, as `"from": "misumi75"`; what the section gives itself wins.

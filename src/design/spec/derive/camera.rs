@@ -144,6 +144,6 @@ fn position(k: &Known<'_>) -> Option<Value> {
 fn mask_angle(k: &Known<'_>) -> Option<Value> {
     let lens = lens(k)?;
     let wanted = 1.03 * marks_angle_rad(k, depth_mm(k));
-    let most = lens.max_field_angle_rad().min(75f64.to_radians());
-    k.number(up(wanted.min(0.995 * most).to_degrees(), 0.1).min(most.to_degrees()))
+    let reach = lens.max_field_angle_rad().min(75f64.to_radians());
+    k.number(up(wanted.min(0.995 * reach).to_degrees(), 0.1).min(reach.to_degrees()))
 }

@@ -129,7 +129,7 @@ pub(super) fn bore_mm(k: &Known<'_>) -> f64 {
     0.5 * k.n("camera_body.diameter_mm") + k.n("camera_body.bore_clearance_mm")
 }
 
-/// Thinnest wall of the process, with a little to spare, mm.
+/// Thinnest wall of the process, and a little margin, mm.
 pub(super) fn wall_mm(k: &Known<'_>) -> f64 {
     k.n("process.min_wall_mm") + 0.02
 }

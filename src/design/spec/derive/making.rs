@@ -45,8 +45,8 @@ pub(super) const TOOLS: &[Rule] = &[
         },
     ),
     follows("mould.fill.diameter_mm", "0.3 R, from the smallest hole (at least 1.2 mm) to 3 mm", |k| {
-        let least = k.n("process.min_hole_diameter_mm").max(1.2);
-        k.number((0.3 * k.n("dome.radius_mm")).min(3.0).max(least))
+        let narrowest = k.n("process.min_hole_diameter_mm").max(1.2);
+        k.number((0.3 * k.n("dome.radius_mm")).min(3.0).max(narrowest))
     }),
     follows("mould.fill.radius_mm", "off the axis, 0.6 R, where the scar is bonded to the sheet", |k| {
         k.number(0.6 * k.n("dome.radius_mm"))

@@ -10,6 +10,7 @@ mod camera;
 mod geometry;
 mod known;
 mod making;
+mod mount;
 mod pattern;
 mod platforms;
 mod room;
@@ -32,7 +33,7 @@ fn rules() -> impl Iterator<Item = &'static Rule> {
         camera::LENS,
         camera::LAYERS,
         camera::BODY,
-        springs::BOUGHT,
+        springs::PURCHASED,
         platforms::LIGHTS,
         springs::LOADS,
         platforms::HEIGHTS,
@@ -58,17 +59,19 @@ pub(super) fn fields() -> impl Iterator<Item = &'static str> {
     rules().map(|rule| rule.field)
 }
 
-/// Gives every left-out field of a design file's tree its value; what was given is told in the order of the rules.
+/// Gives every left-out field of a design file's tree its value; what was given is returned in the order of the rules.
 ///
 /// # Errors
 /// A rule whose fields make no number: a lens that cannot be, or one that sees nothing of the dome.
 pub fn derive(design: &mut Value) -> Result<Vec<DerivedField>, DesignError> {
     let mut given = Vec::new();
+    let stripped = mount::to_strip(design);
     for rule in rules() {
         if known::lookup(design, rule.field).is_some() {
             continue;
         }
         let value = match rule.gives {
+            _ if mount::instead(design, rule.field).is_some() => mount::instead(design, rule.field),
             Gives::Fixed(json) => Some(serde_json::from_str(json).unwrap_or(Value::Null)),
             Gives::Follows(give) => {
                 let known = Known::new(design);
@@ -89,6 +92,7 @@ pub fn derive(design: &mut Value) -> Result<Vec<DerivedField>, DesignError> {
             given.push(DerivedField { field: rule.field, rule: rule.says, value });
         }
     }
+    mount::strip(design, &stripped, &mut given);
     Ok(given)
 }
 

@@ -184,7 +184,7 @@ fn sheet_size(k: &Known<'_>) -> Option<Value> {
         .filter_map(Value::as_array)
         .flatten()
         .filter_map(Value::as_f64)
-        .fold(0.0, |most: f64, side| most.max(side.abs()));
+        .fold(0.0, |widest: f64, side| widest.max(side.abs()));
     let markers = farthest + 0.5 * k.n("white_markers.diameter_mm") + 0.2;
     // what opens into the recess opens wholly: an edge half-way over a hole leaves a sliver
     let gap = k.n("sheet.clearance_mm");

@@ -10,7 +10,7 @@ use super::rule::{Rule, fixed, follows};
 /// So much of what the wire bears may the largest press use.
 const MAX_USED: f64 = 0.9;
 
-pub(super) const BOUGHT: &[Rule] = &[
+pub(super) const PURCHASED: &[Rule] = &[
     fixed("springs.outer_diameter_mm", "3.0", "a common size that fits beside the camera"),
     fixed("springs.free_length_mm", "5.0", "a common size; the camera's depth grows with it"),
     fixed("springs.active_coils", "3", "few coils leave travel before they bind"),
@@ -102,7 +102,7 @@ fn wire(k: &Known<'_>) -> Option<Value> {
         .fold(0.0, |largest: f64, force| largest.max(-force));
     let stiffness = press.max(0.1) / (0.4 * k.n("springs.free_length_mm") * spring_count(k).max(1) as f64);
     let (outer, coils) = (k.n("springs.outer_diameter_mm"), k.n("springs.active_coils"));
-    // the mean diameter depends on the wire: a few rounds settle it far below a step
+    // the mean diameter depends on the wire: a few rounds bring it far below a step
     let mut wire = 0.1 * outer;
     for _ in 0..30 {
         let mean = (outer - wire).max(0.1 * outer);

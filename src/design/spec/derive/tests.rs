@@ -5,7 +5,7 @@ use crate::Design;
 
 const THUMB24: &str = include_str!("../../../../designs/thumb24.json");
 
-fn least(radius_mm: f64) -> Value {
+fn minimal(radius_mm: f64) -> Value {
     let thumb24: Value = serde_json::from_str(THUMB24).unwrap();
     let camera = &thumb24["camera"];
     json!({
@@ -29,7 +29,7 @@ fn a_whole_file_is_left_as_it_is() {
 #[test]
 fn radius_and_lens_make_a_design() {
     for radius_mm in [4.0, 5.0, 7.9, 10.0, 12.6, 20.0, 25.0] {
-        let text = least(radius_mm).to_string();
+        let text = minimal(radius_mm).to_string();
         let design: Design = text.parse().unwrap_or_else(|error| panic!("R = {radius_mm}: {error}"));
         assert!(design.derived().len() > 120, "{}", design.derived().len());
         assert_eq!(design.text(), text, "the text stays as it was written");
@@ -41,8 +41,8 @@ fn radius_and_lens_make_a_design() {
 
 #[test]
 fn every_rule_reads_only_what_stands_before_it() {
-    // from the least design every rule is applied; one that read a later field would find no number
-    let mut design = least(10.0);
+    // from the minimal design every rule is applied; one that read a later field would find no number
+    let mut design = minimal(10.0);
     let given = derive(&mut design).unwrap();
     for rule in rules() {
         let is_other = ["camera.field_of_view_deg", "camera.distortion"].contains(&rule.field);
@@ -57,12 +57,12 @@ fn every_rule_reads_only_what_stands_before_it() {
 
 #[test]
 fn a_given_field_wins_and_the_others_follow_it() {
-    let mut design = least(10.0);
+    let mut design = minimal(10.0);
     design["springs"] = json!({ "free_length_mm": 8.0 });
     design["process"] = json!({ "min_wall_mm": 1.0 });
     derive(&mut design).unwrap();
     assert_eq!(design["springs"]["free_length_mm"], json!(8.0));
-    let mut plain = least(10.0);
+    let mut plain = minimal(10.0);
     derive(&mut plain).unwrap();
     let depth = |design: &Value| -design["camera"]["position_mm"][2].as_f64().unwrap();
     assert!(depth(&design) > depth(&plain), "longer springs need a deeper camera");

@@ -1,4 +1,4 @@
-//! The camera: intrinsics, place, and body.
+//! The camera: intrinsics, and place.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -56,43 +56,6 @@ pub struct CameraSection {
     /// Which camera of a camchain, where it has several: `cam0`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration_camera: Option<String>,
-    /// Key of a part whose numbers stand for the fields that are left out here: `domecast list cameras`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub from: Option<String>,
-    /// Reasons and sources, by field.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub why: Option<Why>,
-}
-
-/// The camera's housing, a cylinder around the optical axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CameraBodySection {
-    /// Outer diameter, mm.
-    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 200.0))]
-    pub diameter_mm: f64,
-    /// Length from the front glass to the back, mm.
-    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 500.0))]
-    pub length_mm: f64,
-    /// How far the front glass stands ahead of the entrance pupil, towards the dome, mm.
-    #[schemars(range(min = 0.0, max = 100.0))]
-    pub front_from_pupil_mm: f64,
-    /// Diameter of the front glass that light can enter, mm.
-    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 200.0))]
-    pub lens_diameter_mm: f64,
-    /// Radial clearance of the bore that holds the body, mm.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub bore_clearance_mm: f64,
-    /// Smallest gap allowed between the front glass and the sheet under the claimed loads, mm.
-    #[schemars(range(min = 0.0, max = 100.0))]
-    pub min_sheet_gap_mm: f64,
-    /// Diameter of the cable that leaves at the back, mm.
-    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 100.0))]
-    pub cable_diameter_mm: f64,
-    /// Smallest radius that the cable may be bent to, mm; left out: twice its diameter.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1000.0))]
-    pub cable_bend_radius_mm: Option<f64>,
     /// Key of a part whose numbers stand for the fields that are left out here: `domecast list cameras`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<String>,

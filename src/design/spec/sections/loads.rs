@@ -9,8 +9,9 @@ use super::Why;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WhiteMarkersSection {
-    /// x, y of each disc's centre on the sheet's top face (z = 0), mm. Four or more, not on one line.
-    #[schemars(length(min = 4, max = 64))]
+    /// x, y of each disc's centre on the sheet's top face (z = 0), mm. Four or more, not on one line; none on a rigid
+    /// mount.
+    #[schemars(length(max = 64))]
     pub positions_mm: Vec<[f64; 2]>,
     /// Diameter of a disc, mm.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 100.0))]
@@ -21,6 +22,20 @@ pub struct WhiteMarkersSection {
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
+}
+
+/// What stands for the section where a rigid mount leaves it out.
+impl Default for WhiteMarkersSection {
+    fn default() -> Self {
+        Self { positions_mm: Vec::new(), diameter_mm: 1.0, reflectance: 0.0, why: None }
+    }
+}
+
+impl WhiteMarkersSection {
+    /// Whether the section is left out.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// The loads that the design claims to carry with every spring, stop and marker inside its limits.

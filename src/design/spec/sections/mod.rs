@@ -14,10 +14,12 @@
 //! ```
 
 mod accuracy;
+mod body;
 mod camera;
 mod light;
 mod loads;
 mod making;
+mod mount;
 mod optics;
 mod pattern;
 mod platforms;
@@ -32,13 +34,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use accuracy::AccuracySection;
-pub use camera::{CameraBodySection, CameraSection, ModelName, RuntimeSection};
+pub use body::{CameraBoardSection, CameraBodyKind, CameraBodySection};
+pub use camera::{CameraSection, ModelName, RuntimeSection};
 pub use light::{DiffuserSection, ExposureSection, PowerRgb, ReflectanceRgb};
 pub use loads::{CentroidNoiseSection, LoadClaim, LoadsSection, WhiteMarkersSection};
 pub use making::{
     CouponSection, FillSection, JigSection, MeshSection, MouldSection, PinsSection, ProcessSection,
     StencilSection, VentsSection,
 };
+pub use mount::{MountKind, MountSection};
 pub use optics::{DomeSection, IndexRgb, IndexValue, LayerSection, OpticsSection};
 pub use pattern::{
     CentredOn, EvenIn, ImageDiscSection, KeepOutSection, OnLost, PatternCentre, PatternKind, PatternSection,
@@ -94,13 +98,20 @@ pub struct DesignFile {
     pub pattern: PatternSection,
     /// How they are printed.
     pub print: PrintSection,
-    /// The markers on the sheet.
+    /// The markers on the sheet; a rigid mount may leave them out.
+    #[serde(default, skip_serializing_if = "WhiteMarkersSection::is_none")]
     pub white_markers: WhiteMarkersSection,
-    /// The springs between the platforms.
+    /// How the upper platform stands on the lower one: on springs where it is left out.
+    #[serde(default, skip_serializing_if = "MountSection::is_default")]
+    pub mount: MountSection,
+    /// The springs between the platforms; left out of a rigid mount.
+    #[serde(default, skip_serializing_if = "SpringsSection::is_none")]
     pub springs: SpringsSection,
-    /// The magnets that hold the springs.
+    /// The magnets that hold the springs; left out of a rigid mount.
+    #[serde(default, skip_serializing_if = "MagnetsSection::is_none")]
     pub magnets: MagnetsSection,
-    /// The pockets of those magnets.
+    /// The pockets of those magnets; left out of a rigid mount.
+    #[serde(default, skip_serializing_if = "MagnetPocketsSection::is_none")]
     pub magnet_pockets: MagnetPocketsSection,
     /// Weight of what the springs carry; left out where it shall not count.
     #[serde(default, skip_serializing_if = "Option::is_none")]

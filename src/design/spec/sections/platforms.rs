@@ -149,6 +149,20 @@ pub struct MagnetPocketsSection {
     pub why: Option<Why>,
 }
 
+/// What stands for the section where a rigid mount leaves it out.
+impl Default for MagnetPocketsSection {
+    fn default() -> Self {
+        Self { diameter_clearance_mm: 0.0, depth_clearance_mm: 0.0, push_out_diameter_mm: 0.0, why: None }
+    }
+}
+
+impl MagnetPocketsSection {
+    /// Whether the section is left out.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 /// Colour of a light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -44,6 +44,37 @@ pub struct SpringsSection {
     pub why: Option<Why>,
 }
 
+/// What stands for the section where a rigid mount leaves it out.
+impl Default for SpringsSection {
+    fn default() -> Self {
+        Self {
+            wire_diameter_mm: 0.0,
+            outer_diameter_mm: 0.0,
+            free_length_mm: 0.0,
+            active_coils: 0.0,
+            ends: SpringEnds::ClosedGround,
+            wire: WireSection {
+                name: String::new(),
+                shear_modulus_mpa: 0.0,
+                elastic_modulus_mpa: 0.0,
+                allowable_shear_mpa: 0.0,
+            },
+            places: SpringPlaces::Listed(Vec::new()),
+            reference_point_mm: None,
+            stop_clearance_mm: None,
+            from: None,
+            why: None,
+        }
+    }
+}
+
+impl SpringsSection {
+    /// Whether the section is left out.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 /// The two ends of a compression spring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -125,6 +156,28 @@ pub struct MagnetsSection {
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
+}
+
+/// What stands for the section where a rigid mount leaves it out.
+impl Default for MagnetsSection {
+    fn default() -> Self {
+        Self {
+            diameter_mm: 0.0,
+            thickness_mm: 0.0,
+            remanence_t: 0.0,
+            grip_force_n: 0.0,
+            facing: MagnetFacing::Ignore,
+            from: None,
+            why: None,
+        }
+    }
+}
+
+impl MagnetsSection {
+    /// Whether the section is left out.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// The force between the two magnets of a pair.

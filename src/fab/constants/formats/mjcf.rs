@@ -23,7 +23,10 @@ pub fn mjcf(constants: &Constants, robot: &Robot) -> String {
         .springs
         .as_ref()
         .map_or((DVec3::ZERO, [[0.0; 6]; 6]), |s| (DVec3::from_array(s.at_mm) * 1e-3, s.stiffness));
-    let (springs, note) = springs_of(&matrix_of(&stiffness));
+    let (springs, mut note) = springs_of(&matrix_of(&stiffness));
+    if constants.springs.is_none() {
+        note = "a rigid mount: the platform has no joint".into();
+    }
     let inertial = |part: &BodyPart, origin: DVec3| {
         let i = part.mass.inertia_kg_m2;
         format!(
@@ -62,6 +65,9 @@ pub fn mjcf(constants: &Constants, robot: &Robot) -> String {
             triple(axis),
             number(damping),
         );
+    }
+    if constants.springs.is_none() {
+        joints.clear();
     }
     let tendons = tendons(&springs);
     format!(

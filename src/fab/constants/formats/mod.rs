@@ -69,7 +69,15 @@ mod tests {
     // What the files say of the camera is all that they say, whichever the lens, to the last digit.
     #[test]
     fn our_own_files_read_back_to_the_same_bytes() {
-        let mut all = ["thumb24.json", "thumb24-fisheye.json", "thumb24-pinhole.json"].map(of).to_vec();
+        let mut all = [
+            "thumb24.json",
+            "thumb24-fisheye.json",
+            "thumb24-pinhole.json",
+            "thumb24-wide.json",
+            "endoscope-r5.json",
+        ]
+        .map(of)
+        .to_vec();
         for count in [8, 12, 14] {
             let mut more = of("thumb24.json");
             let rest = (5..count).map(|i| 0.1 / 3.0_f64.powi(i));

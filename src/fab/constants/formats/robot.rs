@@ -93,7 +93,8 @@ pub fn urdf(constants: &Constants, robot: &Robot) -> String {
     text += &urdf_link(&named(&robot.lower, "base"), mount, "");
     text += &urdf_link(&named(&robot.upper, "sensor"), DVec3::ZERO, &dome);
     text += "  <link name=\"wrench\"/>\n  <link name=\"camera\"/>\n";
-    text += &joint("springs", "base", "sensor", -mount, DVec3::ZERO);
+    let between = if constants.springs.is_some() { "springs" } else { "posts" };
+    text += &joint(between, "base", "sensor", -mount, DVec3::ZERO);
     text += &joint("wrench_point", "sensor", "wrench", at, DVec3::ZERO);
     text += &joint("camera_mount", "base", "camera", camera_at - mount, rpy);
     text + "</robot>\n"

@@ -47,6 +47,10 @@ impl SensorModel {
         if !(mask.center_px.iter().chain(matrix).all(|v| v.is_finite()) && mask.radius_px > 0.0) {
             return Err(TrackError::at("mask", "is no circle in the undistorted frame"));
         }
+        if constants.white_markers.is_empty() {
+            let problem = "are none (a rigid mount): the tracker follows the dots of a platform whose pose it finds by them";
+            return Err(TrackError::at("white_markers", problem));
+        }
         let press_mm =
             constants.springs.as_ref().and_then(|s| s.stiffness_at.last()).map(|e| e.compression_mm);
         let max_shift_mm = press_mm.map_or(DEFAULT_MAX_SHIFT_MM, |press| press.clamp(0.5, 100.0) + 2.0);

@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+"""Simulates a press and pushes on built sensors under their own lights, tracks the frames, and compares with the truth.
+
+    python3 scripts/check_tracking.py target/release/domecast output/thumb24 [...]
+
+For each build a short scene is written from its design's claimed loads: a press, pushes along x and y under it, and back
+to rest, lit with the exposure that `report/light.json` states, with the noise of a usual camera. `domecast simulate` draws
+it and `domecast track` reads frames and constants only. Held to the truth:
+
+- every frame has an answer, and no dot that the camera sees whole is missing or taken for another;
+- dots: rms and largest distance of the centroids;
+- wrench, where the build promises one: each error within six of the standard deviations that the line itself states, and
+  the mean of the squared ones not above four, so that neither the number nor its spread is wrong in silence.
+"""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+FRAMES = 21
+RATE_HZ = 30
+MAX_RMS_PX, MAX_PX = 0.1, 0.75
+MAX_SDS, MAX_MEAN_SQUARE = 6.0, 4.0
+# What six springs' law is linear in, and what a frame of steps leaves: a floor under the stated deviations, N and N mm.
+FLOOR = np.array([0.002, 0.002, 0.005, 0.02, 0.02, 0.005])
+failed = 0
+
+
+def check(what, holds, detail=""):
+    global failed
+    failed += not holds
+    print(f"{'ok  ' if holds else 'FAIL'} {what:<52} {detail}")
+
+
+def scene_of(build):
+    """A scene on a copy of the build's own design, with loads in proportion to its dome."""
+    constants = json.loads((build / "constants/constants.json").read_text())
+    light = json.loads((build / "report/light.json").read_text())
+    radius = constants["optics"]["dome_radius_mm"]
+    pole = [0, 0, radius]
+    press, push = 0.5 * radius, 0.04 * radius
+    forces = [[0, 0, 0], [0, 0, -press], [push, 0, -press], [0, push, -press], [0, 0, 0]]
+    times = np.linspace(0, (FRAMES - 1) / RATE_HZ, len(forces))
+    return {
+        "version": 1,
+        "name": "pushed",
+        "design": str((build / "design.json").resolve()),
+        "frames": {"count": FRAMES, "rate_hz": RATE_HZ},
+        "tolerance": {"px": 0.02, "grey": 2},
+        "seed": 3,
+        "motion": {
+            "wrench": [{"time_s": t, "force_n": f, "point_mm": pole} for t, f in zip(times.tolist(), forces)]
+        },
+        "light": {
+            "surround_level": 0.02,
+            "leds": {"level_per_mw_mm2": light["level_per_mw_mm2"], "stray_level": 0.005, "crosstalk": 0.08},
+        },
+        "electronics": {"noise": {"full_scale_electrons": 8000, "read_electrons": 4, "bits": 10}},
+    }
+
+
+def run(program, *arguments):
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(map(str, arguments))}: {done.stderr.strip() or done.stdout.strip()}")
+    return done.stdout
+
+
+def compare(program, build, folder):
+    scene = folder / "scene.json"
+    scene.write_text(json.dumps(scene_of(build)))
+    run(program, "simulate", scene, "--out", folder / "frames", "--quiet")
+    truth = [json.loads(line) for line in (folder / "frames/truth.jsonl").read_text().splitlines()]
+    frames = sorted((folder / "frames").glob("frame_*.png"))
+    constants = build / "constants/constants.json"
+    run(program, "track", *frames, "--constants", constants, "--out", folder / "track.jsonl", "--quiet")
+    lines = [json.loads(line) for line in (folder / "track.jsonl").read_text().splitlines()]
+    check("a line for each frame", len(lines) == len(truth) == FRAMES, f"{len(lines)} of {FRAMES}")
+    statuses = sorted({line["status"] for line in lines})
+    check("every frame is read", statuses == ["ok"], ", ".join(statuses))
+
+    away, lost, wanted = [], 0, 0
+    for line, true in zip(lines, truth):
+        found = {d["id"]: d["centroid_px"] for d in line["black_dots"] if d["centroid_px"]}
+        for dot in true["black_dots"]:
+            if not dot["visible"]:
+                continue
+            wanted += 1
+            if dot["id"] in found:
+                away.append(np.hypot(*np.subtract(found[dot["id"]], dot["centroid_px"])))
+            else:
+                lost += 1
+    away = np.array(away if away else [np.inf])
+    rms = np.sqrt(np.mean(away**2))
+    check("no visible dot is missing", lost == 0 and wanted > 0, f"{lost} of {wanted}")
+    check("dots lie where they are", rms <= MAX_RMS_PX and away.max() <= MAX_PX, f"rms {rms:.4f} px, max {away.max():.3f} px")
+
+    if not json.loads(constants.read_text()).get("springs"):
+        check("no springs, no wrench", all(not line.get("wrench") for line in lines))
+        return
+    told = [(l["wrench"], l["wrench_sd"], t["wrench"]) for l, t in zip(lines, truth) if l["wrench"]]
+    check("a wrench for each frame", len(told) == FRAMES, f"{len(told)}")
+    if told:
+        got, sd, want = (np.array(part, float) for part in zip(*told))
+        off = got - want
+        parts = off / np.hypot(sd, FLOOR)
+        worst = np.abs(parts).max(0)
+        square = (parts**2).mean(0)
+        words = " ".join(f"{name} {e:.3f}" for name, e in zip(("Fx", "Fy", "Fz", "Mx", "My", "Mz"), np.sqrt((off**2).mean(0))))
+        check("the wrench is within its stated deviations", worst.max() <= MAX_SDS, f"worst {worst.max():.1f}; rms {words}")
+        check("the stated deviations are those of the errors", square.max() <= MAX_MEAN_SQUARE, np.array2string(square, precision=2))
+
+
+def main(program, *builds):
+    for build in map(pathlib.Path, builds):
+        print(build)
+        with tempfile.TemporaryDirectory() as folder:
+            compare(program, build, pathlib.Path(folder))
+    print("tracked as the truth says" if failed == 0 else f"{failed} faults")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    sys.exit(main(*sys.argv[1:]))

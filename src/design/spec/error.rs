@@ -25,7 +25,7 @@ pub struct DesignError {
     /// What to do, where more than "change the value" can be said.
     pub help: Option<String>,
     /// A value of a field that takes this fault away, where one is known.
-    pub cure: Option<Cure>,
+    pub cure: Option<Box<Cure>>,
     /// Further faults that were found in the same run.
     pub more: Vec<DesignError>,
 }
@@ -113,7 +113,7 @@ impl DesignError {
     #[must_use]
     pub fn with_cure(mut self, cure: Cure) -> Self {
         self.help = Some(cure.to_string());
-        self.cure = Some(cure);
+        self.cure = Some(Box::new(cure));
         self
     }
 

@@ -281,8 +281,8 @@ fn averaging(design: &Design, forces: &constants::ForceReport) -> Option<String>
 /// The design as it was written, and beside it what rules gave, for programs that read it.
 fn add_design(tree: &mut Tree, design: &Design) {
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
-    let told = |one: &domecast_design::DerivedField| serde_json::json!({ "field": one.field, "value": one.value, "rule": one.rule });
-    let derived: Vec<serde_json::Value> = design.derived().iter().map(told).collect();
+    let entry = |one: &domecast_design::DerivedField| serde_json::json!({ "field": one.field, "value": one.value, "rule": one.rule });
+    let derived: Vec<serde_json::Value> = design.derived().iter().map(entry).collect();
     if !derived.is_empty() {
         tree.add(DERIVED_NAME, pretty(&derived));
     }

@@ -25,7 +25,7 @@ fn tolerances(change: serde_json::Value) -> TolerancesSection {
 }
 
 /// Each pass is registered by itself: an offset on its plate and a turn about its own axis. What they do to the distance
-/// of two neighbours of different passes is worked out here from the plates alone.
+/// of two neighbours of different passes is computed here from the plates alone.
 #[test]
 fn each_print_pass_has_its_own_registration() {
     let mut spec =

@@ -29,10 +29,10 @@ pub(super) fn faults(m: &Measures) -> Vec<PartError> {
     let Some(seat) = BoardSeat::of(m) else { return Vec::new() };
     let mut found = Vec::new();
     let Some(thread) = seat.thread else {
-        let (hole, least) = (seat.board.hole_diameter_mm, THREADS[0].clearance_mm);
-        let cure = Cure::length("camera_body.board.hole_diameter_mm", hole, least);
+        let (hole, needed) = (seat.board.hole_diameter_mm, THREADS[0].clearance_mm);
+        let cure = Cure::length("camera_body.board.hole_diameter_mm", hole, needed);
         let problem = "no screw is as thin as the board's holes; their diameter";
-        return vec![unheld(["board screws", "camera"], problem, [hole, least], cure)];
+        return vec![unheld(["board screws", "camera"], problem, [hole, needed], cure)];
     };
     found.extend(walls_beside(m, &seat));
     found.extend(roof(m, &seat, &thread));
@@ -100,17 +100,17 @@ fn walls_beside(m: &Measures, seat: &BoardSeat) -> Option<PartError> {
 /// The block goes on above the board: a roof over the recess, and material for the screws.
 fn roof(m: &Measures, seat: &BoardSeat, thread: &Thread) -> Option<PartError> {
     let above = m.lower_top_z_mm - m.pupil_mm().z - seat.face_z_mm;
-    let least = seat.recess_mm.max(MIN_THREAD_DIAMETERS * thread.nominal_mm) + m.process.min_wall_mm;
-    if above >= least * (1.0 - 1e-9) {
+    let needed = seat.recess_mm.max(MIN_THREAD_DIAMETERS * thread.nominal_mm) + m.process.min_wall_mm;
+    if above >= needed * (1.0 - 1e-9) {
         return None;
     }
     let z = m.pupil_mm().z;
-    let cure = Cure::length("camera.position_mm[2]", z, z - (least - above));
+    let cure = Cure::length("camera.position_mm[2]", z, z - (needed - above));
     let problem = format!(
         "block above the board, for what stands on its front, {} and a wall; height",
         format_args!("{} diameters of an {} screw", MIN_THREAD_DIAMETERS, thread.name)
     );
-    Some(unheld(["camera", "lower_platform"], problem, [above, least], cure))
+    Some(unheld(["camera", "lower_platform"], problem, [above, needed], cure))
 }
 
 /// What is below the board ends within the block, and the cable leaves beside it.
@@ -118,12 +118,12 @@ fn room_below(m: &Measures, seat: &BoardSeat, thread: &Thread) -> Option<PartErr
     let underside = m.platforms.lower.underside_z_mm;
     let below = m.pupil_mm().z + seat.back_z_mm - underside;
     // A cap head is as high as its screw is thick.
-    let least = seat.board.components_height_mm.max(thread.nominal_mm);
-    if below < least * (1.0 - 1e-9) {
+    let needed = seat.board.components_height_mm.max(thread.nominal_mm);
+    if below < needed * (1.0 - 1e-9) {
         let field = "platforms.lower.underside_z_mm";
-        let cure = Cure::length(field, underside, underside - (least - below));
+        let cure = Cure::length(field, underside, underside - (needed - below));
         let problem = "room below the board for its parts and the screws' heads";
-        return Some(unheld(["camera", "lower_platform"], problem, [below, least], cure));
+        return Some(unheld(["camera", "lower_platform"], problem, [below, needed], cure));
     }
     let exit = &m.platforms.lower.cable_exit;
     let height = below + seat.board.thickness_mm;
@@ -178,12 +178,12 @@ pub(super) fn bearing(m: &Measures, assembly: &Assembly) -> Vec<PartError> {
                 met as f64 >= ROUND_SHARE * f64::from(AROUND)
             })
             .count();
-        let (length, least) = (step * engaged as f64, MIN_THREAD_DIAMETERS * thread.nominal_mm);
+        let (length, needed) = (step * engaged as f64, MIN_THREAD_DIAMETERS * thread.nominal_mm);
         // One height of the search is not known.
-        if length + step < least {
+        if length + step < needed {
             let place = format!("material round the {} screw in hole {i}; length", thread.name);
             let field = "camera_body.board.holes_mm";
-            found.push(infeasible("lower_platform", place, length, least, field));
+            found.push(infeasible("lower_platform", place, length, needed, field));
         }
     }
     found

@@ -7,8 +7,8 @@ use glam::{DVec2, DVec3};
 use super::error::{Cure, infeasible};
 use super::measures::Measures;
 use super::screws::{THREADS, Thread};
-use super::{Assembly, Blueprint, Feature, PartError};
-use domecast_mesh::{Fit, Profile, RayTarget, Shape};
+use super::{Blueprint, Feature, PartError};
+use domecast_mesh::{Fit, Profile, RayTarget, Shape, TriMesh};
 
 /// A screw that cuts its thread into plastic is sunk by this many of its diameters where the platform lets it, and holds
 /// from this many on.
@@ -83,11 +83,11 @@ pub(super) fn faults(m: &Measures) -> Vec<PartError> {
     }
     let hole = m.mount.hole_diameter_mm;
     let Some(thread) = thread(m) else {
-        let least = THREADS[0].clearance_mm;
-        let cure = Cure::length("mount.hole_diameter_mm", hole, least);
+        let needed = THREADS[0].clearance_mm;
+        let cure = Cure::length("mount.hole_diameter_mm", hole, needed);
         return vec![unheld(
             "no screw is as thin as the posts' holes; their diameter".into(),
-            [hole, least],
+            [hole, needed],
             cure,
         )];
     };
@@ -97,23 +97,22 @@ pub(super) fn faults(m: &Measures) -> Vec<PartError> {
         let cure = Cure::length("mount.post_diameter_mm", post, hole + 2.0 * wall);
         found.push(unheld("wall of a post round its screw".into(), [0.5 * (post - hole), wall], cure));
     }
-    let (depth, least) = (depth_mm(m, &thread), MIN_THREAD_DIAMETERS * thread.nominal_mm);
-    if depth < least * (1.0 - 1e-9) {
+    let (depth, needed) = (depth_mm(m, &thread), MIN_THREAD_DIAMETERS * thread.nominal_mm);
+    if depth < needed * (1.0 - 1e-9) {
         let under = m.platforms.upper.underside_z_mm;
-        let cure = Cure::length("platforms.upper.underside_z_mm", under, under - (least - depth));
+        let cure = Cure::length("platforms.upper.underside_z_mm", under, under - (needed - depth));
         let problem = format!("material under the sheet that an {} screw goes into; depth", thread.name);
-        found.push(unheld(problem, [depth, least], cure));
+        found.push(unheld(problem, [depth, needed], cure));
     }
     found
 }
 
 /// What the finished upper platform lacks above the posts: a face that bears, material round the screws.
-pub(super) fn bearing(m: &Measures, assembly: &Assembly) -> Vec<PartError> {
-    let upper = assembly.items.iter().find(|item| item.name == "upper_platform");
+pub(super) fn bearing(m: &Measures, upper: Option<&TriMesh>) -> Vec<PartError> {
     let Some((thread, upper)) = thread(m).zip(upper).filter(|_| m.mount.is_rigid()) else {
         return Vec::new();
     };
-    let upper = RayTarget::new(&upper.mesh);
+    let upper = RayTarget::new(upper);
     let (under, tap) = (m.platforms.upper.underside_z_mm, 0.5 * thread.tap_mm);
     let skin = 2.0 * m.chord.tolerance_mm() + 0.01;
     let round = |at: DVec2, radius: f64| {
@@ -143,11 +142,11 @@ pub(super) fn bearing(m: &Measures, assembly: &Assembly) -> Vec<PartError> {
             met as f64 >= ROUND_SHARE * f64::from(AROUND)
         };
         let length = step * (0..HEIGHTS).filter(is_round).count() as f64;
-        let least = MIN_THREAD_DIAMETERS * thread.nominal_mm;
+        let needed = MIN_THREAD_DIAMETERS * thread.nominal_mm;
         // One height of the search is not known.
-        if length + step < least {
+        if length + step < needed {
             let place = format!("material round the {} screw of post {i}; length", thread.name);
-            found.push(infeasible("upper_platform", place, length, least, "mount.at_mm"));
+            found.push(infeasible("upper_platform", place, length, needed, "mount.at_mm"));
         }
     }
     found

@@ -50,7 +50,8 @@ pub fn check_sensor(
         rayon::join(|| check_assembly(m, parts, assembly), || trace_sight(design, m, assembly, dots));
     let mut faults = bearing::faults(m, assembly);
     faults.extend(board_seat::bearing(m, assembly));
-    faults.extend(mount::bearing(m, assembly));
+    let upper = assembly.items.iter().find(|item| item.name == "upper_platform");
+    faults.extend(mount::bearing(m, upper.map(|item| &item.mesh)));
     faults.extend(whole.err());
     let sight = sight.unwrap_or_else(|fault| {
         faults.push(fault);

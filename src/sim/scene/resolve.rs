@@ -65,7 +65,7 @@ fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimE
     check(&file)?;
     let layout = Layout::of_design(&design)?;
     if design.is_rigid() {
-        rests(&file)?;
+        check_rigid(&file)?;
     }
     let suspension = if design.is_rigid() { None } else { Some(suspension_of(&design)?) };
     let mut dots: Vec<SceneDot> = layout.dots.iter().map(|dot| scene_dot(dot, design.optics())).collect();
@@ -162,7 +162,7 @@ fn check(file: &SceneFile) -> Result<(), DesignError> {
 
 /// A scene of a rigid mount shows the sensor at rest: the platform does not move, and what objects press is not computed
 /// without springs.
-fn rests(file: &SceneFile) -> Result<(), DesignError> {
+fn check_rigid(file: &SceneFile) -> Result<(), DesignError> {
     let fault = |field: &str, problem: &str| {
         let problem = format!("rigid mount: {problem}");
         Err(DesignError::at(field, "", problem, "a scene at rest, or a design with mount.kind = \"springs\""))

@@ -29,7 +29,7 @@ fn the_shipped_board_is_held() {
     let checked = verdict(&picam(&[])).unwrap_or_else(|faults| panic!("{faults:#?}"));
     assert!(checked.sight.iter().flat_map(|pose| &pose.counts).all(|count| count.blocked == 0));
     assert!(checked.notes.is_empty(), "{:?}", checked.notes);
-    // A ribbon that has to turn is told.
+    // A ribbon that has to turn is a note.
     let turned = verdict(&picam(&[("platforms.lower.cable_exit.azimuth_deg", json!(270))]));
     let notes = turned.unwrap_or_else(|faults| panic!("{faults:#?}")).notes;
     assert!(notes.iter().any(|note| note.message.contains("turn by 180")), "{notes:?}");

@@ -15,8 +15,8 @@ fn designs() -> PathBuf {
 }
 
 fn thumb24() -> Value {
-    let text = std::fs::read_to_string(designs().join("thumb24.json")).unwrap();
-    serde_json::from_str(&text).unwrap()
+    let text = std::fs::read_to_string(designs().join("thumb24.json")).expect("the design");
+    serde_json::from_str(&text).expect("its JSON")
 }
 
 /// The check of thumb24 with some fields changed.
@@ -26,7 +26,7 @@ fn checked(changes: &[(&str, Value)]) -> Result<LightCheck, String> {
         match tree.pointer_mut(field) {
             Some(place) => *place = value.clone(),
             None => {
-                let (section, key) = field[1..].split_once('/').unwrap();
+                let (section, key) = field[1..].split_once('/').expect("a section and a key");
                 tree[section][key] = value.clone();
             }
         }

@@ -222,9 +222,10 @@ fn settings_are_chosen_where_the_file_leaves_them_open() {
     let explicit = design_from(|d| d["mesh"]["chord_tolerance_mm"] = 0.3.into()).unwrap();
     assert_eq!(explicit.settings().chord_tolerance_mm.value, 0.3);
     assert!(!explicit.settings().chord_tolerance_mm.chosen);
-    // and what neither gives is asked for by name
-    let fault = design_from(|d| drop(d.as_object_mut().unwrap().remove("accuracy"))).unwrap_err();
-    assert!(fault.to_string().contains("print.outline_tolerance_mm"), "{fault}");
+    // and what neither gives follows from the rules' accuracy, which `explain` names
+    let ruled = design_from(|d| drop(d.as_object_mut().unwrap().remove("accuracy"))).unwrap();
+    assert!(ruled.settings().outline_tolerance_mm.chosen);
+    assert!(ruled.derived().iter().any(|field| field.field == "accuracy.dot_placement_mm"));
 }
 
 /// The bounds by which settings are chosen hold for designs that nobody has seen.

@@ -104,7 +104,7 @@ mod tests {
                 looked += 1;
             }
         }
-        assert_eq!(looked, 2 * 7 + 3);
+        assert_eq!(looked, 2 * 9 + 5);
     }
 
     // A box from twelve triangles against the closed form, off its own centre.

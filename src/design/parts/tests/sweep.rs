@@ -43,7 +43,9 @@ fn sweep(count: usize) -> (usize, Vec<String>) {
                 for fault in error.faults() {
                     let field = match fault {
                         PartError::Infeasible { field, .. } | PartError::View { field, .. } => field,
-                        PartError::Unheld { cure, .. } | PartError::Blocked { cure, .. } => &cure.field,
+                        PartError::Unheld { cure, .. }
+                        | PartError::Blocked { cure, .. }
+                        | PartError::Cured { cure, .. } => &cure.field,
                         _ => panic!("design {index} is neither made nor refused by field: {fault}\n{text}"),
                     };
                     assert!(!field.is_empty());

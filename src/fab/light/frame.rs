@@ -3,7 +3,7 @@
 use glam::DVec2;
 use tiny_skia::{IntSize, Pixmap};
 
-use super::levels::{LightReport, luma};
+use super::levels::{FULL, LightReport, luma};
 use super::rest::{STEP_PX, fault};
 use crate::artwork::canvas::{color, fill};
 use domecast_design::{Design, DesignError};
@@ -43,7 +43,7 @@ pub(super) fn map(design: &Design, light: &RestLight, report: &LightReport) -> R
     // A little over half: no seams between the squares.
     let half = 0.5 * f64::from(STEP_PX) + 0.3;
     for place in &light.dome {
-        let level = 255.0 * luma(place.level) * report.level_per_mw_mm2;
+        let level = FULL * luma(place.level) * report.level_per_mw_mm2;
         let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
         let corners = corners.map(|corner| place.image_px + half * DVec2::from(corner));
         fill(&mut picture, &corners, shade(level / report.dome.median_level));

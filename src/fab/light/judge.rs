@@ -3,7 +3,7 @@
 
 use serde_json::json;
 
-use super::levels::{LightReport, MarkerLevels};
+use super::levels::{FULL, LightReport, MarkerLevels};
 use crate::numbers::{percent, typeset};
 use domecast_design::{Cure, Design, DesignError};
 use domecast_runtime::track::MIN_MARKER_RISE_LEVELS;
@@ -28,7 +28,7 @@ pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), Desig
     let (dome, leds) = (&report.dome, &design.sections().leds);
     if dome.median_level < MIN_DOME_LEVEL {
         // Light from outside does not grow with the lights.
-        let stray = 255.0 * design.sections().exposure.stray_level;
+        let stray = FULL * design.sections().exposure.stray_level;
         let factor = (MIN_DOME_LEVEL - stray) / (dome.median_level - stray).max(f64::MIN_POSITIVE);
         let cure = brighter(design, 1.1 * factor.max(1.0));
         let text = format!("{cure}, or a larger exposure.max_level_per_mw_mm2 where the camera has it");
@@ -78,7 +78,6 @@ fn brighter(design: &Design, factor: f64) -> Cure {
 /// What makes a marker stand out by what `track` needs and half of that again: surroundings as dark as that asks for;
 /// where none are dark enough, more light if the camera cannot expose longer, and else a whiter paint.
 fn seen_by(design: &Design, report: &LightReport, marker: &MarkerLevels) -> Option<Cure> {
-    const FULL: f64 = 255.0;
     let wanted = 1.5 * MIN_MARKER_RISE_LEVELS;
     let sections = design.sections();
     if marker.level >= wanted {

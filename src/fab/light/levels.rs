@@ -9,7 +9,7 @@ use domecast_design::sections::ExposureSection;
 use domecast_sim::light::RestLight;
 
 /// Full scale of 8 bits.
-const FULL: f64 = 255.0;
+pub(super) const FULL: f64 = 255.0;
 /// Weights of red, green and blue in luma (ITU-R BT.601), the grey that `track` reads.
 const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
 /// Width over which the edge of a marker goes from one level to the other in a sharp image, px: the pixel itself and the

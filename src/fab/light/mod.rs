@@ -39,6 +39,36 @@ pub struct LightCheck {
     pub warnings: Vec<(String, String)>,
 }
 
+/// The light at rest, and what it is in the frame.
+///
+/// # Errors
+/// As [`LightCheck::of`].
+fn measure(design: &Design) -> Result<(RestLight, LightReport), DesignError> {
+    let exposure = &design.sections().exposure;
+    let unit = scene(design, 1.0, 0.0)?;
+    let light = RestLight::of(&unit, pixels(design)).map_err(fault)?;
+    let light = light.filter(|light| light.dome.iter().any(|place| place.level.iter().any(|v| *v > 0.0)));
+    let Some(light) = light else {
+        return Err(DesignError::at(
+            "leds.list",
+            json!(design.sections().leds.list),
+            "no light reaches the part of the dome that the camera sees",
+            "at least one light, with a radiant flux above 0, whose way to the dome is open",
+        ));
+    };
+    let brightest = light.dome.iter().flat_map(|place| place.level).fold(0.0, f64::max);
+    let wanted = exposure.brightest_level / brightest;
+    let level_per_mw_mm2 = exposure.level_per_mw_mm2.unwrap_or(wanted).min(exposure.max_level_per_mw_mm2);
+    let report = LightReport {
+        level_per_mw_mm2,
+        is_exposure_at_limit: exposure.level_per_mw_mm2.is_none() && wanted > exposure.max_level_per_mw_mm2,
+        dome: dome_levels(&light, level_per_mw_mm2, exposure),
+        markers: marker_levels(design, &light, level_per_mw_mm2),
+    };
+    judge::require(design, &report)?;
+    Ok((light, report))
+}
+
 impl LightCheck {
     /// Looks at a design under its own lights.
     ///
@@ -46,32 +76,10 @@ impl LightCheck {
     /// No light, lights that do not fit the design, a dome too dark for `track`, or a white marker that `track` cannot
     /// tell from what is around it.
     pub fn of(design: &Design) -> Result<Self, DesignError> {
-        let exposure = &design.sections().exposure;
-        let unit = scene(design, 1.0, 0.0)?;
-        let light = RestLight::of(&unit, pixels(design)).map_err(fault)?;
-        let light = light.filter(|light| light.dome.iter().any(|place| place.level.iter().any(|v| *v > 0.0)));
-        let Some(light) = light else {
-            return Err(DesignError::at(
-                "leds.list",
-                json!(design.sections().leds.list),
-                "no light reaches the part of the dome that the camera sees",
-                "at least one light, with a radiant flux above 0, whose way to the dome is open",
-            ));
-        };
-        let brightest = light.dome.iter().flat_map(|place| place.level).fold(0.0, f64::max);
-        let wanted = exposure.brightest_level / brightest;
-        let level_per_mw_mm2 = exposure.level_per_mw_mm2.unwrap_or(wanted).min(exposure.max_level_per_mw_mm2);
-        let report = LightReport {
-            level_per_mw_mm2,
-            is_exposure_at_limit: exposure.level_per_mw_mm2.is_none()
-                && wanted > exposure.max_level_per_mw_mm2,
-            dome: dome_levels(&light, level_per_mw_mm2, exposure),
-            markers: marker_levels(design, &light, level_per_mw_mm2),
-        };
-        judge::require(design, &report)?;
+        let (light, report) = measure(design)?;
         let warnings = judge::warnings(design, &report);
         let map_png = frame::map(design, &light, &report)?;
-        let lit = scene(design, level_per_mw_mm2, exposure.stray_level)?;
+        let lit = scene(design, report.level_per_mw_mm2, design.sections().exposure.stray_level)?;
         Ok(Self { frame_png: frame::frame(&lit)?, map_png, report, warnings })
     }
 
@@ -92,5 +100,5 @@ impl LightCheck {
 /// # Errors
 /// As [`LightCheck::of`].
 pub fn marker_noise_px(design: &Design) -> Result<Vec<f64>, DesignError> {
-    Ok(LightCheck::of(design)?.report.markers.iter().map(|marker| marker.centroid_sd_px).collect())
+    Ok(measure(design)?.1.markers.iter().map(|marker| marker.centroid_sd_px).collect())
 }

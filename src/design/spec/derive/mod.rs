@@ -71,7 +71,6 @@ pub fn derive(design: &mut Value) -> Result<Vec<DerivedField>, DesignError> {
             continue;
         }
         let value = match rule.gives {
-            _ if mount::instead(design, rule.field).is_some() => mount::instead(design, rule.field),
             Gives::Fixed(json) => Some(serde_json::from_str(json).unwrap_or(Value::Null)),
             Gives::Follows(give) => {
                 let known = Known::new(design);

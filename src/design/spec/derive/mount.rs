@@ -1,6 +1,6 @@
-//! What a rigid mount and a camera's board do without: the rules serve springs and round cameras.
+//! What a rigid mount does without: the rules serve springs.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::known::lookup;
 use super::rule::DerivedField;
@@ -8,28 +8,18 @@ use super::rule::DerivedField;
 /// Sections that only springs need; a rigid mount refuses them where they are given.
 const OF_SPRINGS: [&str; 4] = ["springs", "magnets", "magnet_pockets", "white_markers"];
 
-/// Whether a text stands at a path.
-fn is(design: &Value, path: &str, word: &str) -> bool {
-    lookup(design, path).and_then(Value::as_str) == Some(word)
+/// Whether the platform stands on posts.
+pub(super) fn is_rigid(design: &Value) -> bool {
+    lookup(design, "mount.kind").is_some_and(|kind| kind == "rigid")
 }
 
 /// The sections of springs that a design with a rigid mount leaves out: rules may use their numbers (heights as if
 /// springs stood there), and [`strip`] takes them away again. Empty for springs.
 pub(super) fn to_strip(design: &Value) -> Vec<&'static str> {
-    if !is(design, "mount.kind", "rigid") {
+    if !is_rigid(design) {
         return Vec::new();
     }
     OF_SPRINGS.into_iter().filter(|section| lookup(design, section).is_none()).collect()
-}
-
-/// Values that a rule gives otherwise for a rigid mount or a board; `None` where it gives its own.
-pub(super) fn instead(design: &Value, field: &str) -> Option<Value> {
-    let without = match field {
-        "loads.claims" => is(design, "mount.kind", "rigid"),
-        "platforms.lower.clamp.azimuth_deg" => is(design, "camera_body.kind", "board"),
-        _ => false,
-    };
-    without.then(|| json!([]))
 }
 
 /// Takes the sections of springs away again.

@@ -63,6 +63,10 @@ pub(super) const RING: &[Rule] = &[
 ];
 
 fn claims(k: &Known<'_>) -> Option<Value> {
+    // A rigid mount promises no net wrench.
+    if k.value("mount.kind").is_some_and(|kind| kind == "rigid") {
+        return Some(Value::Array(Vec::new()));
+    }
     let radius = k.n("dome.radius_mm");
     let of = |share: f64| super::known::tidy(share * radius);
     // the push tilts too, which adds to what the spring at the end has to hold

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use domecast::camera::{Lens, LensModel, LensSpec};
 use domecast::numeric::Rigid;
-use domecast::optics::{FlatLayer, OpticsSpec, SensorOptics};
+use domecast::optics::{DomeShape, FlatLayer, OpticsSpec, SensorOptics};
 use glam::{DVec2, DVec3};
 
 const BROWN: [f64; 5] = [-0.2917, 0.0878, 0.0, 0.0, -0.01156];
@@ -35,7 +35,7 @@ fn optics(model: LensModel, distortion: &[f64]) -> SensorOptics {
         lens: lens_spec(model, distortion),
         sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0)),
         layers: vec![layer("acrylic", 1.491, Some(1.0)), layer("silicone", 1.41, None)],
-        dome_radius_mm: 10.0,
+        dome: DomeShape::hemisphere(10.0),
     })
     .expect("usable optics")
 }

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use domecast::camera::{Lens, LensModel, LensSpec};
 use domecast::numeric::Rigid;
-use domecast::optics::{FlatLayer, OpticsSpec, SensorOptics};
+use domecast::optics::{DomeShape, FlatLayer, OpticsSpec, SensorOptics};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -79,7 +79,7 @@ fn answer(case: Case) -> Answer {
         sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0)),
         layers: vec![layer("acrylic", 1.491, Some(1.0)), layer("silicone", 1.41, None)],
         // Large enough that every ray ends on the dome: the whole way is timed.
-        dome_radius_mm: 1000.0,
+        dome: DomeShape::hemisphere(1000.0),
     })
     .expect("usable optics");
     let pixels: Vec<DVec2> = case.pixels.into_iter().map(DVec2::from_array).collect();

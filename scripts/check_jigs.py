@@ -46,17 +46,18 @@ def seat_of(jig, sheet_size, normal):
     return np.mean(heights[facing & (np.abs(heights - seat) < 1e-3)])
 
 
-def check_jig(jig, sheet, hit, dots, name):
+def check_jig(jig, sheet, hit, dots, name, sphere):
     turn = stroke(hit["tilt_deg"], hit["azimuth_deg"])
     normal = turn @ [0, 0, 1]
     low, high = sheet.bounds
     size, thick = (high - low)[:2], high[2] - low[2]
     seat = seat_of(jig, size, normal)
-    # the sheet's underside on the seat, its middle (the dome's centre is `thick` above it) on the jig's axis
-    centre_z = (seat + thick) / normal[2]
+    # the sheet's underside on the seat, the centre of the dome's sphere on the jig's axis
+    aside = -(turn @ sphere)[:2]
+    centre_z = (seat + thick - normal[:2] @ aside) / normal[2]
     place = np.eye(4)
     place[:3, :3] = turn
-    place[2, 3] = centre_z
+    place[:3, 3] = [*aside, centre_z]
     held = sheet.copy()
     held.apply_transform(place)
     common = trimesh.boolean.intersection([jig, held], engine="manifold")
@@ -82,37 +83,39 @@ def check_jig(jig, sheet, hit, dots, name):
     check(f"{name}: the sheet lies on its seat", len(on) == 4 and np.abs(on).max() < 1e-3)
 
     surface = np.array([d["surface_mm"] for d in dots])
-    turned = surface @ turn.T
+    turned = (surface - sphere) @ turn.T
     film = np.abs(turned[:, :2] - [d["plate_mm"] for d in dots]).max()
     check(f"{name}: dots lie under their film", film < 1e-9, f"{len(dots)} dots, {film:.1e} mm")
-    starts = turned + place[:3, 3] + 1e-3 * turned / np.linalg.norm(turned, axis=1)[:, None]
+    starts = turned + turn @ sphere + place[:3, 3] + 1e-3 * turned / np.linalg.norm(turned, axis=1)[:, None]
     ways = np.tile([0, 0, 1.0], (len(dots), 1))
     free = not (jig.ray.intersects_any(starts, ways).any() or held.ray.intersects_any(starts, ways).any())
     steep = np.degrees(np.arccos(turned[:, 2] / np.linalg.norm(turned, axis=1))).max()
     check(f"{name}: the stroke reaches every dot", free, f"up to {steep:.1f} degrees from it")
     highest = max(jig.vertices[:, 2].max(), held.vertices[:, 2].max()) - centre_z
-    radius = np.linalg.norm(surface, axis=1).mean()
+    radius = np.linalg.norm(surface - sphere, axis=1).mean() + (turn @ sphere)[2]
     check(f"{name}: the pad meets the dome first", highest < radius, f"sheet and jig {radius - highest:.2f} mm lower")
 
 
 def check_build(build):
     print(build)
     layout = json.loads((build / "artwork/layout.json").read_text())
-    dots = json.loads((build / "constants/constants.json").read_text())["black_dots"]
+    constants = json.loads((build / "constants/constants.json").read_text())
+    dots, sphere = constants["black_dots"], np.array([0, 0, constants["optics"].get("dome_center_z_mm", 0.0)])
     sheet = trimesh.load_mesh(build / "parts/acrylic_sheet.stl")
     hits = layout["hits"]
     turns = np.array([stroke(h["tilt_deg"], h["azimuth_deg"])[2] for h in hits])
     # a dot belongs to the pass whose film shows it; between two that are equally near, the film decides
     by_pass = [[] for _ in hits]
     for dot in dots:
-        off = [np.abs((stroke(h["tilt_deg"], h["azimuth_deg"]) @ dot["surface_mm"])[:2] - dot["plate_mm"]).max() for h in hits]
+        at = np.array(dot["surface_mm"]) - sphere
+        off = [np.abs((stroke(h["tilt_deg"], h["azimuth_deg"]) @ at)[:2] - dot["plate_mm"]).max() for h in hits]
         by_pass[int(np.argmin(off))].append(dot)
     nearest = [(turns @ d["normal"]).max() - turns[i] @ d["normal"] for i, group in enumerate(by_pass) for d in group]
     check("each dot is in its nearest pass", max(nearest) < 1e-9)
     check("passes have the dots that they state", [len(g) for g in by_pass] == [h["dots"] for h in hits])
     for index, (hit, group) in enumerate(zip(hits, by_pass)):
         name = "print_jig" if len(hits) == 1 else f"print_jig_{index}"
-        check_jig(trimesh.load_mesh(build / f"parts/{name}.stl"), sheet, hit, group, name)
+        check_jig(trimesh.load_mesh(build / f"parts/{name}.stl"), sheet, hit, group, name, sphere)
 
 
 def main(*builds):

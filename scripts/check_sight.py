@@ -95,13 +95,26 @@ def blocked(meshes, pupil, ends):
     return names
 
 
+def dome_of(constants):
+    """Radius and centre of the sphere that the dots lie on: below the sheet's top under a cap, above it on a cylinder."""
+    optics = constants["optics"]
+    return optics["dome_radius_mm"], np.array([0, 0, optics.get("dome_center_z_mm", 0.0)])
+
+
+def base_of(constants):
+    """Radius of the circle in which the dome meets the sheet."""
+    radius, centre = dome_of(constants)
+    return np.sqrt(radius**2 - min(centre[2], 0.0) ** 2)
+
+
 def aims(constants):
     """Points whose rays must be free, by what they belong to: dots with their rims, rims of the markers."""
-    radius = constants["optics"]["dome_radius_mm"]
+    radius, centre = dome_of(constants)
     dots = []
     for dot in constants["black_dots"]:
         rim = rims(np.array(dot["surface_mm"]), np.array(dot["normal"]), dot["diameter_mm"] / 2)
-        rim *= radius / np.linalg.norm(rim, axis=1)[:, None]
+        rim -= centre
+        rim = centre + rim * (radius / np.linalg.norm(rim, axis=1)[:, None])
         dots += [np.array(dot["surface_mm"]), *rim[rim[:, 2] >= 0]]
     markers = [
         point
@@ -129,7 +142,7 @@ def sights(folder):
             detail += f"; {len(lost)} blocked from {first:.1f} degrees, most by {worst}"
         yield f"no {what[:-1]} is behind a part", not lost, detail
     # The check sees walls: rays spread by a third beyond the markers (the dome's rim without them) meet the platforms.
-    rim = list(rims(np.zeros(3), np.array([0, 0, 1.0]), constants["optics"]["dome_radius_mm"]))
+    rim = list(rims(np.zeros(3), np.array([0, 0, 1.0]), base_of(constants)))
     pupil, ends, _ = air_rays(constants, aimed["white markers"] or rim)
     wide = pupil + (ends - pupil) * np.array([1.33, 1.33, 1.0])
     yield "wider rays do meet parts", any(n is not None for n in blocked(meshes, pupil, wide)), ""

@@ -41,7 +41,7 @@ def scene_of(build):
     constants = json.loads((build / "constants/constants.json").read_text())
     light = json.loads((build / "report/light.json").read_text())
     radius = constants["optics"]["dome_radius_mm"]
-    pole = [0, 0, radius]
+    pole = [0, 0, radius + constants["optics"].get("dome_center_z_mm", 0.0)]
     press, push = 0.5 * radius, 0.04 * radius
     forces = [[0, 0, 0], [0, 0, -press], [push, 0, -press], [0, push, -press], [0, 0, 0]]
     times = np.linspace(0, (FRAMES - 1) / RATE_HZ, len(forces)).tolist()

@@ -7,7 +7,7 @@
 //! use domecast_optics::camera::{LensSpec, LensModel};
 //! use domecast_optics::glam::{DVec2, DVec3};
 //! use domecast_optics::numeric::Rigid;
-//! use domecast_optics::{FlatLayer, OpticsSpec, SensorOptics};
+//! use domecast_optics::{DomeShape, FlatLayer, OpticsSpec, SensorOptics};
 //!
 //! let optics = SensorOptics::new(&OpticsSpec {
 //!     lens: LensSpec {
@@ -24,7 +24,7 @@
 //!         FlatLayer { name: "acrylic".into(), index: [1.49; 3], thickness_mm: Some(1.0) },
 //!         FlatLayer { name: "silicone".into(), index: [1.41; 3], thickness_mm: None },
 //!     ],
-//!     dome_radius_mm: 10.0,
+//!     dome: DomeShape::hemisphere(10.0),
 //! })?;
 //! let pixel = DVec2::new(400.0, 200.0);
 //! let point = optics.trace(pixel)?.surface_mm;

@@ -339,3 +339,35 @@ fn check_frames_by_threads(name: &str, count: u32) {
     let differ: Vec<_> = one.iter().zip(&three).filter(|(a, b)| a != b).map(|(a, _)| &a.0).collect();
     assert!(differ.is_empty() && one.len() == three.len(), "{name}: {differ:?}");
 }
+
+/// The thumb with another dome, as a scene under its own lights.
+fn scene_on(dome: serde_json::Value, more: &str) -> Result<Scene, SimError> {
+    let text = include_str!("../../designs/thumb24.json");
+    let mut tree: serde_json::Value = serde_json::from_str(text).unwrap();
+    for (key, value) in dome.as_object().unwrap() {
+        tree["dome"][key] = value.clone();
+    }
+    tree["envelope"]["size_mm"] = serde_json::json!([40, 40, 40]);
+    tree["pattern"]["polar_angle_deg"] = 50.into();
+    let design = domecast_design::Design::from_str(&tree.to_string()).unwrap();
+    let file = format!(
+        r#"{{ "version": 1, "name": "t", "design": "thumb24.json", "frames": {{ "count": 1, "rate_hz": 30 }},
+        "tolerance": {{ "px": 0.02, "grey": 1 }},
+        "light": {{ "surround_level": 0.02, "leds": {{ "level_per_mw_mm2": 450 }} }} {more} }}"#
+    );
+    Scene::new(serde_json::from_str(&file).unwrap(), Path::new("."), design)
+}
+
+#[test]
+fn objects_on_a_dome_that_is_no_hemisphere_are_refused_by_name() {
+    let ball = r#", "objects": [{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 },
+        "path": [{ "time_s": 0, "position_mm": [0, 0, 19] }] }]"#;
+    let cap = serde_json::json!({ "radius_mm": 10.6, "rim_angle_deg": 70 });
+    let pillar = serde_json::json!({ "cylinder_height_mm": 2 });
+    for (dome, kind) in [(&cap, "a spherical cap"), (&pillar, "a hemisphere on a cylinder")] {
+        let error = scene_on(dome.clone(), ball).unwrap_err().to_string();
+        assert!(error.contains("scene objects: the dome is") && error.contains(kind), "{error}");
+        assert!(scene_on(dome.clone(), "").is_ok());
+    }
+    assert!(scene_on(serde_json::json!({}), ball).is_ok());
+}

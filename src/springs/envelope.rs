@@ -1,5 +1,7 @@
 //! The load envelope: how far each load can be driven, and what ends it.
 
+use std::f64::consts::FRAC_PI_4;
+
 use glam::DVec3;
 
 use super::limits::{Check, Limit, Limits, LoadCase, try_load};
@@ -7,6 +9,7 @@ use super::load::Wrench;
 use super::spec::SpringSpec;
 use super::spring::Spring;
 use super::suspension::{Suspension, SuspensionSpec};
+use domecast_optics::DomeShape;
 use domecast_optics::numeric::Rigid;
 
 /// A load that is driven up from zero.
@@ -107,9 +110,10 @@ pub fn reach(suspension: &Suspension, limits: &Limits, more: MoreChecks, directi
 }
 
 /// The directions of a load table: presses and pulls on the pole, a push at `azimuths` around it, presses off
-/// centre, tilts and twists, one newton or newton-millimetre each; `dome_radius_mm` says where they act.
-pub fn standard_directions(at_mm: DVec3, dome_radius_mm: f64, azimuths: u32) -> Vec<Direction> {
-    let pole = DVec3::new(0.0, 0.0, dome_radius_mm);
+/// centre, tilts and twists, one newton or newton-millimetre each, where they act on the dome. On a cap that ends before
+/// 45 degrees the presses off centre act on its rim, along its normal there.
+pub fn standard_directions(at_mm: DVec3, dome: &DomeShape, azimuths: u32) -> Vec<Direction> {
+    let pole = dome.pole_mm();
     let load = |name: String, force, moment, point| Direction {
         name,
         wrench: Wrench::of_load(force, moment, point, at_mm),
@@ -125,11 +129,13 @@ pub fn standard_directions(at_mm: DVec3, dome_radius_mm: f64, azimuths: u32) -> 
         let degrees = angle.to_degrees().round();
         all.push(load(format!("push at the pole, {degrees} deg"), along, DVec3::ZERO, pole));
         let normal = (along + DVec3::Z).normalize();
+        let end = dome.sphere_end_rad();
+        let normal = if end < FRAC_PI_4 { along * end.sin() + DVec3::Z * end.cos() } else { normal };
         all.push(load(
             format!("press at 45 deg, {degrees} deg"),
             -normal,
             DVec3::ZERO,
-            normal * dome_radius_mm,
+            dome.center_mm() + normal * dome.radius_mm(),
         ));
         all.push(load(format!("tilt about {degrees} deg"), DVec3::ZERO, along, pole));
     }
@@ -137,17 +143,17 @@ pub fn standard_directions(at_mm: DVec3, dome_radius_mm: f64, azimuths: u32) -> 
 }
 
 /// The border of what can be pressed and pushed at once: for each of `count` mixes of a push (along `azimuth_rad`,
-/// at the pole) and a press, how far it goes, from pure pull over pure push to pure press. Points (push N, press N).
+/// at the pole, `pole_z_mm` high) and a press, how far it goes, from pure pull over pure push to pure press. Points (push N, press N).
 pub fn push_press_border(
     suspension: &Suspension,
     limits: &Limits,
     more: MoreChecks,
-    dome_radius_mm: f64,
+    pole_z_mm: f64,
     azimuth_rad: f64,
     count: u32,
 ) -> Vec<([f64; 2], Option<Limit>)> {
     let along = DVec3::new(azimuth_rad.cos(), azimuth_rad.sin(), 0.0);
-    let pole = DVec3::new(0.0, 0.0, dome_radius_mm);
+    let pole = DVec3::new(0.0, 0.0, pole_z_mm);
     let mix = |i: u32| {
         // From pull (-90 degrees) to press (+90 degrees), the push scaled so that both ends are seen.
         let angle = std::f64::consts::PI * (f64::from(i) / f64::from(count.max(2) - 1) - 0.5);

@@ -70,7 +70,8 @@ fn the_envelope_ends_at_what_is_known() {
     let suspension = platform(4.0, false);
     let limits = Limits { grip_force_n: Some(0.8), ..Limits::default() };
     let nothing = |_: &Rigid| Vec::new();
-    let directions = standard_directions(suspension.at_mm(), 10.0, 4);
+    let directions =
+        standard_directions(suspension.at_mm(), &domecast_optics::DomeShape::hemisphere(10.0), 4);
     let press = reach(&suspension, &limits, &nothing, &directions[0]);
     // Six springs of four coils bind at 20.1 N; the wire bears 838 MPa at 17 N, so 1180 at 23.9.
     close(press.factor, 20.12, 0.02);

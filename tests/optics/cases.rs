@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use domecast::camera::{LensModel, LensSpec};
 use domecast::numeric::Rigid;
-use domecast::optics::{FlatLayer, OpticsSpec};
+use domecast::optics::{DomeShape, FlatLayer, OpticsSpec};
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
@@ -130,7 +130,7 @@ fn read(file: CaseFile) -> Case {
             lens: file.lens.spec(),
             sensor_from_camera: Rigid::from_rows_4x4(&file.sensor_from_camera).unwrap(),
             layers: file.layers.iter().map(layer).collect(),
-            dome_radius_mm: file.dome_radius_mm,
+            dome: DomeShape::hemisphere(file.dome_radius_mm),
         },
         max_field_angle_rad: file.max_field_angle_rad.parse().unwrap(),
         limit: file.limit,
@@ -215,7 +215,7 @@ impl Case {
     /// All lengths times `factor`; a power of two changes no rounding.
     pub fn scaled(mut self, factor: f64) -> Self {
         self.name = format!("{} times {factor}", self.name);
-        self.spec.dome_radius_mm *= factor;
+        self.spec.dome = self.spec.dome.scaled_to(self.spec.dome.radius_mm() * factor);
         self.spec.sensor_from_camera.translation_mm *= factor;
         for layer in &mut self.spec.layers {
             if let Some(thickness) = &mut layer.thickness_mm {

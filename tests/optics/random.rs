@@ -98,5 +98,10 @@ pub fn optics_spec(r: &mut SeededRandom, mut lens: LensSpec) -> OpticsSpec {
         let half = (0.5 * lens.field_of_view_rad).min(PI);
         lens.pupil_shift_mm = vec![0.2 * gap * r.between(-1.0, 1.0) / (half * half)];
     }
-    OpticsSpec { lens, sensor_from_camera: Rigid::new(rotation, at), layers, dome_radius_mm: radius }
+    OpticsSpec {
+        lens,
+        sensor_from_camera: Rigid::new(rotation, at),
+        layers,
+        dome: domecast::optics::DomeShape::hemisphere(radius),
+    }
 }

@@ -32,7 +32,7 @@ impl<'a> Sensor<'a> {
             sheet,
             fill: dd(last.index_for(channel)),
             bottom,
-            radius: spec.dome_radius_mm,
+            radius: spec.dome.radius_mm(),
         }
     }
 

@@ -160,7 +160,8 @@ fn loads(azimuths: u32, parts: &[f64]) -> Vec<(String, Wrench, Rigid)> {
     let suspension = suspension();
     let limits = limits_of(&SENSOR.design);
     let sight = MarkerSight::of(&SENSOR.design);
-    let alone = standard_directions(suspension.at_mm(), 10.0, azimuths);
+    let alone =
+        standard_directions(suspension.at_mm(), &domecast::optics::DomeShape::hemisphere(10.0), azimuths);
     let press = alone[0].clone();
     let mut both = alone.clone();
     both.extend(alone.iter().map(|d| {

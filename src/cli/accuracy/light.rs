@@ -19,8 +19,8 @@ const REFERENCE: usize = 96;
 const QUICK_REFERENCE: usize = 24;
 const QUICK_PLACES: [usize; 3] = [1, 2, 4];
 /// Directions at which the light is looked at.
-const LOOKED: Rings = Rings { rings: 5, patches: 9 };
-const QUICK_LOOKED: Rings = Rings { rings: 3, patches: 5 };
+const LOOKED: Rings = Rings { rings: 5, patches: 9, ..Rings::USUAL };
+const QUICK_LOOKED: Rings = Rings { rings: 3, patches: 5, ..Rings::USUAL };
 /// Bounces that the samples sum.
 const BOUNCES: [u32; 6] = [1, 2, 4, 8, 16, 32];
 
@@ -38,7 +38,7 @@ pub fn sweeps(scene: &Scene, time_limit: TimeLimit, quick: bool) -> Result<Vec<S
 
 fn emitter_places(ways: &Ways, time_limit: TimeLimit, quick: bool) -> Sweep {
     let (looked, finest) = if quick { (QUICK_LOOKED, QUICK_REFERENCE) } else { (LOOKED, REFERENCE) };
-    let places = directions(looked);
+    let places = directions(Rings { face: ways.face(), ..looked });
     let look = |count: usize| -> Vec<Vec<f64>> {
         let rule = EmitterRule::with_places(count);
         let by = |source| places.iter().map(|place| ways.still(source, *place, &rule)).collect();
@@ -95,7 +95,7 @@ fn differences<'a>(found: &'a [Vec<f64>], truth: &'a [Vec<f64>]) -> impl Iterato
 }
 
 fn bounces(scene: &Scene, ways: &Ways, time_limit: TimeLimit) -> Sweep {
-    let room = DomeRoom::new(&ways.optics[1], Rings::USUAL, Underside::Fresnel);
+    let room = DomeRoom::new(&ways.optics[1], Rings::usual(ways.face()), Underside::Fresnel);
     let albedo = setup::mean_reflectance(scene)[1];
     let rule = EmitterRule::with_places(1);
     let direct: Vec<f64> = directions(room.rings())
@@ -165,7 +165,5 @@ fn bounces(scene: &Scene, ways: &Ways, time_limit: TimeLimit) -> Sweep {
 }
 
 fn directions(rings: Rings) -> Vec<DVec3> {
-    (0..rings.rings)
-        .flat_map(|ring| (0..rings.patches).map(move |patch| rings.direction(ring, patch)))
-        .collect()
+    (0..rings.rings).flat_map(|ring| (0..rings.patches).map(move |patch| rings.place(ring, patch))).collect()
 }

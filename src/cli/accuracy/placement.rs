@@ -26,12 +26,14 @@ pub fn sweep(
     let clear = SensorOptics::new(&spec).ok()?;
     let pixels: Vec<DVec2> = layout.dots.iter().map(|dot| dot.image_px).collect();
     let trace = |optics: &SensorOptics, pixel: DVec2| optics.trace(pixel).ok().map(|hit| hit.surface_mm);
+    let dome = optics.dome();
     let mean_trace = |pixel: DVec2| {
         let mut sum = DVec3::ZERO;
         for channel in &channels {
-            sum += trace(channel, pixel)?;
+            sum += dome.outward_mm(trace(channel, pixel)?);
         }
-        Some(sum.normalize() * optics.dome_radius_mm())
+        // On the sphere, where dots lie.
+        Some(dome.center_mm() + sum.normalize() * dome.radius_mm())
     };
     let truth: Vec<Option<DVec3>> = pixels.iter().map(|&pixel| balanced(&channels, optics, pixel)).collect();
     type Place<'a> = &'a dyn Fn(DVec2) -> Option<DVec3>;
@@ -79,7 +81,7 @@ pub fn sweep(
 
 /// The place on the dome whose images in the three channels have their mean at the pixel.
 fn balanced(channels: &[SensorOptics; 3], optics: &SensorOptics, pixel: DVec2) -> Option<DVec3> {
-    let radius_mm = optics.dome_radius_mm();
+    let dome = optics.dome();
     let mut at = optics.trace(pixel).ok()?.surface_mm;
     for _ in 0..REFERENCE_STEPS {
         let (mut image, mut slope) = (DVec2::ZERO, nalgebra::Matrix2x3::zeros());
@@ -88,13 +90,14 @@ fn balanced(channels: &[SensorOptics; 3], optics: &SensorOptics, pixel: DVec2) -
             image += one / 3.0;
             slope += by_point / 3.0;
         }
-        let normal = at / radius_mm;
+        let normal = dome.normal(at);
         let (side, up) = normal.any_orthonormal_pair();
         let column = |v: DVec3| slope * nalgebra::Vector3::from(v.to_array());
         let (a, b) = (column(side), column(up));
         let off = pixel - image;
         let step = Matrix2::from_columns(&[a, b]).try_inverse()? * Vector2::new(off.x, off.y);
-        at = (at + side * step.x + up * step.y).normalize() * radius_mm;
+        let moved = dome.outward_mm(at) + side * step.x + up * step.y;
+        at = dome.center_mm() + moved.normalize() * dome.radius_mm();
     }
     at.is_finite().then_some(at)
 }

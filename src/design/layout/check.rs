@@ -1,5 +1,7 @@
 //! Whether a dot of the pattern can be seen and printed, and the dot if so.
 
+use std::f64::consts::FRAC_PI_2;
+
 use glam::{DVec2, DVec3};
 
 use super::dot::{Dot, DotProjector, plate_outline};
@@ -32,10 +34,16 @@ pub(super) fn check_dot(
     let limit_rad = spec.print.wrap_limit_deg.to_radians();
     let polar_rad = surface.normal.truncate().length().atan2(surface.normal.z);
     let keep_out = &spec.pattern.keep_out;
+    let (center_mm, end_rad) = (spec.optics.dome().center_mm(), spec.optics.dome().sphere_end_rad());
+    // A cap ends before the pad does: no dot hangs over its rim.
+    if polar_rad + own_rad > end_rad && end_rad < FRAC_PI_2 {
+        return Err(lose(Reason::KeepOut(Zone::Rim)));
+    }
     if polar_rad - own_rad < keep_out.pole_deg.to_radians() && keep_out.pole_deg > 0.0 {
         return Err(lose(Reason::KeepOut(Zone::Pole)));
     }
-    if polar_rad + own_rad > (90.0 - keep_out.rim_deg).to_radians() && keep_out.rim_deg > 0.0 {
+    if polar_rad + own_rad > (end_rad.to_degrees() - keep_out.rim_deg).to_radians() && keep_out.rim_deg > 0.0
+    {
         return Err(lose(Reason::KeepOut(Zone::Rim)));
     }
     if reach_rad > limit_rad {
@@ -44,7 +52,7 @@ pub(super) fn check_dot(
     let pass_from_sensor = passes[pass].pass_from_sensor;
     let plate_mm = projector
         .transfer
-        .plate_from_dome(pass_from_sensor * surface.surface_mm)
+        .plate_from_dome(pass_from_sensor * (surface.surface_mm - center_mm))
         .map_err(|limit| lose(Reason::BeyondTransfer(limit)))?;
     let plate_outline =
         plate_outline(&curve, projector.transfer, pass_from_sensor, projector.outline_tolerance_mm)

@@ -24,14 +24,13 @@ use super::dot::{Dot, DotProjector};
 use super::frame::EvenFrame;
 use super::lost::Reason;
 use super::plan::Layout;
-use super::region::dome_point;
 use super::spec::LayoutSpec;
 use super::window::Window;
 use super::zones::{ImageZone, check_corners, marker_zones};
-use domecast_optics::SensorOptics;
+use domecast_optics::{DomeShape, SensorOptics};
 
 /// Rings and points per ring at which the dome is sampled. Rings are at equal steps of height, so that every
-/// point stands for the same area.
+/// point stands for the same area, on a cylinder as on the sphere.
 const RINGS: u32 = 90;
 const AROUND: u32 = 72;
 
@@ -81,16 +80,16 @@ pub fn coverage(
     window: Option<&Window>,
 ) -> DomeCoverage {
     let visibility = Visibility { spec, optics, markers: marker_zones(optics, &spec.white_markers), window };
-    let radius_mm = optics.dome_radius_mm();
+    let dome = optics.dome();
     let (mut lens, mut raster, mut mask, mut free, mut whole) = (0u32, 0u32, 0u32, 0u32, true);
     let mut whole_to_rad = 0.0;
     for ring in 0..RINGS {
-        let height = 1.0 - (f64::from(ring) + 0.5) / f64::from(RINGS);
-        let polar_rad = height.acos();
+        let level = 1.0 - (1.0 - dome.rim_level()) * ((f64::from(ring) + 0.5) / f64::from(RINGS));
+        let meridian_rad = DomeShape::meridian_of_level(level);
         let before = free;
         for k in 0..AROUND {
             let azimuth_rad = TAU * f64::from(k) / f64::from(AROUND);
-            let reason = visibility.point(dome_point(radius_mm, polar_rad, azimuth_rad)).err();
+            let reason = visibility.point(dome.point_mm(meridian_rad, azimuth_rad)).err();
             lens += u32::from(!matches!(reason, Some(Reason::Unseen(_))));
             raster += u32::from(!matches!(reason, Some(Reason::Unseen(_) | Reason::OutsideImage)));
             mask += u32::from(!matches!(
@@ -101,7 +100,8 @@ pub fn coverage(
         }
         whole &= free - before == AROUND;
         if whole {
-            whole_to_rad = if ring + 1 == RINGS { FRAC_PI_2 } else { polar_rad };
+            let seen_rad = if ring + 1 == RINGS { FRAC_PI_2 } else { meridian_rad };
+            whole_to_rad = seen_rad.min(dome.sphere_end_rad());
         }
     }
     let all = f64::from(RINGS * AROUND);

@@ -100,13 +100,21 @@ pub(super) enum DotCurve<'a> {
 }
 
 impl DotCurve<'_> {
-    /// A circle on the dome around a point of it; it has no image.
+    /// A circle on a sphere about the origin, around a point of it; it has no image.
     pub(super) fn on_dome_of(radius_mm: f64, surface_mm: DVec3, diameter_mm: f64) -> Self {
         let flat = 0.5 * diameter_mm;
         let axis = surface_mm / radius_mm;
         let (side, up) = tangents(axis);
         let center = axis * ((radius_mm - flat) * (radius_mm + flat)).max(0.0).sqrt();
         Self::OnDome { optics: None, center, side: side * flat, up: up * flat }
+    }
+
+    /// Centre of the sphere that the curve lies on, mm.
+    fn sphere_mm(&self) -> DVec3 {
+        match self {
+            Self::Apparent { projector, .. } => projector.optics.dome().center_mm(),
+            Self::OnDome { optics, .. } => optics.map_or(DVec3::ZERO, |optics| optics.dome().center_mm()),
+        }
     }
 
     /// The point on the dome and its derivative, mm.
@@ -182,9 +190,12 @@ impl DotProjector<'_> {
                 DotCurve::Apparent { projector: self, center_px: even_px, radius_px: 0.5 * diameter }
             }
             DotSize::OnDome(diameter_mm) => {
-                let mut curve = DotCurve::on_dome_of(self.optics.dome_radius_mm(), surface_mm, diameter_mm);
-                if let DotCurve::OnDome { optics, .. } = &mut curve {
+                let sphere_mm = self.optics.dome().center_mm();
+                let radius_mm = self.optics.dome_radius_mm();
+                let mut curve = DotCurve::on_dome_of(radius_mm, surface_mm - sphere_mm, diameter_mm);
+                if let DotCurve::OnDome { optics, center, .. } = &mut curve {
                     *optics = Some(self.optics);
+                    *center += sphere_mm;
                 }
                 curve
             }
@@ -232,8 +243,8 @@ fn plate_point(
     angle_rad: f64,
 ) -> Result<CurvePoint, Reason> {
     let (point, slope) = curve.on_dome(angle_rad)?;
-    let plate =
-        transfer.plate_from_dome_with_slope(pass_from_sensor * point).map_err(Reason::BeyondTransfer)?;
+    let on_pass = pass_from_sensor * (point - curve.sphere_mm());
+    let plate = transfer.plate_from_dome_with_slope(on_pass).map_err(Reason::BeyondTransfer)?;
     let slope = pass_from_sensor * slope;
     let [x, y] = plate.plate_from_dome;
     Ok(CurvePoint { at: plate.plate_mm, slope: DVec2::new(x.dot(slope), y.dot(slope)) })

@@ -1,7 +1,5 @@
 //! Where a pattern has its middle and its end.
 
-use std::f64::consts::FRAC_PI_2;
-
 use glam::{DVec2, DVec3};
 
 use super::boundary::Boundary;
@@ -15,9 +13,8 @@ use domecast_optics::RayLimit;
 
 /// The pattern's middle in the even frame, px.
 pub(super) fn center(spec: &LayoutSpec, frame: &EvenFrame<'_>) -> Result<DVec2, LayoutError> {
-    let radius_mm = spec.optics.dome_radius_mm();
     let raw = match spec.pattern.centre {
-        PatternCentre::Pole => spec.optics.project(DVec3::new(0.0, 0.0, radius_mm)),
+        PatternCentre::Pole => spec.optics.project(spec.optics.dome().pole_mm()),
         PatternCentre::PrincipalPoint => Ok(spec.optics.lens().project(DVec3::Z).unwrap_or_default()),
     };
     let lost = |limit: RayLimit| {
@@ -57,7 +54,7 @@ pub(super) fn edge(
             DotSize::OnDome(mm) => ((0.5 * mm / radius_mm).asin(), 0.0),
             DotSize::Apparent(px) => (0.0, 0.5 * px),
         };
-        let polar_rad = (polar_deg.to_radians() - own_rad).clamp(0.0, FRAC_PI_2);
+        let polar_rad = (polar_deg.to_radians() - own_rad).clamp(0.0, spec.optics.dome().sphere_end_rad());
         let parallel =
             region::parallel(&spec.optics, &projector.frame, center_px, polar_rad).map_err(|limit| {
                 LayoutError::new(

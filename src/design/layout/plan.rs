@@ -18,6 +18,7 @@ use super::{gaps, zones};
 use crate::spec::Design;
 use crate::spec::sections::{OnLost, PatternKind, PrintPasses, PrintSection};
 use crate::transfer::TransferMap;
+use domecast_optics::DomeShape;
 
 /// Delaunay edges up to this multiple of the nearest distance count as neighbours: below the diagonal of a
 /// square lattice (1.414), well above its side.
@@ -42,6 +43,8 @@ pub struct Layout {
     pub center_px: DVec2,
     /// Edge of the pattern in the even frame, around its centre.
     pub edge: Boundary,
+    /// The dome's outer face.
+    pub dome: DomeShape,
     /// The pad's map, the same for each print pass.
     pub transfer: TransferMap,
     /// What a person should know, in words.
@@ -150,15 +153,29 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
         ));
     }
     warn_of_wrap(spec, &dots, &mut warnings);
-    if !lost.is_empty() {
-        warnings.push(format!(
-            "{} of {} dots of the pattern are left out",
-            lost.len(),
-            dots.len() + lost.len()
-        ));
-    }
+    warn_of_lost(dots.len(), lost.len(), &mut warnings);
     let (print, origin) = (spec.print.clone(), spec.origin.clone());
-    Ok(Layout { dots, lost, passes, pitch_px, size, center_px, edge, transfer, warnings, print, origin })
+    let dome = *spec.optics.dome();
+    Ok(Layout {
+        dots,
+        lost,
+        passes,
+        pitch_px,
+        size,
+        center_px,
+        edge,
+        dome,
+        transfer,
+        warnings,
+        print,
+        origin,
+    })
+}
+
+fn warn_of_lost(laid_out: usize, lost: usize, warnings: &mut Vec<String>) {
+    if lost > 0 {
+        warnings.push(format!("{lost} of {} dots of the pattern are left out", laid_out + lost));
+    }
 }
 
 /// The print passes that the dots of the pattern need, those that the lens does not see left out.

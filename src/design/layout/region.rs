@@ -3,11 +3,10 @@
 //! # Example
 //! ```
 //! use domecast_design::Design;
-//! use domecast_design::layout::region::dome_point;
 //!
 //! # const THUMB24: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json");
 //! let design = Design::load(THUMB24.as_ref())?;
-//! let point = dome_point(design.optics().dome_radius_mm(), 0.5, 1.0);
+//! let point = design.optics().dome().point_mm(0.5, 1.0);
 //! let pixel = design.optics().project(point)?;
 //! assert!((design.optics().trace(pixel)?.surface_mm - point).length() < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -37,14 +36,14 @@ pub struct DomeEdge {
     pub cut: Option<(f64, RayLimit)>,
 }
 
-/// The point of the dome at a polar angle and an azimuth, mm.
-pub fn dome_point(radius_mm: f64, polar_rad: f64, azimuth_rad: f64) -> DVec3 {
+/// The point of a sphere about the origin at a polar angle and an azimuth, mm.
+pub fn sphere_point(radius_mm: f64, polar_rad: f64, azimuth_rad: f64) -> DVec3 {
     let (sin, cos) = polar_rad.sin_cos();
     let out = DVec2::from_angle(azimuth_rad) * sin;
     out.extend(cos) * radius_mm
 }
 
-/// Projects the parallel at `polar_rad` into the even frame, as a boundary around `center_px`. Where the lens
+/// Projects the parallel at a meridian's angle ([`domecast_optics::DomeShape::point_mm`]) into the even frame, as a boundary around `center_px`. Where the lens
 /// does not reach the parallel, the boundary follows the end of what it sees.
 ///
 /// # Errors
@@ -55,9 +54,8 @@ pub fn parallel(
     center_px: DVec2,
     polar_rad: f64,
 ) -> Result<DomeEdge, RayLimit> {
-    let radius_mm = optics.dome_radius_mm();
     let place = |polar: f64, azimuth: f64| -> Result<DVec2, RayLimit> {
-        let pixel = optics.project(dome_point(radius_mm, polar, azimuth))?;
+        let pixel = optics.project(optics.dome().point_mm(polar, azimuth))?;
         Ok(frame.even_from_raw(pixel)? - center_px)
     };
     place(0.0, 0.0)?;

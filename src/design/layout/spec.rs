@@ -8,8 +8,8 @@ use super::frame::UndistortedFrame;
 use crate::spec::Design;
 use crate::spec::sections::{PatternSection, PrintSection, TransferMapName};
 use crate::transfer::{Correction, Nominal, TransferError, TransferMap};
-use domecast_optics::SensorOptics;
 use domecast_optics::pose::Marker;
+use domecast_optics::{DomeShape, SensorOptics};
 
 /// The circle outside which the runtime does not look, in the undistorted frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,17 +120,17 @@ impl LayoutSpec {
 
     /// The pad's map.
     pub fn transfer(&self) -> Result<TransferMap, LayoutError> {
-        transfer_map(&self.print, self.optics.dome_radius_mm()).map_err(|error| {
+        transfer_map(&self.print, self.optics.dome()).map_err(|error| {
             LayoutError::new(format!("print.{}", error.field), error.value, error.problem, error.allowed)
         })
     }
 }
 
-/// The map that a `print` section names.
+/// The map that a `print` section names, about the centre of the dome's sphere.
 ///
 /// # Errors
 /// The measured map folds, or holds a number that is not finite.
-pub fn transfer_map(print: &PrintSection, dome_radius_mm: f64) -> Result<TransferMap, TransferError> {
+pub fn transfer_map(print: &PrintSection, dome: &DomeShape) -> Result<TransferMap, TransferError> {
     let nominal = match print.transfer {
         TransferMapName::Orthographic => Nominal::Orthographic,
         TransferMapName::Equidistant => Nominal::Equidistant,
@@ -144,5 +144,5 @@ pub fn transfer_map(print: &PrintSection, dome_radius_mm: f64) -> Result<Transfe
         offset_mm: DVec2::from_array(measured.offset_mm),
         max_polar_rad: measured.max_polar_deg.to_radians(),
     });
-    TransferMap::new(dome_radius_mm, nominal, correction)
+    Ok(TransferMap::new(dome.radius_mm(), nominal, correction)?.up_to(dome.sphere_end_rad()))
 }

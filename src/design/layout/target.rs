@@ -17,7 +17,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::dot::{DotCurve, plate_outline};
 use super::outline::Outline;
-use super::region::dome_point;
+use super::region::sphere_point;
 use crate::spec::sections::PrintSection;
 use crate::transfer::TransferMap;
 
@@ -30,7 +30,7 @@ pub struct TargetMark {
     pub ring: u32,
     /// Its place on the ring, from +x.
     pub spoke: u32,
-    /// Where it should land on the dome, frame of the print pass, mm.
+    /// Where it should land on the dome, frame of the print pass about the sphere's centre, mm.
     pub surface_mm: DVec3,
     /// Where it stands on the plate by the design's map, mm.
     pub plate_mm: DVec2,
@@ -80,7 +80,7 @@ fn rings_of(
         let around = (6 * ring).max(1);
         for spoke in 0..around {
             let azimuth_rad = std::f64::consts::TAU * f64::from(spoke) / f64::from(around);
-            let surface_mm = dome_point(radius_mm, polar_rad, azimuth_rad);
+            let surface_mm = sphere_point(radius_mm, polar_rad, azimuth_rad);
             let diameter_mm = if spoke == 0 && ring > 0 { BOLD * diameter_mm } else { diameter_mm };
             let curve = DotCurve::on_dome_of(radius_mm, surface_mm, diameter_mm);
             let placed = transfer.plate_from_dome(surface_mm);

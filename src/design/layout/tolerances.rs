@@ -196,9 +196,10 @@ fn sensor(
     let shift = DVec3::from_array(tolerances.pupil_mm.map(|sd| sd * random.normal())) * counts(0);
     let [a, b, c] = tolerances.camera_rotation_deg.map(|sd| sd.to_radians() * random.normal() * counts(1));
     let turn = DMat3::from_rotation_z(c) * DMat3::from_rotation_y(b) * DMat3::from_rotation_x(a);
-    let nominal_radius_mm = made.dome_radius_mm;
-    made.dome_radius_mm = (nominal_radius_mm + tolerances.dome_radius_mm * random.normal() * counts(2))
+    let nominal_radius_mm = made.dome.radius_mm();
+    let radius_mm = (nominal_radius_mm + tolerances.dome_radius_mm * random.normal() * counts(2))
         .max(0.5 * nominal_radius_mm);
+    made.dome = made.dome.scaled_to(radius_mm);
     let mut sheet_mm = 0.0;
     for layer in &mut made.layers {
         let thicker = tolerances.layer_thickness_mm * random.normal() * counts(3);
@@ -225,7 +226,8 @@ fn sensor(
             (shift_mm, DVec2::from_angle(turn))
         })
         .collect();
-    let larger = made.dome_radius_mm / nominal_radius_mm;
+    let larger = radius_mm / nominal_radius_mm;
+    let center_mm = spec.optics.dome().center_mm();
     let seen: Option<Vec<Option<DVec2>>> = layout
         .dots
         .iter()
@@ -238,7 +240,8 @@ fn sensor(
             let scatter_mm = random.normal_pair() * tolerances.print_scatter_mm * counts(7);
             let plate_mm = turn.rotate(dot.plate_mm) + shift_mm + scatter_mm;
             let on_pass = layout.transfer.dome_from_plate(plate_mm).ok()?;
-            let surface = layout.passes.get(dot.pass)?.pass_from_sensor.transpose() * on_pass * larger;
+            let surface = layout.passes.get(dot.pass)?.pass_from_sensor.transpose() * on_pass;
+            let surface = (surface + center_mm) * larger;
             Some(Some(optics.project(surface).ok()?))
         })
         .collect();

@@ -20,7 +20,6 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-use super::region::dome_point;
 use crate::spec::Design;
 use domecast_optics::SensorOptics;
 use domecast_optics::camera::Lens;
@@ -73,7 +72,7 @@ impl Window {
             .flat_map(|optics| {
                 (0..DIRECTIONS).filter_map(move |k| {
                     let azimuth_rad = TAU * f64::from(k) / f64::from(DIRECTIONS);
-                    let point = dome_point(optics.dome_radius_mm(), TAU / 4.0, azimuth_rad);
+                    let point = optics.dome().point_mm(optics.dome().meridian_end_rad(), azimuth_rad);
                     ViewRay::of_pixel(optics, optics.project(point).ok()?)
                 })
             })

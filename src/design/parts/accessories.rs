@@ -152,12 +152,17 @@ impl JigBlock {
         Self { recess, rim, block: recess + DVec2::splat(rim), grip, seat, top: seat + grip }
     }
 
-    /// The highest corner of sheet and block along a stroke, from the dome's centre, mm.
+    /// The highest corner of sheet and block along a stroke, from the middle of the dome's base, mm.
     fn height_mm(&self, m: &Measures, pass: &PrintPass) -> f64 {
         let up = pass.pass_from_sensor.transpose().z_axis;
         let corner = |half: DVec2, z: f64| up.truncate().abs().dot(half) + up.z * z;
         corner(0.5 * m.sheet_size_mm, 0.0).max(corner(self.block, self.top))
     }
+}
+
+/// The dome's top along a stroke, from the middle of its base, mm.
+fn top_mm(m: &Measures, pass: &PrintPass) -> f64 {
+    m.dome.radius_mm() + pass.pass_from_sensor.z_axis.z * m.dome.center_z_mm()
 }
 
 /// The print passes whose pad would meet sheet or jig before the dome: tilted so far that a corner of them stands higher
@@ -166,14 +171,15 @@ pub fn stroke_notes(m: &Measures, passes: &[PrintPass]) -> Vec<DesignWarning> {
     const STEP_DEG: f64 = 0.5;
     let block = JigBlock::of(m);
     let note = |pass: &PrintPass| {
-        let over_mm = block.height_mm(m, pass) - m.dome_radius_mm;
+        let over_mm = block.height_mm(m, pass) - top_mm(m, pass);
         if over_mm <= 0.0 {
             return None;
         }
         let (tilt_deg, azimuth_deg) = (pass.tilt_rad.to_degrees(), pass.azimuth_rad.to_degrees());
         let lower = (1..).map(|step| tilt_deg - STEP_DEG * f64::from(step)).take_while(|deg| *deg > 0.0);
         let clear = lower.into_iter().find(|deg| {
-            block.height_mm(m, &PrintPass::new(deg.to_radians(), pass.azimuth_rad)) <= m.dome_radius_mm
+            let lower = PrintPass::new(deg.to_radians(), pass.azimuth_rad);
+            block.height_mm(m, &lower) <= top_mm(m, &lower)
         });
         let cure =
             clear.map_or_else(String::new, |deg| format!("; up to {deg:.1} degrees they stay below it"));
@@ -190,7 +196,7 @@ pub fn stroke_notes(m: &Measures, passes: &[PrintPass]) -> Vec<DesignWarning> {
 /// below, tilted so that the pass's direction points up into the pad's stroke.
 ///
 /// Frame: top of the base plate z = 0, register pins on the x axis, the pass's
-/// direction through the dome's centre is the z axis.
+/// direction through the centre of the dome's sphere is the z axis.
 pub(super) fn jig(m: &Measures, name: &str, pass: &PrintPass) -> Result<Blueprint, PartError> {
     let j = &m.jig;
     let mut b =
@@ -204,7 +210,9 @@ pub(super) fn jig(m: &Measures, name: &str, pass: &PrintPass) -> Result<Blueprin
         .into_iter()
         .fold(f64::INFINITY, f64::min);
     let height = j.seat_height_mm - lowest;
-    let jig_from_sensor = DAffine3 { matrix3: turn, translation: DVec3::Z * height };
+    // The stroke goes through the centre of the dome's sphere.
+    let aside = (turn * m.dome.center_mm()).with_z(0.0);
+    let jig_from_sensor = DAffine3 { matrix3: turn, translation: DVec3::Z * height - aside };
     let base = 0.5 * DVec2::from_array(j.base_mm);
     let plate = Shape::cuboid((-base).extend(-j.base_thickness_mm), base.extend(0.0));
     b.added.push(Feature::new("base", "jig.base_mm", plate));

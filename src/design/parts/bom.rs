@@ -99,9 +99,9 @@ fn made(design: &Design, m: &Measures, parts: &[Part], table: &mut Table) {
         "parts/acrylic_sheet.dxf",
         "sheet",
     ]);
-    let volume_ml = 2.0 / 3.0 * std::f64::consts::PI * m.dome_radius_mm.powi(3) * 1e-3;
+    let volume_ml = m.dome.volume_mm3() * 1e-3;
     let elastomer = &sections.elastomer.material;
-    let dome = format!("radius {}", m.dome_radius_mm);
+    let dome = dome_size(m);
     let amount = format!("{volume_ml:.1}");
     table.row([
         "dome",
@@ -260,5 +260,17 @@ fn quoted(cell: &str) -> String {
         format!("\"{}\"", cell.replace('"', "\"\""))
     } else {
         cell.to_owned()
+    }
+}
+
+/// The dome's size in words.
+fn dome_size(m: &Measures) -> String {
+    let sphere = format!("radius {}", m.dome.radius_mm());
+    match m.dome.center_z_mm() {
+        z if z < 0.0 => {
+            format!("{sphere}, cap {:.3} high, {:.3} wide", m.dome.height_mm(), 2.0 * m.dome.rim_radius_mm())
+        }
+        z if z > 0.0 => format!("{sphere}, on a cylinder {z} high"),
+        _ => sphere,
     }
 }

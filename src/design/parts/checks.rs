@@ -285,7 +285,7 @@ impl Scene {
             field: "camera.position_mm".into(),
         })?;
         let discs = m.markers_mm.iter().map(|&at| ("a white marker", at, m.marker_radius_mm));
-        for (what, center, radius) in discs.chain([("the dome's rim", DVec2::ZERO, m.dome_radius_mm)]) {
+        for (what, center, radius) in discs.chain([("the dome's rim", DVec2::ZERO, m.dome.rim_radius_mm())]) {
             for line in sight_lines(&moved, center, radius) {
                 let under = line.pupil_mm.lerp(line.sheet_mm, 1.0 - 1e-6);
                 if let Some((fraction, _)) = self.upper.first_hit(line.pupil_mm, under) {

@@ -25,7 +25,7 @@ const BAR_MM: f64 = 10.0;
 fn drawing(m: &Measures) -> Drawing {
     let half_kerf = 0.5 * m.sheet.kerf_mm;
     let half_mm = 0.5 * m.sheet_size_mm + DVec2::splat(half_kerf);
-    let mut circles = vec![(DVec2::ZERO, m.dome_radius_mm)];
+    let mut circles = vec![(DVec2::ZERO, m.dome.rim_radius_mm())];
     circles.extend(m.markers_mm.iter().map(|&at| (at, m.marker_radius_mm)));
     Drawing {
         half_mm,

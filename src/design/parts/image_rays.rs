@@ -103,7 +103,7 @@ pub(super) fn rays(design: &Design, m: &Measures, pose: &Rigid, dots: &[Dot]) ->
         for k in 0..DOT_RIM {
             let way = DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(DOT_RIM));
             let rim = dot.surface_mm + 0.5 * dot.diameter_mm * (across.0 * way.x + across.1 * way.y);
-            let rim = rim * (m.dome_radius_mm / rim.length());
+            let rim = m.dome.onto(rim);
             if rim.z >= 0.0 {
                 push(RayKind::Dot, at(rim));
             }
@@ -115,7 +115,7 @@ pub(super) fn rays(design: &Design, m: &Measures, pose: &Rigid, dots: &[Dot]) ->
         rays.without[RayKind::Marker as usize] += all - lines.len().min(all);
         rays.list.extend(lines.into_iter().map(|line| ImageRay { kind: RayKind::Marker, line }));
     }
-    let rim = sight_lines(&optics, DVec2::ZERO, m.dome_radius_mm);
+    let rim = sight_lines(&optics, DVec2::ZERO, m.dome.rim_radius_mm());
     rays.without[RayKind::DomeRim as usize] += all - rim.len().min(all);
     rays.list.extend(rim.into_iter().map(|line| ImageRay { kind: RayKind::DomeRim, line }));
     mask_rays(design, &optics, &mut rays);

@@ -11,7 +11,7 @@ use crate::spec::sections::{
     MouldSection, MountSection, PlatformsSection, ProcessSection, SheetSection, StencilSection,
 };
 use domecast_mesh::{Chord, Fit, Shape};
-use domecast_optics::SensorOptics;
+use domecast_optics::{DomeShape, SensorOptics};
 
 /// Dimensions of a design as the parts need them. Heights are in the sensor
 /// frame at rest.
@@ -43,8 +43,8 @@ pub struct Measures {
     pub sheet_size_mm: DVec2,
     /// Thickness of all flat layers but the dome, mm.
     pub sheet_thickness_mm: f64,
-    /// Radius of the elastomer, mm.
-    pub dome_radius_mm: f64,
+    /// The elastomer's outer face.
+    pub dome: DomeShape,
     /// Top of the lower platform, mm.
     pub lower_top_z_mm: f64,
     /// Where the springs stand.
@@ -119,7 +119,7 @@ fn lower_view(design: &Design, poses: &[Pose], markers_mm: &[DVec2]) -> Result<O
     }
     let view = ViewCone::below(
         design.optics(),
-        sections.dome.radius_mm,
+        sections.dome.shape().rim_radius_mm(),
         (markers_mm, 0.5 * sections.white_markers.diameter_mm),
         &poses.iter().map(|pose| pose.rest_from_platform).collect::<Vec<_>>(),
         (low, top),
@@ -150,7 +150,7 @@ impl Measures {
         let markers_mm: Vec<DVec2> = design.white_markers_mm().iter().map(|p| p.truncate()).collect();
         let view = ViewCone::over(
             design.optics(),
-            sections.dome.radius_mm,
+            sections.dome.shape().rim_radius_mm(),
             (&markers_mm, 0.5 * sections.white_markers.diameter_mm),
             &poses.iter().map(|pose| pose.rest_from_platform).collect::<Vec<_>>(),
             (sections.platforms.upper.underside_z_mm, design.sheet_underside_z_mm()),
@@ -171,7 +171,7 @@ impl Measures {
             outer_mm: DVec2::from_array(sections.platforms.outer_mm),
             sheet_size_mm: DVec2::from_array(sections.sheet.size_mm),
             sheet_thickness_mm: design.sheet_thickness_mm(),
-            dome_radius_mm: sections.dome.radius_mm,
+            dome: sections.dome.shape(),
             lower_top_z_mm: design.lower_top_z_mm(),
             spring_axes_mm: design.springs_at_mm(),
             sensor_from_camera: DAffine3 { matrix3: camera.rotation, translation: camera.translation_mm },
@@ -220,14 +220,35 @@ impl Measures {
     /// Radius of the mould's cavity as printed: the silicone that shrinks to
     /// the dome, and the sealer round it.
     pub fn cavity_radius_mm(&self) -> f64 {
-        self.dome_radius_mm / (1.0 - self.shrinkage) + self.mould.sealer_thickness_mm
+        self.dome.radius_mm() / (1.0 - self.shrinkage) + self.mould.sealer_thickness_mm
+    }
+
+    /// Height of the cavity's centre above the dome's flat face while it is cast, mm: the cast is larger than the dome
+    /// by what it shrinks.
+    pub fn cast_center_z_mm(&self) -> f64 {
+        self.dome.center_z_mm() / (1.0 - self.shrinkage)
+    }
+
+    /// Radius of the mould's cavity in the parting plane, one sealer's thickness beyond the cast's flat face, mm.
+    pub fn mouth_radius_mm(&self) -> f64 {
+        let (radius, beyond) =
+            (self.cavity_radius_mm(), self.cast_center_z_mm() + self.mould.sealer_thickness_mm);
+        if beyond < 0.0 { ((radius - beyond) * (radius + beyond)).max(0.0).sqrt() } else { radius }
+    }
+
+    /// Radius of the cast's rim in the sealed cavity, mm.
+    pub fn cast_rim_mm(&self) -> f64 {
+        if self.dome.center_z_mm() < 0.0 {
+            self.dome.rim_radius_mm() / (1.0 - self.shrinkage)
+        } else {
+            self.cavity_radius_mm() - self.mould.sealer_thickness_mm
+        }
     }
 
     /// Axes of the mould's vents: just inside the rim of the sealed cavity.
     pub fn vent_axes_mm(&self) -> Vec<DVec2> {
         let vents = &self.mould.vents;
-        let rim = self.cavity_radius_mm() - self.mould.sealer_thickness_mm;
-        let radius = rim - vents.inset_mm - 0.5 * vents.diameter_mm;
+        let radius = self.cast_rim_mm() - vents.inset_mm - 0.5 * vents.diameter_mm;
         (0..vents.count)
             .map(|i| polar(radius, vents.first_azimuth_deg + 360.0 * f64::from(i) / f64::from(vents.count)))
             .collect()

@@ -13,32 +13,33 @@ use domecast_mesh::{Fit, Profile, ProfileEdge, Shape};
 
 /// Half the side of the square mould.
 pub(super) fn half_side_mm(m: &Measures) -> f64 {
-    m.cavity_radius_mm() + m.mould.wall_mm
+    m.mouth_radius_mm() + m.mould.wall_mm
 }
 
 /// Floor of the cavity block.
 pub(super) fn bottom_z_mm(m: &Measures) -> f64 {
-    -(m.mould.sealer_thickness_mm + m.cavity_radius_mm() + m.mould.floor_mm)
+    -(m.mould.sealer_thickness_mm + m.cast_center_z_mm() + m.cavity_radius_mm() + m.mould.floor_mm)
 }
 
 /// The cavity as a solid, from its pole up to `top_mm` above the parting plane.
 ///
 /// The sealer also lies on the base plate, so the silicone's flat face is one
-/// sealer's thickness below the parting plane: the sphere's centre is there,
-/// and a short cylinder leads up from it.
+/// sealer's thickness below the parting plane. The sphere's centre is there,
+/// and a short cylinder leads up from it; that of a dome on a cylinder lies
+/// deeper, that of a cap higher, whose cavity opens like the sphere.
 pub(super) fn cavity_shape(m: &Measures, top_mm: f64) -> Shape {
     let (radius, sealer) = (m.cavity_radius_mm(), m.mould.sealer_thickness_mm);
-    Shape::Turned {
-        profile: Profile {
-            points_mm: vec![
-                DVec2::new(0.0, -sealer - radius),
-                DVec2::new(radius, -sealer),
-                DVec2::new(radius, top_mm),
-            ],
-            edges: vec![ProfileEdge::Arc { center_z_mm: -sealer }, ProfileEdge::Line],
-        },
-        fit: Fit::Area,
+    let center = -sealer - m.cast_center_z_mm();
+    let mut points_mm = vec![DVec2::new(0.0, center - radius)];
+    let mut edges = vec![ProfileEdge::Arc { center_z_mm: center }];
+    if center < top_mm {
+        points_mm.extend([DVec2::new(radius, center), DVec2::new(radius, top_mm)]);
+        edges.push(ProfileEdge::Line);
+    } else {
+        let above = center - top_mm;
+        points_mm.push(DVec2::new(((radius - above) * (radius + above)).max(0.0).sqrt(), top_mm));
     }
+    Shape::Turned { profile: Profile { points_mm, edges }, fit: Fit::Area }
 }
 
 pub(super) fn cavity(m: &Measures) -> Result<Blueprint, PartError> {

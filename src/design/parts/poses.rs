@@ -70,8 +70,8 @@ pub(super) fn poses(design: &Design) -> Result<Vec<Pose>, PartError> {
     }
     let (limits, sight) = (limits_of(design), MarkerView::of(design));
     let more = |pose: &Rigid| sight.checks(pose, |_, _| {});
-    let radius_mm = design.sections().dome.radius_mm;
-    let corners: Vec<Pose> = standard_directions(suspension.at_mm(), radius_mm, AZIMUTHS)
+    let dome = design.sections().dome.shape();
+    let corners: Vec<Pose> = standard_directions(suspension.at_mm(), &dome, AZIMUTHS)
         .into_par_iter()
         .filter_map(|direction| {
             let reached = reach(&suspension, &limits, &more, &direction);

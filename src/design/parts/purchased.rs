@@ -8,6 +8,7 @@ use super::board::BoardSeat;
 use super::measures::Measures;
 use super::screws::Thread;
 use domecast_mesh::{Chord, Construction, Fit, MeshError, Piece, Profile, ProfileEdge, Shape, TriMesh};
+use domecast_optics::DomeShape;
 use domecast_optics::numeric::Rigid;
 
 /// The camera, about its axis, in the sensor frame at rest.
@@ -62,23 +63,24 @@ pub(super) fn screw_heads(m: &Measures) -> Vec<Piece> {
 
 /// The elastomer dome, in the sensor frame.
 pub(super) fn dome(m: &Measures) -> Piece {
-    hemisphere("dome", m.dome_radius_mm)
+    turned("dome", &m.dome)
 }
 
 /// The dome with its membrane, in the sensor frame: its outer face.
 pub(super) fn membrane(m: &Measures) -> Piece {
-    hemisphere("membrane", m.dome_radius_mm + m.membrane_mm)
+    turned("membrane", &m.dome.with_radius_mm(m.dome.radius_mm() + m.membrane_mm))
 }
 
-fn hemisphere(name: &str, radius_mm: f64) -> Piece {
-    let shape = Shape::Turned {
-        profile: Profile {
-            points_mm: vec![DVec2::new(radius_mm, 0.0), DVec2::new(0.0, radius_mm)],
-            edges: vec![ProfileEdge::Arc { center_z_mm: 0.0 }],
-        },
-        fit: Fit::Inside,
-    };
-    Piece::new(name, shape)
+fn turned(name: &str, dome: &DomeShape) -> Piece {
+    let mut points_mm = vec![DVec2::new(dome.rim_radius_mm(), 0.0)];
+    let mut edges = Vec::new();
+    if dome.center_z_mm() > 0.0 {
+        points_mm.push(DVec2::new(dome.radius_mm(), dome.center_z_mm()));
+        edges.push(ProfileEdge::Line);
+    }
+    points_mm.push(DVec2::new(0.0, dome.height_mm()));
+    edges.push(ProfileEdge::Arc { center_z_mm: dome.center_z_mm() });
+    Piece::new(name, Shape::Turned { profile: Profile { points_mm, edges }, fit: Fit::Inside })
 }
 
 /// Both magnets of spring `i`: the upper one in the sensor frame, the lower in

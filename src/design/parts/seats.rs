@@ -361,7 +361,7 @@ fn mould_pins(m: &Measures, found: &mut Vec<PartError>) {
     let pins = &m.mould.pins;
     let wide = 0.5 * pins.diameter_mm + pins.clearance_mm;
     let room = mould::half_side_mm(m) - wide - m.process.min_wall_mm;
-    let near = m.cavity_radius_mm() + wide + m.process.min_wall_mm;
+    let near = m.mouth_radius_mm() + wide + m.process.min_wall_mm;
     for (i, at) in pins.at_mm.iter().enumerate() {
         let at = DVec2::from_array(*at);
         let wall = (room - at.abs().max_element()).min(at.length() - near) + m.process.min_wall_mm;

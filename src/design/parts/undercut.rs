@@ -71,7 +71,7 @@ pub(super) fn check(m: &Measures, parts: &[Part]) -> Result<(), PartError> {
             return Err(infeasible(name, place, gap_mm, 0.0, field));
         }
     }
-    let rim = m.cavity_radius_mm() - m.mould.sealer_thickness_mm;
+    let rim = m.cast_rim_mm();
     let fill = &m.mould.fill;
     let reach = fill.radius_mm + 0.5 * fill.diameter_mm;
     if reach > rim {

@@ -84,7 +84,7 @@ impl Lines {
     /// In the frame of the platform; none may be empty of the dome's rim.
     fn over(
         optics: &SensorOptics,
-        dome_radius_mm: f64,
+        rim_radius_mm: f64,
         (markers_mm, marker_radius_mm): (&[DVec2], f64),
         poses: &[Rigid],
     ) -> Result<Self, PartError> {
@@ -94,7 +94,7 @@ impl Lines {
                 problem: format!("at one of the springs' positions {error}"),
                 field: "camera.position_mm".into(),
             })?;
-            all.rim.extend(sight_lines(&moved, DVec2::ZERO, dome_radius_mm));
+            all.rim.extend(sight_lines(&moved, DVec2::ZERO, rim_radius_mm));
             for (lines, &center) in all.markers.iter_mut().zip(markers_mm) {
                 lines.extend(sight_lines(&moved, center, marker_radius_mm));
             }
@@ -131,7 +131,7 @@ impl ViewCone {
     /// Follows the rays from the rim of the dome's base and of the markers,
     /// through the sheet, down to the pupil.
     ///
-    /// * `dome_radius_mm`, `markers_mm`, `marker_radius_mm`: what must be seen,
+    /// * `rim_radius_mm`, `markers_mm`, `marker_radius_mm`: what must be seen,
     ///   on the sheet's top face;
     /// * `poses`: `rest_from_platform` for every position of the springs that
     ///   counts;
@@ -144,13 +144,13 @@ impl ViewCone {
     /// seen at any.
     pub fn over(
         optics: &SensorOptics,
-        dome_radius_mm: f64,
+        rim_radius_mm: f64,
         (markers_mm, marker_radius_mm): (&[DVec2], f64),
         poses: &[Rigid],
         (low_z_mm, high_z_mm): (f64, f64),
         margin_mm: f64,
     ) -> Result<Self, PartError> {
-        let lines = Lines::over(optics, dome_radius_mm, (markers_mm, marker_radius_mm), poses)?;
+        let lines = Lines::over(optics, rim_radius_mm, (markers_mm, marker_radius_mm), poses)?;
         Ok(Self::of_lines(&lines, (low_z_mm, high_z_mm), margin_mm))
     }
 
@@ -161,7 +161,7 @@ impl ViewCone {
     /// As [`ViewCone::over`].
     pub(super) fn below(
         optics: &SensorOptics,
-        dome_radius_mm: f64,
+        rim_radius_mm: f64,
         (markers_mm, marker_radius_mm): (&[DVec2], f64),
         poses: &[Rigid],
         (low_z_mm, high_z_mm): (f64, f64),
@@ -172,7 +172,7 @@ impl ViewCone {
         for pose in poses {
             let seen = Lines::over(
                 optics,
-                dome_radius_mm,
+                rim_radius_mm,
                 (markers_mm, marker_radius_mm),
                 std::slice::from_ref(pose),
             )?;

@@ -133,7 +133,7 @@ impl Design {
     pub fn bounds_mm(&self) -> [DVec3; 2] {
         let sections = &self.sections;
         let half = DVec2::from_array(sections.platforms.outer_mm) / 2.0;
-        let top_mm = sections.dome.radius_mm + sections.elastomer.membrane_thickness_mm;
+        let top_mm = sections.dome.shape().height_mm() + sections.elastomer.membrane_thickness_mm;
         let bottom_mm = sections.platforms.lower.underside_z_mm.min(self.camera_back_z_mm());
         [DVec3::new(-half.x, -half.y, bottom_mm), DVec3::new(half.x, half.y, top_mm)]
     }

@@ -35,7 +35,7 @@ pub(super) fn lints(file: &DesignFile, optics: Option<&SensorOptics>) -> Vec<Des
 
 /// Metres or micrometres among millimetres: lengths that go together, of sizes that do not.
 fn units(file: &DesignFile) -> Vec<DesignWarning> {
-    let dome = file.dome.radius_mm;
+    let dome = file.dome.shape().rim_radius_mm();
     let head = 0.5 * file.platforms.outer_mm[0].min(file.platforms.outer_mm[1]);
     let sheet: f64 = file.optics.layers.iter().filter_map(|layer| layer.thickness_mm).sum();
     let depth = file.camera.position_mm[2].abs();

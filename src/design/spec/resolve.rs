@@ -22,6 +22,7 @@ pub(super) fn optics(
 ) -> Result<SensorOptics, DesignError> {
     rules::layers(&optics.layers)?;
     rules::camera_below_sheet(camera, optics)?;
+    rules::dome_shape(dome)?;
     let layers = optics.layers.iter().map(|layer| FlatLayer {
         name: layer.name.clone(),
         index: layer.index.rgb(),
@@ -31,7 +32,7 @@ pub(super) fn optics(
         lens: lens_spec(camera),
         sensor_from_camera: sensor_from_camera(camera),
         layers: layers.collect(),
-        dome_radius_mm: dome.radius_mm,
+        dome: dome.shape(),
     };
     SensorOptics::new(&spec).map_err(|fault| {
         // the optics name their own inputs; the message names the fields of the file
@@ -40,7 +41,7 @@ pub(super) fn optics(
                 format!("camera.{}", rest.replace("field_of_view_rad", "field_of_view_deg"))
             }
             _ if fault.field.starts_with("layers") => format!("optics.{}", fault.field),
-            _ if fault.field == "dome_radius_mm" => "dome.radius_mm".to_owned(),
+            _ if fault.field.starts_with("dome_") => "dome.radius_mm".to_owned(),
             _ => "camera.position_mm".to_owned(),
         };
         DesignError::at(field, fault.value, "the optics cannot be", fault.allowed)

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::design::Design;
 use super::error::DesignError;
-use super::sections::{CameraSection, LayerSection, OpticsSection, SpringEnds};
+use super::sections::{CameraSection, DomeSection, LayerSection, OpticsSection, SpringEnds};
 
 /// Sums of written decimals (10.1 + 15.9) may miss the written limit by rounding; a nanometre is far
 /// below anything that can be made.
@@ -14,7 +14,7 @@ const ROUNDING_MM: f64 = 1e-6;
 /// Checks all of them; the error carries every one that does not hold.
 pub(super) fn check(design: &Design) -> Result<(), DesignError> {
     let mut faults = Vec::new();
-    for rule in [sizes, dome_on_platform, envelope, pattern, springs, white_markers] {
+    for rule in [sizes, dome_on_platform, envelope, pattern, pattern_on_dome, springs, white_markers] {
         rule(design, &mut faults);
     }
     DesignError::all(faults)
@@ -105,19 +105,57 @@ fn dome_on_platform(design: &Design, faults: &mut Vec<DesignError>) {
     let smallest_mm = DVec2::from_array(sections.platforms.outer_mm)
         .min_element()
         .min(DVec2::from_array(sections.sheet.size_mm).min_element());
-    let radius_mm = sections.dome.radius_mm;
+    let dome = sections.dome.shape();
+    let radius_mm = dome.rim_radius_mm();
     if 2.0 * radius_mm > smallest_mm {
         faults.push(
             DesignError::at(
                 "dome.radius_mm",
-                radius_mm,
+                dome.radius_mm(),
                 format!("the dome is {} mm wide, wider than the platform or its sheet", 2.0 * radius_mm),
                 format!(
                     "at most {} (half of the smallest of platforms.outer_mm and sheet.size_mm)",
-                    smallest_mm / 2.0
+                    smallest_mm / 2.0 * (dome.radius_mm() / radius_mm)
                 ),
             )
             .with_help("radius for diameter?"),
+        );
+    }
+}
+
+/// A cylinder stands under a whole hemisphere only.
+pub(super) fn dome_shape(dome: &DomeSection) -> Result<(), DesignError> {
+    let (rim_deg, height_mm) = (dome.rim_angle_deg.unwrap_or(90.0), dome.cylinder_height_mm.unwrap_or(0.0));
+    if height_mm > 0.0 && rim_deg < 90.0 {
+        return Err(DesignError::at(
+            "dome.cylinder_height_mm",
+            height_mm,
+            format!(
+                "the dome is a cap, dome.rim_angle_deg is {rim_deg}: a cylinder under it would leave a step"
+            ),
+            "0 under a cap, or a rim angle of 90 degrees",
+        )
+        .cured_by("dome.cylinder_height_mm", 0.0));
+    }
+    Ok(())
+}
+
+/// The pattern ends on the sphere.
+fn pattern_on_dome(design: &Design, faults: &mut Vec<DesignError>) {
+    let sections = design.sections();
+    let (Some(asked_deg), Some(rim_deg)) = (sections.pattern.polar_angle_deg, sections.dome.rim_angle_deg)
+    else {
+        return;
+    };
+    if asked_deg > rim_deg {
+        faults.push(
+            DesignError::at(
+                "pattern.polar_angle_deg",
+                asked_deg,
+                "the pattern would reach past the dome's rim",
+                format!("at most dome.rim_angle_deg, {rim_deg}"),
+            )
+            .cured_by("pattern.polar_angle_deg", rim_deg),
         );
     }
 }
@@ -248,20 +286,21 @@ fn springs(design: &Design, faults: &mut Vec<DesignError>) {
 fn white_markers(design: &Design, faults: &mut Vec<DesignError>) {
     let sections = design.sections();
     let radius_mm = sections.white_markers.diameter_mm / 2.0;
+    let rim_mm = sections.dome.shape().rim_radius_mm();
     let half = DVec2::from_array(sections.sheet.size_mm) / 2.0;
     let places = &sections.white_markers.positions_mm;
     for (index, place) in places.iter().enumerate() {
         let at = DVec2::from_array(*place);
         let field = format!("white_markers.positions_mm[{index}]");
-        if at.length() - radius_mm < sections.dome.radius_mm {
+        if at.length() - radius_mm < rim_mm {
             faults.push(
                 DesignError::at(
                     field.clone(),
                     json!(place),
                     "the marker lies under the dome and would hide dots",
-                    format!("at least {} mm from the axis", rounded(sections.dome.radius_mm + radius_mm)),
+                    format!("at least {} mm from the axis", rounded(rim_mm + radius_mm)),
                 )
-                .cured_by(&field, outwards(at, sections.dome.radius_mm + radius_mm)),
+                .cured_by(&field, outwards(at, rim_mm + radius_mm)),
             );
         }
         if (at.abs() + radius_mm).cmpgt(half).any() {

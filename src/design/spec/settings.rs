@@ -195,21 +195,21 @@ struct OpticalSensitivity {
 impl OpticalSensitivity {
     fn by(file: &DesignFile, optics: &SensorOptics) -> Result<Self, DesignError> {
         let reach_rad = reach_deg(file).to_radians();
-        let radius_mm = file.dome.radius_mm;
+        let dome = optics.dome();
         let points: Vec<DVec3> = (0..=RINGS)
             .flat_map(|ring| (0..AROUND).map(move |k| (ring, k)))
             .map(|(ring, k)| {
                 let polar = reach_rad * f64::from(ring) / f64::from(RINGS);
                 let azimuth = std::f64::consts::TAU * f64::from(k) / f64::from(AROUND);
                 let flat = polar.sin() * glam::DVec2::from_angle(azimuth);
-                radius_mm * flat.extend(polar.cos())
+                dome.center_mm() + dome.radius_mm() * flat.extend(polar.cos())
             })
             .collect();
         let (mut px_per_radius_mm, mut mm_per_radius_mm, mut px_per_mm) = (0.0_f64, 0.0_f64, 0.0_f64);
         let mut visible_points = Vec::new();
         for &point in &points {
             let Ok((pixel, slope)) = optics.project_with_jacobian(point) else { continue };
-            let normal = point / radius_mm;
+            let normal = dome.normal(point);
             let (side, up) = normal.any_orthonormal_pair();
             let by = |v: DVec3| slope * nalgebra::Vector3::from(v.to_array());
             let out = by(normal);
@@ -239,7 +239,8 @@ impl OpticalSensitivity {
 
 /// How far from the pole dots may lie: as the pattern says, or as far as the print reaches.
 fn reach_deg(file: &DesignFile) -> f64 {
-    file.pattern.polar_angle_deg.unwrap_or(file.print.wrap_limit_deg).min(89.0)
+    let rim_deg = file.dome.rim_angle_deg.unwrap_or(90.0);
+    file.pattern.polar_angle_deg.unwrap_or(file.print.wrap_limit_deg).min(89.0).min(rim_deg)
 }
 
 /// Root mean square shift of dots in the image, all tolerances drawn together, px: to first order the squares of what

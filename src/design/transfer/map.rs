@@ -13,12 +13,13 @@ use super::polar::{Polar, UnitPlate};
 /// It covers the rounding of a traced ray many times over, and refuses a point of another dome.
 const ON_DOME_TOLERANCE: f64 = 1e-6;
 
-/// A map between the dome and the plate.
+/// A map between the dome and the plate. Points of the dome are about the centre of its sphere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferMap {
     dome_radius_mm: f64,
     nominal: Nominal,
     correction: Option<Correction>,
+    end_rad: f64,
 }
 
 /// A place on the plate with the map's slope there.
@@ -53,7 +54,12 @@ impl TransferMap {
         if let Some(correction) = &correction {
             correction.check(nominal)?;
         }
-        Ok(Self { dome_radius_mm, nominal, correction })
+        Ok(Self { dome_radius_mm, nominal, correction, end_rad: FRAC_PI_2 })
+    }
+
+    /// The same map for a dome whose sphere ends at a polar angle of its own.
+    pub fn up_to(self, end_rad: f64) -> Self {
+        Self { end_rad: end_rad.min(FRAC_PI_2), ..self }
     }
 
     /// The dome's radius, mm.
@@ -73,7 +79,7 @@ impl TransferMap {
 
     /// The polar angle to which the map holds, rad: the rim, or the end of the measurement.
     pub fn max_polar_rad(&self) -> f64 {
-        self.correction.as_ref().map_or(FRAC_PI_2, |correction| correction.max_polar_rad)
+        self.correction.as_ref().map_or(self.end_rad, |correction| correction.max_polar_rad.min(self.end_rad))
     }
 
     /// Where on the plate the ink for this point of the dome lies.
@@ -145,7 +151,7 @@ impl TransferMap {
         let at = Polar::of_direction(point_mm / length_mm);
         if at.polar_rad <= self.max_polar_rad() + ANGLE_EPSILON_RAD {
             Ok(at)
-        } else if self.correction.is_some() && at.polar_rad <= FRAC_PI_2 + ANGLE_EPSILON_RAD {
+        } else if self.correction.is_some() && at.polar_rad <= self.end_rad + ANGLE_EPSILON_RAD {
             Err(TransferLimit::BeyondMeasured { polar_rad: at.polar_rad, limit_rad: self.max_polar_rad() })
         } else {
             Err(TransferLimit::BeyondDome)

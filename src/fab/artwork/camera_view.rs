@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use tiny_skia::Pixmap;
 
 use super::canvas::{color, fill, fill_outline, stroke};
@@ -33,9 +33,9 @@ pub fn camera_view(spec: &LayoutSpec, layout: &Layout) -> Result<Vec<u8>, Render
     picture.fill(color(AROUND));
 
     let raw = EvenFrame::new(optics.lens(), EvenIn::Raw, spec.undistorted);
-    let pole = optics.project(DVec3::new(0.0, 0.0, optics.dome_radius_mm()));
+    let pole = optics.project(optics.dome().pole_mm());
     if let Ok(center) = pole
-        && let Ok(rim) = region::parallel(optics, &raw, center, TAU / 4.0)
+        && let Ok(rim) = region::parallel(optics, &raw, center, optics.dome().meridian_end_rad())
     {
         let corners: Vec<DVec2> = rim.boundary.polygon().into_iter().map(|p| center + p).collect();
         fill(&mut picture, &corners, MEMBRANE);

@@ -29,14 +29,16 @@ pub fn outside_view(layout: &Layout) -> Result<Vec<u8>, RenderError> {
     let mut picture = Pixmap::new(SIDE_PX, SIDE_PX).ok_or(RenderError::Size)?;
     picture.fill(color(GROUND));
     let middle = DVec2::splat(0.5 * f64::from(SIDE_PX - 1));
-    let scale = DOME_PX / layout.transfer.dome_radius_mm();
+    let scale = DOME_PX / layout.dome.rim_radius_mm();
     let px = |p_mm: DVec2| middle + DVec2::new(p_mm.x, -p_mm.y) * scale;
     let circle = |radius_mm: f64| -> Vec<DVec2> {
         (0..360).map(|k| px(DVec2::from_angle(TAU * f64::from(k) / 360.0) * radius_mm)).collect()
     };
-    let radius_mm = layout.transfer.dome_radius_mm();
-    fill(&mut picture, &circle(radius_mm), MEMBRANE);
-    for polar_deg in [30.0, 60.0, 90.0f64] {
+    let dome = &layout.dome;
+    let radius_mm = dome.radius_mm();
+    fill(&mut picture, &circle(dome.rim_radius_mm()), MEMBRANE);
+    let end_deg = dome.sphere_end_rad().to_degrees();
+    for polar_deg in [30.0, 60.0, 90.0f64].map(|deg| deg.min(end_deg)) {
         stroke(&mut picture, &circle(radius_mm * polar_deg.to_radians().sin()), true, 1.0, LINE);
     }
     for dot in &layout.dots {
@@ -61,7 +63,12 @@ pub fn outside_view(layout: &Layout) -> Result<Vec<u8>, RenderError> {
         }
     };
     words("seen from outside", DVec2::new(20.0, 36.0), 16.0);
-    words("circles: 30, 60, 90 deg from the pole", DVec2::new(20.0, 884.0), 12.0);
+    let circles = if end_deg < 90.0 {
+        "circles: 30, 60 deg from the pole; rim"
+    } else {
+        "circles: 30, 60, 90 deg from the pole"
+    };
+    words(circles, DVec2::new(20.0, 884.0), 12.0);
     words("x", DVec2::new(872.0, 456.0), 14.0);
     words("y", DVec2::new(444.0, 40.0), 14.0);
     picture.encode_png().map_err(|error| RenderError::Encode(error.to_string()))

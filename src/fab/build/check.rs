@@ -162,15 +162,16 @@ fn check_constants(report: &mut CheckReport, dir: &Path, design: &Design, consta
 }
 
 fn dots_on_dome(design: &Design, constants: &Constants) -> Result<String, String> {
-    let radius_mm = design.sections().dome.radius_mm;
+    let dome = design.sections().dome.shape();
     let mut worst_mm = 0.0_f64;
     for dot in &constants.black_dots {
         let surface = DVec3::from_array(dot.surface_mm);
-        let off_mm = (surface.length() - radius_mm)
+        let off_mm = dome
+            .distance_mm(surface)
             .abs()
-            .max((surface / radius_mm - DVec3::from_array(dot.normal)).length());
+            .max((dome.normal(surface) - DVec3::from_array(dot.normal)).length());
         if off_mm.is_nan() || off_mm > DOME_TOLERANCE_MM || surface.z < 0.0 {
-            return Err(format!("dot {} is {off_mm:.3e} mm off the dome of {radius_mm} mm", dot.id));
+            return Err(format!("dot {} is {off_mm:.3e} mm off the dome of {} mm", dot.id, dome.radius_mm()));
         }
         worst_mm = worst_mm.max(off_mm);
     }
@@ -244,7 +245,7 @@ fn check_svg(text: &str, layout: &Layout, constants: &Constants) -> Result<Strin
         let Some(pass) = layout.passes.get(laid_out.pass) else {
             return Err(format!("dot {id} belongs to no print pass"));
         };
-        let surface = pass.pass_from_sensor.transpose() * on_pass;
+        let surface = layout.dome.center_mm() + pass.pass_from_sensor.transpose() * on_pass;
         let off_mm = surface.distance(DVec3::from_array(dot.surface_mm));
         if off_mm.is_nan() || off_mm > ARTWORK_TOLERANCE_MM {
             return Err(format!("dot {id} lands {off_mm:.3e} mm beside its surface_mm"));

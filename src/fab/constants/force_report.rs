@@ -149,20 +149,16 @@ pub fn force_report(
     let limits = limits_of(design);
     let sight = &springs.sight;
     let more = |pose: &Rigid| sight.checks(pose);
-    let radius_mm = design.sections().dome.radius_mm;
-    let directions = standard_directions(suspension.at_mm(), radius_mm, AZIMUTHS);
+    let dome = design.sections().dome.shape();
+    let directions = standard_directions(suspension.at_mm(), &dome, AZIMUTHS);
     let lines: Vec<EnvelopeLine> =
         directions.par_iter().map(|d| line(&reach(&suspension, &limits, &more, d))).collect();
-    let border = push_press_border(&suspension, &limits, &more, radius_mm, 0.0, BORDER_POINTS);
+    let border = push_press_border(&suspension, &limits, &more, dome.height_mm(), 0.0, BORDER_POINTS);
 
     let Claims { json: claims, poses, hardest } = claims(design, &suspension, &limits, &more);
     // The paper's measured maximum, checked whether or not the design claims it.
-    let press = Wrench::of_load(
-        DVec3::new(0.0, 0.0, -PAPER_N),
-        DVec3::ZERO,
-        DVec3::Z * radius_mm,
-        suspension.at_mm(),
-    );
+    let press =
+        Wrench::of_load(DVec3::new(0.0, 0.0, -PAPER_N), DVec3::ZERO, dome.pole_mm(), suspension.at_mm());
     let paper = try_all(&suspension, &limits, &more, &press);
     let springs_that_hold =
         spring_choices(&suspension, &limits, &more, &hardest.filter(|h| h.force_n.z < 0.0).unwrap_or(press));

@@ -81,6 +81,7 @@ pub fn with_springs(
         },
         optics: OpticsConstants {
             dome_radius_mm: optics.dome_radius_mm(),
+            dome_center_z_mm: optics.dome().center_z_mm(),
             layers: optics
                 .layers()
                 .iter()

@@ -1,7 +1,5 @@
 //! The making, step by step, with this design's quantities.
 
-use std::f64::consts::PI;
-
 use super::subject::ReportSubject;
 use crate::html::{Html, html};
 use crate::numbers::typeset;
@@ -52,7 +50,7 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
 fn printing_and_casting(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
     let s = subject.design.sections();
     let n = typeset;
-    let dome_ml = 2.0 / 3.0 * PI * s.dome.radius_mm.powi(3) / 1000.0;
+    let dome_ml = s.dome.shape().volume_mm3() / 1000.0;
     let printed = subject.parts.iter().filter(|part| part.name != "acrylic_sheet");
     let grams = |part: &Part| part.volume_mm3 / 1000.0 * s.process.density_g_per_cm3;
     let total_g: f64 = printed.clone().map(grams).sum();
@@ -209,7 +207,7 @@ fn camera_text(subject: &ReportSubject<'_>) -> Html {
 
 /// Area of the dome's surface, mm^2.
 fn skin_mm2(subject: &ReportSubject<'_>) -> f64 {
-    2.0 * PI * subject.design.sections().dome.radius_mm.powi(2)
+    subject.design.sections().dome.shape().area_mm2()
 }
 
 fn dots_text(subject: &ReportSubject<'_>) -> Html {

@@ -4,6 +4,7 @@ use super::subject::ReportSubject;
 use super::{constants, forces, light, making, measured, parts, pattern, section};
 use crate::html::{Html, base64, figure, html, table};
 use crate::numbers::{percent, typeset};
+use domecast_optics::DomeShape;
 
 /// A chapter of the page.
 struct Chapter {
@@ -87,12 +88,27 @@ fn warnings(subject: &ReportSubject<'_>) -> Html {
     )
 }
 
+/// The dome's size in words.
+fn dome_size(dome: &DomeShape) -> String {
+    let n = typeset;
+    let round = |mm: f64| n((1e3 * mm).round() / 1e3);
+    let (wide, radius) = (round(2.0 * dome.rim_radius_mm()), n(dome.radius_mm()));
+    match dome.center_z_mm() {
+        z if z < 0.0 => format!(
+            "⌀ {wide} mm, a cap {} mm high of a sphere of radius {radius} mm",
+            round(dome.height_mm())
+        ),
+        z if z > 0.0 => format!("⌀ {wide} mm, on a cylinder {} mm high", n(z)),
+        _ => format!("⌀ {} mm", n(2.0 * dome.radius_mm())),
+    }
+}
+
 fn key_figures(subject: &ReportSubject<'_>) -> Html {
     let s = subject.design.sections();
     let n = typeset;
     let mut entries = vec![
         ("Dots", subject.layout.dots.len().to_string()),
-        ("Dome", format!("⌀ {} mm", n(2.0 * s.dome.radius_mm))),
+        ("Dome", dome_size(&s.dome.shape())),
         ("Envelope", s.envelope.size_mm.map(n).join(" × ") + " mm"),
         ("Air gap at rest", format!("{} mm", n(subject.design.optics().air_gap_mm()))),
         ("Largest field angle", format!("{}°", n(subject.constants.camera.max_field_angle_rad.to_degrees()))),

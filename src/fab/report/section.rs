@@ -303,7 +303,7 @@ fn dimensions(design: &Design, low: DVec3, high: DVec3) -> String {
     };
     let left = |k: f64| low.x - step * k;
     let right = |k: f64| high.x + step * k;
-    art += &upright(left(1.0), -s.dome.radius_mm, [0.0, s.dome.radius_mm], "dome");
+    art += &upright(left(1.0), -s.dome.shape().rim_radius_mm(), [0.0, s.dome.shape().height_mm()], "dome");
     art += &upright(left(1.0), 0.0, [pupil_z, 0.0], "pupil to dome");
     art += &upright(
         left(2.0),

@@ -26,7 +26,7 @@
 //! #         FlatLayer { name: "acrylic".into(), index: [1.49; 3], thickness_mm: Some(1.0) },
 //! #         FlatLayer { name: "silicone".into(), index: [1.41; 3], thickness_mm: None },
 //! #     ],
-//! #     dome_radius_mm: 10.0,
+//! #     dome: domecast_optics::DomeShape::hemisphere(10.0),
 //! # })?;
 //! // four discs on the sheet, seen from a platform that has moved by 1 mm and turned by 0.05 rad
 //! let corners = [(11.0, 10.0), (-11.0, 10.0), (-11.0, -10.0), (11.0, -9.0)];

@@ -28,7 +28,7 @@ fn thumb(model: LensModel) -> SensorOptics {
         },
         sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0)),
         layers: vec![layer("acrylic", 1.491, Some(1.0)), layer("silicone", 1.41, None)],
-        dome_radius_mm: 10.0,
+        dome: crate::DomeShape::hemisphere(10.0),
     })
     .unwrap()
 }
@@ -90,7 +90,7 @@ fn the_plane_may_be_turned_in_the_camera() {
             lens: base.lens().spec().clone(),
             sensor_from_camera: Rigid::new(rotation_from_vector(turn), DVec3::new(0.1, 0.0, -10.0)),
             layers: base.layers()[1..].to_vec(),
-            dome_radius_mm: 10.0,
+            dome: crate::DomeShape::hemisphere(10.0),
         };
         let optics = SensorOptics::new(&spec).unwrap();
         let solver = PoseSolver::new(&optics, &square(7.0, 0.8), PoseOptions::new(0.1, 5.0)).unwrap();
@@ -201,7 +201,7 @@ fn a_far_plane_is_ambiguous() {
         lens: base.lens().spec().clone(),
         sensor_from_camera: Rigid::from_translation(DVec3::new(0.0, 0.0, -120.0)),
         layers: base.layers()[1..].to_vec(),
-        dome_radius_mm: 10.0,
+        dome: crate::DomeShape::hemisphere(10.0),
     };
     let optics = SensorOptics::new(&spec).unwrap();
     let solver = PoseSolver::new(&optics, &square(7.5, 0.8), PoseOptions::new(0.3, 30.0)).unwrap();

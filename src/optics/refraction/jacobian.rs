@@ -78,7 +78,8 @@ impl SensorOptics {
         let (n, up) = (self.fill.index, hit.inside.z);
         let shift_slope = self.lens.pupil_shift_mm(field_angle_rad).1;
         let angle_gradient = field_angle_gradient(ray);
-        let grazing = hit.point.dot(hit.inside);
+        let outward = self.dome.outward_mm(hit.point);
+        let grazing = outward.dot(hit.inside);
         let mut jacobian = Matrix3x2::zeros();
         for j in 0..2 {
             let ray_motion = column(&ray_by_pixel, j);
@@ -89,7 +90,7 @@ impl SensorOptics {
                 DVec2::new(origin.x, origin.y) + dp * per_p + p * (per_p_by_cos * d.z - origin.z / cos);
             let inside = DVec3::new(dp.x / n, dp.y / n, cos * d.z / (n * n * up));
             let moved = DVec3::new(base.x, base.y, 0.0) + inside * hit.inside_mm;
-            let surface = moved - hit.inside * (hit.point.dot(moved) / grazing);
+            let surface = moved - hit.inside * (outward.dot(moved) / grazing);
             for i in 0..3 {
                 jacobian[(i, j)] = surface[i];
             }

@@ -1,7 +1,7 @@
 //! Pixel to dome and dome to pixel, through flat layers and a solid dome.
 //!
 //! The camera stands in air under a flat sheet of any number of layers; the
-//! sheet's top face (`z = 0`) carries a solid hemisphere. Everything is in the
+//! sheet's top face (`z = 0`) carries a solid dome ([`DomeShape`]). Everything is in the
 //! *sensor* frame: origin at the centre of the dome's base, +z out through the
 //! pole, millimetres.
 //!
@@ -17,6 +17,7 @@
 //! A point is seen only if its chief ray lies in the domain of the lens. Every
 //! way in which there is no answer has its name ([`RayLimit`]).
 
+mod dome;
 mod jacobian;
 mod limit;
 mod project;
@@ -26,6 +27,7 @@ mod stack;
 mod trace;
 mod tube;
 
+pub use dome::DomeShape;
 pub use jacobian::PixelMotion;
 pub use limit::RayLimit;
 pub use project::SolvedPixel;

@@ -135,9 +135,9 @@ impl SensorOptics {
         if !point.is_finite() {
             return Err(RayLimit::NotFinite);
         }
-        let slack = ON_DOME_TOLERANCE * self.dome_radius_mm;
+        let slack = ON_DOME_TOLERANCE * self.dome.radius_mm();
         // Above the top, one has to be in the dome.
-        if point.z <= 0.0 || point.length() <= self.dome_radius_mm + slack {
+        if point.z <= 0.0 || self.dome.outward_mm(point).length() <= self.dome.radius_mm() + slack {
             Ok(point)
         } else if point.z <= slack {
             Ok(DVec3::new(point.x, point.y, 0.0))

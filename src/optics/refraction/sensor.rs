@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::dome::DomeShape;
 use super::spec::{ColorChannel, FlatLayer, OpticsError, OpticsSpec};
 use super::stack::Plate;
 use crate::camera::Lens;
@@ -20,7 +21,7 @@ pub struct SensorOptics {
     pub(super) plates: Vec<Plate>,
     pub(super) fill: Plate,
     pub(super) bottom_mm: f64,
-    pub(super) dome_radius_mm: f64,
+    pub(super) dome: DomeShape,
 }
 
 impl SensorOptics {
@@ -62,7 +63,7 @@ impl SensorOptics {
             plates: Vec::new(),
             fill: Plate::new(1.0, 0.0),
             bottom_mm,
-            dome_radius_mm: spec.dome_radius_mm,
+            dome: spec.dome,
         };
         let mut optics = optics.for_channel(ColorChannel::Green);
         optics.place(rest_from_camera)?;
@@ -137,7 +138,7 @@ impl SensorOptics {
             sensor_from_camera: self.rest_from_camera,
             // the air is what the camera's place leaves
             layers: self.layers.iter().skip(1).cloned().collect(),
-            dome_radius_mm: self.dome_radius_mm,
+            dome: self.dome,
         }
     }
 
@@ -168,9 +169,14 @@ impl SensorOptics {
         &self.layers
     }
 
-    /// Radius of the dome, millimetres.
+    /// The dome's outer face.
+    pub fn dome(&self) -> &DomeShape {
+        &self.dome
+    }
+
+    /// Radius of the dome's sphere, millimetres.
     pub fn dome_radius_mm(&self) -> f64 {
-        self.dome_radius_mm
+        self.dome.radius_mm()
     }
 
     /// The entrance pupil of a ray with this field angle, sensor frame.

@@ -1,5 +1,6 @@
 //! What the optics are made from, and what is wrong with it.
 
+use super::dome::DomeShape;
 use crate::camera::{LensError, LensSpec};
 use crate::numeric::Rigid;
 
@@ -50,8 +51,8 @@ pub struct OpticsSpec {
     /// From the camera outwards, without the air; the last one fills the dome
     /// and has no thickness of its own, all others have one.
     pub layers: Vec<FlatLayer>,
-    /// Radius of the dome's outer face in millimetres.
-    pub dome_radius_mm: f64,
+    /// The dome's outer face.
+    pub dome: DomeShape,
 }
 
 /// Optics that cannot be: the field, its value and what is allowed there.
@@ -89,6 +90,9 @@ impl std::error::Error for OpticsError {}
 /// squared and compared.
 const LENGTHS_MM: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
+/// Least height of a cap over its sphere's radius: a rim angle of 0.8 degrees.
+const MIN_CAP: f64 = 1e-4;
+
 /// Largest index of refraction; no clear material comes near it.
 const MAX_INDEX: f64 = 100.0;
 
@@ -99,8 +103,18 @@ impl OpticsSpec {
     /// # Errors
     /// The first field at fault.
     pub fn check(&self) -> Result<(), OpticsError> {
-        if !LENGTHS_MM.contains(&self.dome_radius_mm) {
-            return Err(OpticsError::new("dome_radius_mm", self.dome_radius_mm, "a positive length in mm"));
+        let (radius_mm, center_z_mm) = (self.dome.radius_mm(), self.dome.center_z_mm());
+        if !LENGTHS_MM.contains(&radius_mm) {
+            return Err(OpticsError::new("dome_radius_mm", radius_mm, "a positive length in mm"));
+        }
+        // below that the cap is thinner than rounding can tell
+        let lowest_mm = -(1.0 - MIN_CAP) * radius_mm;
+        if !(lowest_mm..=*LENGTHS_MM.end()).contains(&center_z_mm) {
+            return Err(OpticsError::new(
+                "dome_center_z_mm",
+                center_z_mm,
+                format!("more than {lowest_mm} mm: the pole is above the sheet"),
+            ));
         }
         if self.layers.is_empty() {
             return Err(OpticsError::new("layers", "empty", "at least the medium that fills the dome"));

@@ -1,3 +1,5 @@
+mod domes;
+
 use super::*;
 use crate::camera::{LensModel, LensSpec};
 use crate::numeric::Rigid;
@@ -21,7 +23,7 @@ fn spec(model: LensModel, distortion: &[f64]) -> OpticsSpec {
             layer("acrylic", [1.489, 1.491, 1.497], Some(1.0)),
             layer("silicone", [1.408, 1.41, 1.415], None),
         ],
-        dome_radius_mm: 10.0,
+        dome: DomeShape::hemisphere(10.0),
     }
 }
 

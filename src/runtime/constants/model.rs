@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::law::SpringLaw;
+use domecast_optics::DomeShape;
 
 /// Marks the file for readers.
 pub const FORMAT: &str = "domecast-constants";
@@ -96,10 +97,26 @@ pub struct CameraConstants {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct OpticsConstants {
-    /// Radius of the dots' surface.
+    /// Radius of the sphere that the dots lie on.
     pub dome_radius_mm: f64,
+    /// Height of that sphere's centre above the sheet's top, where the dome is no hemisphere: negative for a cap, the
+    /// height of the cylinder that a hemisphere stands on above zero. Not there: 0.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub dome_center_z_mm: f64,
     /// From the camera outwards, the air gap at rest first.
     pub layers: Vec<LayerConstants>,
+}
+
+impl OpticsConstants {
+    /// The dome's outer face.
+    pub fn dome(&self) -> DomeShape {
+        DomeShape::new(self.dome_radius_mm, self.dome_center_z_mm)
+    }
+}
+
+/// Whether a number says no more than that it is not there.
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// One flat layer.

@@ -7,7 +7,7 @@ use super::plain_input::{PlainError, PlainInput};
 use domecast_optics::camera::{LensModel, LensSpec};
 use domecast_optics::numeric::Rigid;
 use domecast_optics::pose::{Marker, PoseOptions, PoseSolver, Sighting};
-use domecast_optics::{FlatLayer, OpticsSpec, RayLimit, SensorOptics};
+use domecast_optics::{DomeShape, FlatLayer, OpticsSpec, RayLimit, SensorOptics};
 use domecast_springs::Displacement;
 
 /// What the runtime sees at one pose.
@@ -43,7 +43,7 @@ impl PlainRuntimeSolver {
             sensor_from_camera: *input.optics.rest_from_camera(),
             layers: vec![FlatLayer { name: "nothing".into(), index: [1.0; 3], thickness_mm: None }],
             // Nothing is above the sheet for it; apparent positions may lie there.
-            dome_radius_mm: 1e3 * input.optics.dome_radius_mm(),
+            dome: DomeShape::hemisphere(1e3 * input.optics.dome_radius_mm()),
         };
         let optics = SensorOptics::new(&spec).map_err(PlainError::Optics)?;
         let markers: Vec<Marker> = input

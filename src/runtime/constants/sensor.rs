@@ -46,7 +46,7 @@ impl Constants {
             },
             sensor_from_camera: camera_from_sensor.orthonormalized().inverse(),
             layers: layers.iter().map(layer).collect(),
-            dome_radius_mm: self.optics.dome_radius_mm,
+            dome: self.optics.dome(),
         })
     }
 

@@ -29,7 +29,8 @@ fn platform_mm_per_s(scene: &Scene) -> f64 {
         MotionSection::Pose(_) => 1.0,
     };
     let at_mm = scene.reference_mm();
-    let lever_mm = scene.optics().dome_radius_mm() + at_mm.length() + 1.0;
+    let dome = scene.optics().dome();
+    let lever_mm = dome.height_mm().max(dome.rim_radius_mm()) + at_mm.length() + 1.0;
     let keys = key_displacements(scene, motion);
     let speed = |a: &(f64, Displacement), b: &(f64, Displacement)| {
         let moved = (b.1.translation_mm - a.1.translation_mm).length();

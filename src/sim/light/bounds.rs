@@ -8,7 +8,7 @@
 
 use std::sync::OnceLock;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::direct::EmitterRule;
@@ -85,12 +85,16 @@ impl LightBounds {
         // What the platform's window shows may tilt against the camera; only at rest is its loss known.
         let still = scene.file().motion.is_none() && !moved;
         let mut out = Self::default();
+        // What the pole sees of the dome, beside its base: no point sees more. Half for a hemisphere.
+        let dome = scene.optics().dome();
+        let rim2 = dome.rim_radius_mm() * dome.rim_radius_mm();
+        let straight = 1.0 - rim2 / (rim2 + dome.height_mm() * dome.height_mm());
         for c in 0..3 {
             let seen: Vec<f64> = ways.sources.iter().map(|source| source.seen_mw[c]).collect();
             let albedo = sections.elastomer.membrane_reflectance.to_array()[c];
             let found = samples.channel(c, &seen, still);
-            // Half of the membrane's light meets the dome again; the rest meets the underside, which may send it back.
-            let comes_back = if has_faces(&ways.optics[c]) { albedo } else { 0.5 * albedo };
+            // A part of the membrane's light meets the dome again; the rest meets the underside, which may send it back.
+            let comes_back = if has_faces(&ways.optics[c]) { albedo } else { straight * albedo };
             let more = 1.0 / (1.0 - comes_back);
             let own = comes_back * more * found.membrane.max;
             let index = |beside: bool| setup::index_at(&ways.optics[c], beside).powi(2);
@@ -204,7 +208,9 @@ impl Samples {
         }
         let membrane = places
             .into_par_iter()
-            .map(|(place, direction)| sample(place, (!moved).then_some(direction), false))
+            .map(|(place, direction)| {
+                sample(place, (!moved).then_some(cases[0].face().normal(direction)), false)
+            })
             .collect();
         let markers = scene.markers().iter().map(|m| sample(m.position_mm, Some(DVec3::Z), true)).collect();
         Ok(Self { membrane, markers })
@@ -245,9 +251,9 @@ fn directions(ways: &Ways) -> Vec<DVec3> {
     });
     let around = (0..AROUND).map(|k| std::f64::consts::TAU * k as f64 / AROUND as f64);
     let azimuths: Vec<f64> = around.chain(lights).collect();
-    for z in RINGS {
-        let aside = (1.0_f64 - z * z).sqrt();
-        out.extend(azimuths.iter().map(|azimuth| (DVec2::from_angle(*azimuth) * aside).extend(z)));
+    let face = ways.face();
+    for z in RINGS.map(|share| face.level(share)) {
+        out.extend(azimuths.iter().map(|azimuth| face.place(*azimuth, z)));
     }
     out
 }

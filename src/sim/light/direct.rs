@@ -105,6 +105,8 @@ struct Share {
     flux: DVec3,
     /// From the place to where its ray meets the sheet's underside, mm.
     way_mm: DVec3,
+    /// Where its ray comes up through the sheet's top, mm.
+    foot_mm: DVec3,
 }
 
 impl DirectLight<'_> {
@@ -139,7 +141,7 @@ impl DirectLight<'_> {
         if open > 0.0 {
             for (line, &(u, across)) in shares.chunks_exact(count).zip(rule.nodes()) {
                 for (share, &(v, up)) in line.iter().zip(rule.nodes()) {
-                    if self.enters(place(u, v) + share.way_mm) {
+                    if self.enters(place(u, v) + share.way_mm) && self.meets_dome(point_mm, share.foot_mm) {
                         sum += share.flux * (across * up * open);
                     }
                 }
@@ -153,7 +155,8 @@ impl DirectLight<'_> {
                 let is_free = |v: f64| {
                     let source = place(u, v);
                     let end = source + rule.interpolate(line.iter().map(|share| share.way_mm), v);
-                    self.enters(end) && hollows.is_free(source, end)
+                    let foot = || rule.interpolate(line.iter().map(|share| share.foot_mm), v);
+                    self.enters(end) && self.meets_dome(point_mm, foot()) && hollows.is_free(source, end)
                 };
                 for (low, high) in pieces_in_sight(is_free) {
                     for (v, up) in rule.rule.over(low, high) {
@@ -179,6 +182,13 @@ impl DirectLight<'_> {
         underside_mm.truncate().abs().cmple(self.sheet_half_mm).all()
     }
 
+    /// Whether a ray to a point of the dome comes up within its foot. A light under a cap may stand outside it; the
+    /// lights under a hemisphere stand within its foot and are taken as they are.
+    fn meets_dome(&self, point_mm: DVec3, foot_mm: DVec3) -> bool {
+        let dome = self.optics.dome();
+        dome.is_hemisphere() || point_mm.z <= 0.0 || foot_mm.truncate().length() <= dome.rim_radius_mm()
+    }
+
     /// What a place of the emitter sends to a point; `None` where no ray leads there. `near` is a neighbour's tangent.
     fn share(
         &self,
@@ -193,7 +203,8 @@ impl DirectLight<'_> {
         let per_sr = emitter.lobe.per_sr(tube.leaving.dot(emitter.platform_from_emitter.matrix3.z_axis));
         let passed = if self.fresnel { fresnel::through(indices, tube.snell_invariant) } else { 1.0 };
         let flux = tube.arriving * (per_sr * passed * tube.sr_per_mm2);
-        Some(Share { flux, way_mm: tube.underside_mm - source })
+        let foot_mm = point_mm - tube.arriving * (point_mm.z / tube.arriving.z);
+        Some(Share { flux, way_mm: tube.underside_mm - source, foot_mm })
     }
 }
 

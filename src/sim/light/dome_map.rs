@@ -2,25 +2,100 @@
 //!
 //! Directions from the dome's centre are mapped to a disc of radius 1 by the equal-area map
 //! `(x, y) / sqrt(1 + z)` (Lambert's azimuthal projection): smooth over the whole hemisphere, the rim included,
-//! and one square root to compute. The disc lies in a square grid with some cells of padding all round.
+//! and one square root to compute. A cap ends at a smaller circle, which is drawn out to the disc; a cylinder under the
+//! hemisphere goes on outside its circle, at `sqrt(1 - z)`, which keeps areas equal there too (Archimedes), and both are
+//! drawn in to the disc. The disc lies in a square grid with some cells of padding all round.
 
+use domecast_optics::DomeShape;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 /// Cells beyond the disc on each side, so that a bicubic look-up at the rim stays inside.
 const PADDING: usize = 3;
 
+/// The dome's face as the map takes it: places of it less the sphere's centre, over the radius. On the sphere that is
+/// the outward normal; on a cylinder `z` goes on below zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DomeFace {
+    /// `z` of the rim: 0 for a hemisphere.
+    pub rim: f64,
+}
+
+impl DomeFace {
+    /// Half a sphere.
+    pub const HEMISPHERE: Self = Self { rim: 0.0 };
+
+    /// The face of a dome.
+    pub fn of(dome: &DomeShape) -> Self {
+        Self { rim: dome.rim_level() }
+    }
+
+    /// Whether the face goes on as a cylinder below the sphere.
+    pub fn has_wall(&self) -> bool {
+        self.rim < 0.0
+    }
+
+    /// Radius of the rim's circle in the equal-area plane, where the hemisphere's is 1.
+    pub fn reach(&self) -> f64 {
+        (1.0 - self.rim).sqrt()
+    }
+
+    /// `z` at a share of the area, counted from the rim.
+    pub fn level(&self, share: f64) -> f64 {
+        self.rim + (1.0 - self.rim) * share
+    }
+
+    /// The place at an azimuth and `z`.
+    pub fn place(&self, azimuth_rad: f64, z: f64) -> DVec3 {
+        let out = if z < 0.0 { 1.0 } else { (1.0 - z * z).sqrt() };
+        (DVec2::from_angle(azimuth_rad) * out).extend(z)
+    }
+
+    /// Outward unit normal at a place.
+    pub fn normal(&self, place: DVec3) -> DVec3 {
+        if self.has_wall() && place.z < 0.0 { place.with_z(0.0) } else { place }
+    }
+
+    /// The disc's point for a place.
+    pub fn disc(&self, place: DVec3) -> DVec2 {
+        if self.has_wall() && place.z < 0.0 {
+            place.truncate() * ((1.0 - place.z).sqrt() / self.reach())
+        } else {
+            place.truncate() / (1.0 + place.z.max(0.0)).sqrt() / self.reach()
+        }
+    }
+
+    /// The place of a point of the disc, radius at most 1.
+    pub fn place_of_disc(&self, disc: DVec2) -> DVec3 {
+        let reach = self.reach();
+        let flat = disc * reach;
+        let square = flat.length_squared().min(reach * reach);
+        let z = if reach == 1.0 { 1.0 - square } else { (1.0 - square).max(self.rim) };
+        if z < 0.0 {
+            return flat.normalize_or_zero().extend(z);
+        }
+        (flat * (2.0 - square).sqrt()).extend(z)
+    }
+}
+
 /// The grid over the disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DomeGrid {
     /// Nodes along each side.
     pub nodes: usize,
+    /// The face that the disc shows.
+    pub face: DomeFace,
 }
 
 impl DomeGrid {
     /// A grid with so many cells from rim to rim, at least 8.
     pub fn with_cells(cells: usize) -> Self {
-        Self { nodes: cells.max(8) + 2 * PADDING + 1 }
+        Self { nodes: cells.max(8) + 2 * PADDING + 1, face: DomeFace::HEMISPHERE }
+    }
+
+    /// The same grid over another face.
+    pub fn over(self, face: DomeFace) -> Self {
+        Self { face, ..self }
     }
 
     /// Cells from rim to rim.
@@ -39,9 +114,9 @@ impl DomeGrid {
         DVec2::new(at(column), at(row))
     }
 
-    /// Grid coordinates (in nodes) of a unit direction with z of at least 0.
-    pub fn coordinates(&self, direction: DVec3) -> DVec2 {
-        self.coordinates_of_disc(disc_from_direction(direction))
+    /// Grid coordinates (in nodes) of a place of the face.
+    pub fn coordinates(&self, place: DVec3) -> DVec2 {
+        self.coordinates_of_disc(self.face.disc(place))
     }
 
     /// Grid coordinates of a place in the disc's plane.
@@ -49,7 +124,7 @@ impl DomeGrid {
         (disc + 1.0) * (0.5 * self.cells() as f64) + PADDING as f64
     }
 
-    /// Values at all nodes, row by row, of a function of the direction; rows are shared among threads.
+    /// Values at all nodes, row by row, of a function of the place; rows are shared among threads.
     ///
     /// A node beyond the rim, which no direction has, gets the parabola over the radius through the rim and two places
     /// inside continued. These are asked for at even azimuths, a cell apart along the rim; a cubic leads from
@@ -64,13 +139,14 @@ impl DomeGrid {
             .into_par_iter()
             .map(|k| {
                 let aside = DVec2::from_angle(std::f64::consts::TAU * k as f64 / azimuths as f64);
-                [1.0, 1.0 - step, 1.0 - 2.0 * step].map(|radius| value(direction_from_disc(aside * radius)))
+                [1.0, 1.0 - step, 1.0 - 2.0 * step]
+                    .map(|radius| value(self.face.place_of_disc(aside * radius)))
             })
             .collect();
         let node = |i: usize| {
             let place = self.place(i % self.nodes, i / self.nodes);
             if place.length() <= 1.0 {
-                return value(direction_from_disc(place));
+                return value(self.face.place_of_disc(place));
             }
             if !self.is_beside(place.length()) { [0.0; K] } else { beyond(&rim, place, step) }
         };
@@ -116,23 +192,6 @@ fn beyond<const K: usize>(rim: &[[[f64; K]; 3]], place: DVec2, step: f64) -> [f6
         }
     }
     out
-}
-
-/// The disc's point for a unit direction.
-pub fn disc_from_direction(direction: DVec3) -> DVec2 {
-    direction.truncate() / (1.0 + direction.z.max(0.0)).sqrt()
-}
-
-/// [`disc_from_direction`], continued some degrees below the rim.
-#[inline]
-pub fn disc_continued(direction: DVec3) -> DVec2 {
-    direction.truncate() / (1.0 + direction.z.max(-0.25)).sqrt()
-}
-
-/// The unit direction of a point of the disc, radius at most 1.
-pub fn direction_from_disc(disc: DVec2) -> DVec3 {
-    let square = disc.length_squared().min(1.0);
-    (disc * (2.0 - square).sqrt()).extend(1.0 - square)
 }
 
 /// Bicubic look-up (Catmull and Rom's cubic, third order) in a table over a grid.

@@ -10,36 +10,47 @@
 //!   reflection: the underside is a mirror whose strength depends on the angle. What comes back outside the
 //!   dome's foot is guided away in the sheet and lost.
 //!
+//! A cylinder under the hemisphere is no part of that sphere: with one, every pair of patches has its own straight way,
+//! `cos cos' dA / (pi d^2)`; the dome is convex, so nothing stands between.
+//!
 //! The balance `B = albedo (E + K B)` is solved on rings of patches; the mirror's part depends on the azimuth
 //! between two patches only, so one ring of it serves all. Its series falls at least as fast as the albedo.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
+use super::dome_map::DomeFace;
 use super::fresnel;
-use domecast_optics::SensorOptics;
+use domecast_optics::{DomeShape, SensorOptics};
 
 /// Rings of equal area from rim to pole, and patches in each.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rings {
     /// Rings.
     pub rings: usize,
     /// Patches in a ring.
     pub patches: usize,
+    /// The face that they share.
+    pub face: DomeFace,
 }
 
 impl Rings {
     /// Enough for 0.3 % of the light that comes back from the sheet (tested against twice as many).
-    pub const USUAL: Self = Self { rings: 16, patches: 40 };
+    pub const USUAL: Self = Self { rings: 16, patches: 40, face: DomeFace::HEMISPHERE };
 
-    fn cos(&self, ring: usize) -> f64 {
-        (ring as f64 + 0.5) / self.rings as f64
+    /// As many over another face.
+    pub fn usual(face: DomeFace) -> Self {
+        Self { face, ..Self::USUAL }
     }
 
-    /// Unit direction of a patch's middle.
-    pub fn direction(&self, ring: usize, patch: usize) -> DVec3 {
+    fn cos(&self, ring: usize) -> f64 {
+        self.face.level((ring as f64 + 0.5) / self.rings as f64)
+    }
+
+    /// Place of a patch's middle.
+    pub fn place(&self, ring: usize, patch: usize) -> DVec3 {
         let z = self.cos(ring);
         let azimuth = std::f64::consts::TAU * (patch as f64 + 0.5) / self.patches as f64;
-        (DVec2::from_angle(azimuth) * (1.0 - z * z).sqrt()).extend(z)
+        self.face.place(azimuth, z)
     }
 
     /// How many patches in all; patch `p` of ring `r` is number `r * patches + p`.
@@ -52,7 +63,9 @@ impl Rings {
 #[derive(Debug, Clone)]
 pub struct DomeRoom {
     rings: Rings,
-    radius_mm: f64,
+    dome: DomeShape,
+    /// Share of an exitance of one that all patches together give each other straight, over the sphere.
+    straight: f64,
     /// `mirror[(to * rings + from) * patches + shift]`: irradiance at ring `to` for an exitance of one of the
     /// patch of ring `from` that is `shift` patches further round.
     mirror: Vec<f64>,
@@ -91,25 +104,29 @@ pub enum Underside {
 impl DomeRoom {
     /// Computes how the underside mirrors the dome.
     pub fn new(optics: &SensorOptics, rings: Rings, underside: Underside) -> Self {
-        let radius_mm = optics.dome_radius_mm();
+        let dome = *optics.dome();
         let mut mirror = vec![0.0; rings.rings * rings.rings * rings.patches];
+        let of_sphere = if rings.face.has_wall() { 0.0 } else { dome.height_mm() / dome.radius_mm() };
         if underside != Underside::Dark {
             for to in 0..rings.rings {
-                let target = rings.direction(to, 0);
+                let target = rings.place(to, 0);
+                let (at_mm, normal) = (on_dome(&dome, target), rings.face.normal(target));
                 for from in 0..rings.rings {
                     let mut near = 0.0;
                     for shift in 0..rings.patches {
-                        let source = rings.direction(from, shift);
-                        let (value, tangent) =
-                            mirrored(optics, source, target * radius_mm, target, underside, near);
+                        let source = rings.place(from, shift);
+                        let (value, tangent) = mirrored(optics, source, at_mm, normal, underside, near);
                         near = tangent;
                         mirror[(to * rings.rings + from) * rings.patches + shift] =
-                            value * patch_mm2(rings, radius_mm);
+                            value * patch_mm2(rings, &dome);
                     }
                 }
             }
         }
-        Self { rings, radius_mm, mirror }
+        if rings.face.has_wall() {
+            add_straight(rings, &dome, &mut mirror);
+        }
+        Self { rings, dome, straight: of_sphere, mirror }
     }
 
     /// The patches.
@@ -119,13 +136,13 @@ impl DomeRoom {
 
     /// Area of every patch, mm^2.
     pub fn patch_mm2(&self) -> f64 {
-        patch_mm2(self.rings, self.radius_mm)
+        patch_mm2(self.rings, &self.dome)
     }
 
     /// Irradiance of every patch by the exitance of all.
     pub fn irradiance(&self, exitance: &[f64]) -> Vec<f64> {
-        let Rings { rings, patches } = self.rings;
-        let straight = exitance.iter().sum::<f64>() / (2 * self.rings.count()) as f64;
+        let Rings { rings, patches, .. } = self.rings;
+        let straight = self.straight * exitance.iter().sum::<f64>() / (2 * self.rings.count()) as f64;
         let mut out = vec![straight; self.rings.count()];
         for (to, row) in out.chunks_mut(patches).enumerate() {
             for (from, light) in exitance.chunks(patches).enumerate() {
@@ -171,7 +188,7 @@ impl DomeRoom {
         let mut sum = 0.0;
         for ring in 0..self.rings.rings {
             for patch in 0..self.rings.patches {
-                let source = self.rings.direction(ring, patch);
+                let source = self.rings.place(ring, patch);
                 let (value, tangent) = mirrored(optics, source, point_mm, DVec3::Z, Underside::Fresnel, near);
                 near = tangent;
                 sum += value * exitance[ring * self.rings.patches + patch];
@@ -181,12 +198,44 @@ impl DomeRoom {
     }
 }
 
-fn patch_mm2(rings: Rings, radius_mm: f64) -> f64 {
-    std::f64::consts::TAU * radius_mm * radius_mm / rings.count() as f64
+fn patch_mm2(rings: Rings, dome: &DomeShape) -> f64 {
+    dome.area_mm2() / rings.count() as f64
 }
 
+/// The point of a place of the face.
+fn on_dome(dome: &DomeShape, place: DVec3) -> DVec3 {
+    dome.center_mm() + place * dome.radius_mm()
+}
+
+/// Irradiance by the straight ways between patches, which for a sphere is one number and here is not. A patch is taken
+/// at several places: next to it the kernel is bounded, but not smooth.
+fn add_straight(rings: Rings, dome: &DomeShape, kernel: &mut [f64]) {
+    let own_mm2 = patch_mm2(rings, dome) / f64::from(SUB * SUB);
+    let step = std::f64::consts::TAU / rings.patches as f64;
+    for (at, value) in kernel.iter_mut().enumerate() {
+        let (to, from, shift) =
+            (at / (rings.rings * rings.patches), at / rings.patches % rings.rings, at % rings.patches);
+        let target = rings.place(to, 0);
+        let (target_mm, normal) = (on_dome(dome, target), rings.face.normal(target));
+        for (i, j) in (0..SUB).flat_map(|i| (0..SUB).map(move |j| (i, j))) {
+            let [up, around] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(SUB));
+            let level = rings.face.level((from as f64 + up) / rings.rings as f64);
+            let source = rings.face.place(step * (shift as f64 + around), level);
+            let way = target_mm - on_dome(dome, source);
+            let square = way.length_squared();
+            if square > 1e-12 * dome.radius_mm() * dome.radius_mm() {
+                let cosines = normal.dot(way).max(0.0) * (-rings.face.normal(source).dot(way)).max(0.0);
+                *value += own_mm2 * cosines / (std::f64::consts::PI * square * square);
+            }
+        }
+    }
+}
+
+/// Places along each side of a patch.
+const SUB: u32 = 4;
+
 /// Irradiance at a point by way of the underside, for an exitance of one and an area of 1 mm^2 at the dome's
-/// point in the direction `source`; and the tangent of the way.
+/// place `source`; and the tangent of the way.
 fn mirrored(
     optics: &SensorOptics,
     source: DVec3,
@@ -195,9 +244,11 @@ fn mirrored(
     underside: Underside,
     near: f64,
 ) -> (f64, f64) {
-    let radius = optics.dome_radius_mm();
-    let Ok(tube) = optics.mirrored_tube(source * radius, point_mm, near) else { return (0.0, near) };
-    let cosines = (-source.dot(tube.leaving)).max(0.0) * normal.dot(tube.arriving).max(0.0);
+    let dome = optics.dome();
+    let (radius, source_mm) = (dome.rim_radius_mm(), on_dome(dome, source));
+    let Ok(tube) = optics.mirrored_tube(source_mm, point_mm, near) else { return (0.0, near) };
+    let cosines =
+        (-DomeFace::of(dome).normal(source).dot(tube.leaving)).max(0.0) * normal.dot(tube.arriving).max(0.0);
     let value = cosines * tube.sr_per_mm2 / std::f64::consts::PI;
     if underside == Underside::Perfect {
         return (value, tube.tangent);
@@ -205,7 +256,7 @@ fn mirrored(
     // Where it crosses the sheet's top, down and (for a point of the dome) up.
     let foot = |end: DVec3, along: DVec3| (end - along * (end.z / along.z)).truncate().length() <= radius;
     let up = point_mm.z <= 0.0 || foot(point_mm, tube.arriving);
-    if !(up && foot(source * radius, tube.leaving)) {
+    if !(up && foot(source_mm, tube.leaving)) {
         return (0.0, tube.tangent);
     }
     let channel = optics.channel();

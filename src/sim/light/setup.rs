@@ -156,14 +156,13 @@ pub fn sheet_half_mm(design: &Design) -> DVec2 {
 
 /// The membrane's reflectance, with the dots' share of the dome less bright: for the light in the dome as a whole.
 pub fn mean_reflectance(scene: &Scene) -> Channels {
-    let radius = scene.optics().dome_radius_mm();
     let printed: f64 = scene
         .layout()
         .dots
         .iter()
         .map(|dot| 0.25 * std::f64::consts::PI * dot.diameter_mm * dot.diameter_mm)
         .sum();
-    let share = (printed / (std::f64::consts::TAU * radius * radius)).min(1.0);
+    let share = (printed / scene.optics().dome().area_mm2()).min(1.0);
     let ink = scene.file().ink.reflectance;
     let bare = scene.design().sections().elastomer.membrane_reflectance.to_array();
     bare.map(|r| r * (1.0 - share + share * ink))

@@ -1,6 +1,6 @@
 //! Levels of the membrane and the white markers, from the light on them.
 
-use glam::{DVec3, Vec4};
+use glam::{DVec3, Vec3A, Vec4};
 
 use super::field::{FieldParts, LightField};
 use super::setup::{self, Channels};
@@ -48,6 +48,7 @@ pub fn predicted_evaluations(scene: &Scene) -> u64 {
 pub struct ShadedDome {
     field: LightField,
     per_mm: f32,
+    center_mm: Vec3A,
     /// Level for each mW/mm^2.
     gain: Vec4,
     stray: f32,
@@ -131,6 +132,7 @@ impl ShadedDome {
         });
         Ok(Some(Self {
             per_mm: (1.0 / scene.optics().dome_radius_mm()) as f32,
+            center_mm: scene.optics().dome().center_mm().as_vec3a(),
             field,
             gain: wide(gain),
             stray: light.stray_level as f32,
@@ -170,7 +172,7 @@ impl Shading for ShadedDome {
         let light = if sample.is_moved {
             self.field.moved(sample.point_mm, sample.normal)
         } else {
-            self.field.still(sample.point_mm * self.per_mm)
+            self.field.still((sample.point_mm - self.center_mm) * self.per_mm)
         };
         self.gain * light * self.passed(sample.to_camera.z) + Vec4::splat(self.stray)
     }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::cavity::Cavities;
 use super::direct::{DirectLight, Emitter, EmitterRule};
-use super::dome_map::{DomeGrid, bicubic};
+use super::dome_map::{DomeFace, DomeGrid, bicubic};
 use super::radiosity::{DomeRoom, Rings, Underside};
 use super::shelf::Shelf;
 use domecast_optics::SensorOptics;
@@ -69,16 +69,21 @@ impl Ways {
         self.optics[1].dome_radius_mm()
     }
 
-    /// A point of the dome or of a shell inside it.
-    pub fn point(&self, direction: DVec3, part: f64) -> DVec3 {
-        let point = direction * (self.radius_mm() * part);
+    /// The face of the dome.
+    pub fn face(&self) -> DomeFace {
+        DomeFace::of(self.optics[1].dome())
+    }
+
+    /// The point of a place of the dome, or of a shell inside it.
+    pub fn point(&self, place: DVec3, part: f64) -> DVec3 {
+        let point = self.optics[1].dome().center_mm() + place * (self.radius_mm() * part);
         // The rim of the dome is silicone, not the sheet's top beside it.
         point.with_z(point.z.max(1e-9 * self.radius_mm()))
     }
 
     /// Irradiance of the undeformed membrane by one source, for a flux of one.
-    pub fn still(&self, source: &Source, direction: DVec3, rule: &EmitterRule) -> f64 {
-        self.flux(source, self.point(direction, 1.0), rule).dot(direction).max(0.0)
+    pub fn still(&self, source: &Source, place: DVec3, rule: &EmitterRule) -> f64 {
+        self.flux(source, self.point(place, 1.0), rule).dot(self.face().normal(place)).max(0.0)
     }
 }
 
@@ -116,14 +121,18 @@ impl Prepared {
     /// The same on the shells inside it.
     pub fn shells(&self, ways: &Ways) -> &[Tables] {
         self.shells.get_or_init(|| {
-            SHELLS.iter().skip(1).map(|&part| tables(ways, part, DomeGrid::with_cells(SHELL_CELLS))).collect()
+            SHELLS
+                .iter()
+                .skip(1)
+                .map(|&part| tables(ways, part, DomeGrid::with_cells(SHELL_CELLS).over(ways.face())))
+                .collect()
         })
     }
 
     /// The dome as a room, for each channel.
     pub fn rooms(&self, ways: &Ways) -> &[DomeRoom] {
         let underside = if ways.fresnel { Underside::Fresnel } else { Underside::Dark };
-        let room = |optics| DomeRoom::new(optics, Rings::USUAL, underside);
+        let room = |optics| DomeRoom::new(optics, Rings::usual(ways.face()), underside);
         self.rooms.get_or_init(|| ways.optics.par_iter().map(room).collect())
     }
 }
@@ -136,10 +145,10 @@ pub fn prepared(key: &str) -> Arc<Prepared> {
 
 fn dome_tables(ways: &Ways) -> Tables {
     let rule = EmitterRule::default();
-    let made = tables(ways, 1.0, DomeGrid::with_cells(DOME_CELLS));
+    let made = tables(ways, 1.0, DomeGrid::with_cells(DOME_CELLS).over(ways.face()));
     let off = |(source, table): (&Source, &Vec<Node>)| {
         let probes = (0..PROBES).into_par_iter().map(|i| {
-            let direction = probe(i);
+            let direction = probe(ways.face(), i);
             let [.., found] = bicubic(&made.grid, table, made.grid.coordinates(direction));
             let exact = ways.still(source, direction, &rule);
             (exact, (found - exact).abs())
@@ -158,7 +167,7 @@ fn tables(ways: &Ways, part: f64, grid: DomeGrid) -> Tables {
     let fill = |source| {
         grid.fill_in_parallel(|direction| {
             let flux = ways.flux(source, ways.point(direction, part), &rule);
-            flux.extend(flux.dot(direction).max(0.0)).to_array()
+            flux.extend(flux.dot(grid.face.normal(direction)).max(0.0)).to_array()
         })
     };
     let sources = ways.sources.iter().map(fill).collect();
@@ -172,9 +181,8 @@ pub fn predicted_evaluations(shells: bool) -> u64 {
     PROBES as u64 + of(DOME_CELLS) + inside
 }
 
-/// Directions spread evenly over the hemisphere (a golden spiral), none of them a node of a table.
-fn probe(i: usize) -> DVec3 {
-    let z = (i as f64 + 0.5) / PROBES as f64;
-    let azimuth = i as f64 * 2.399_963_229_728_653;
-    (DVec2::from_angle(azimuth) * (1.0 - z * z).sqrt()).extend(z)
+/// Places spread evenly over the dome (a golden spiral), none of them a node of a table.
+fn probe(face: DomeFace, i: usize) -> DVec3 {
+    let z = face.level((i as f64 + 0.5) / PROBES as f64);
+    face.place(i as f64 * 2.399_963_229_728_653, z)
 }

@@ -1,3 +1,4 @@
+mod domes;
 mod mitsuba;
 mod tables;
 
@@ -9,7 +10,7 @@ use super::LightUse;
 use super::bounds;
 use super::cavity::Cavities;
 use super::direct::{DirectLight, Emitter, EmitterRule};
-use super::dome_map::{DomeGrid, bicubic, direction_from_disc, disc_from_direction};
+use super::dome_map::{DomeFace, DomeGrid, bicubic};
 use super::field::{FieldParts, LightField};
 use super::fresnel;
 use super::lobe::{Diffuser, Lobe};
@@ -42,7 +43,13 @@ fn sensor(sheet: &[f64], dome: f64) -> SensorOptics {
         pupil_shift_mm: Vec::new(),
     };
     let sensor_from_camera = Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0));
-    SensorOptics::new(&OpticsSpec { lens, sensor_from_camera, layers, dome_radius_mm: 10.0 }).unwrap()
+    SensorOptics::new(&OpticsSpec {
+        lens,
+        sensor_from_camera,
+        layers,
+        dome: domecast_optics::DomeShape::hemisphere(10.0),
+    })
+    .unwrap()
 }
 
 /// A square emitter at a place, facing a direction.
@@ -222,7 +229,7 @@ fn fresnel_splits_without_loss_and_stops_at_the_critical_angle() {
 fn a_dome_on_a_perfect_mirror_is_half_a_sphere() {
     // Without a sheet between, the mirrored dome closes the sphere: evenly lit, E_indirect = a / (1 - a) E.
     let optics = sensor(&[], 1.41);
-    let rings = Rings { rings: 20, patches: 48 };
+    let rings = Rings { rings: 20, patches: 48, ..Rings::USUAL };
     let room = DomeRoom::new(&optics, rings, Underside::Perfect);
     for albedo in [0.2, 0.6, 0.9] {
         let balance = room.solve(&vec![1.0; rings.count()], albedo);
@@ -259,7 +266,7 @@ fn interreflection_makes_no_light() {
     // Half straight; of the other half, 1 - 1/n^2 = 0.498 lies beyond the critical angle and returns, less what
     // escapes beside the dome's foot; of the rest a few percent.
     assert!(share > 0.65 && share < 0.5 + 0.5 * (0.499 + 0.05), "{share}");
-    let finer = Rings { rings: 32, patches: 80 };
+    let finer = Rings { rings: 32, patches: 80, ..Rings::USUAL };
     let fine = DomeRoom::new(&optics, finer, Underside::Fresnel).irradiance(&vec![1.0; finer.count()]);
     let fine_share = fine.iter().sum::<f64>() / fine.len() as f64;
     assert!((share / fine_share - 1.0).abs() < 3e-3, "{share} {fine_share}");
@@ -276,9 +283,9 @@ fn interreflection_makes_no_light() {
 #[test]
 fn the_map_of_the_dome_goes_both_ways_and_keeps_areas() {
     for direction in directions(300) {
-        let disc = disc_from_direction(direction);
+        let disc = DomeFace::HEMISPHERE.disc(direction);
         assert!(disc.length() <= 1.0);
-        assert!((direction_from_disc(disc) - direction).length() < 1e-12);
+        assert!((DomeFace::HEMISPHERE.place_of_disc(disc) - direction).length() < 1e-12);
         // half of the disc's area lies above the half of the hemisphere's
         assert!((disc.length_squared() - (1.0 - direction.z)).abs() < 1e-12);
     }

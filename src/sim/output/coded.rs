@@ -9,6 +9,7 @@ use crate::output::truth::FrameTruth;
 use crate::raster::frame::Image8;
 use crate::scene::Scene;
 use crate::work::Work;
+use domecast_optics::DomeShape;
 
 /// Quality of the video's JPEGs: the PNG frames are the exact ones.
 const QUALITY: u8 = 92;
@@ -94,7 +95,7 @@ fn extras(scene: &Scene, drawn: &Drawn) -> tiff::TiffResult<Vec<(String, Vec<u8>
     if wanted.heights {
         let heights = match &drawn.contact {
             Some(contact) => contact.height_map_mm(radius_mm, HEIGHT_SIDE as usize),
-            None => still_heights_mm(radius_mm, HEIGHT_SIDE as usize),
+            None => still_heights_mm(scene.optics().dome(), HEIGHT_SIDE as usize),
         };
         files.push((format!("heights_{number:04}.tif"), float_tiff(&heights, HEIGHT_SIDE)?));
     }
@@ -124,11 +125,16 @@ fn pressure_json(drawn: &Drawn) -> String {
     format!("{text}\n")
 }
 
-/// Heights of the undeformed dome on the raster of [`domecast_contact::ContactState::height_map_mm`].
-fn still_heights_mm(radius_mm: f64, side: usize) -> Vec<f64> {
-    let at = |i: usize| ((2 * i + 1) as f64 / side as f64 - 1.0) * radius_mm;
-    let height =
-        |k: usize| (radius_mm * radius_mm - at(k % side).powi(2) - at(k / side).powi(2)).max(0.0).sqrt();
+/// Heights of the undeformed dome on the raster of [`domecast_contact::ContactState::height_map_mm`], which reaches from
+/// rim to rim; zero beside the dome.
+fn still_heights_mm(dome: &DomeShape, side: usize) -> Vec<f64> {
+    let (radius_mm, rim_mm) = (dome.radius_mm(), dome.rim_radius_mm());
+    let at = |i: usize| ((2 * i + 1) as f64 / side as f64 - 1.0) * rim_mm;
+    let height = |k: usize| {
+        let (x, y) = (at(k % side), at(k / side));
+        let above = (radius_mm * radius_mm - x.powi(2) - y.powi(2)).max(0.0).sqrt();
+        if x.hypot(y) < rim_mm { (dome.center_z_mm() + above).max(0.0) } else { 0.0 }
+    };
     (0..side * side).map(height).collect()
 }
 

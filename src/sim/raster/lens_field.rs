@@ -143,7 +143,7 @@ pub fn inside(field: Range<usize>, x: usize, part: &[f32]) -> (Range<usize>, &[f
 
 /// The dome's rim in the image, px. Where the lens does not see it, the polygon runs outside the lens's field.
 pub fn rim_polygon(optics: &SensorOptics) -> Vec<DVec2> {
-    let radius = optics.dome_radius_mm();
+    let radius = optics.dome().rim_radius_mm();
     let lens = optics.lens();
     let [[_, _, cx], [_, _, cy], _] = lens.spec().matrix;
     let center = DVec2::new(cx, cy);

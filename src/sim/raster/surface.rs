@@ -84,7 +84,8 @@ impl<'a> ShadedSurface<'a> {
         let seen = self.at(y)?;
         let (place_mm, inside) = seen.optics.follow_continued(ray).ok()?;
         let (rest_mm, inside) = (place_mm.as_vec3a(), inside.as_vec3a());
-        let normal = rest_mm * (1.0 / seen.optics.dome_radius_mm() as f32);
+        let dome = seen.optics.dome();
+        let normal = dome.outward_mm(place_mm).as_vec3a() * (1.0 / dome.radius_mm() as f32);
         let mut sample = SurfaceSample { point_mm: rest_mm, normal, to_camera: -inside, is_moved: false };
         if let Some(map) = seen.map {
             // Where a ray may meet the membrane more than once, what it shows may not depend on a neighbour.

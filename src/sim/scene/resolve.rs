@@ -67,6 +67,7 @@ fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimE
     if design.is_rigid() {
         check_rigid(&file)?;
     }
+    check_dome(&file, &design)?;
     let suspension = if design.is_rigid() { None } else { Some(suspension_of(&design)?) };
     let mut dots: Vec<SceneDot> = layout.dots.iter().map(|dot| scene_dot(dot, design.optics())).collect();
     for (index, broken) in file.ink.broken.iter().enumerate() {
@@ -107,7 +108,7 @@ fn scene_dot(dot: &Dot, optics: &SensorOptics) -> SceneDot {
     let pieces = dot.image_outline.pieces().len().max(1);
     let fine = dot.image_outline.polygon((RIM_POINTS / pieces).max(1) as u32);
     let mut rim_mm = [dot.surface_mm; RIM_POINTS];
-    let radius_mm = 0.5 * dot.diameter_mm;
+    let (radius_mm, center_mm) = (0.5 * dot.diameter_mm, optics.dome().center_mm());
     let side = if dot.normal.z.abs() < 0.9 { DVec3::Z.cross(dot.normal) } else { DVec3::X.cross(dot.normal) };
     let side = side.normalize_or_zero();
     let up = dot.normal.cross(side);
@@ -117,7 +118,10 @@ fn scene_dot(dot: &Dot, optics: &SensorOptics) -> SceneDot {
         let seen = fine.get(k).filter(|_| fine.len() == RIM_POINTS).and_then(|px| optics.trace(*px).ok());
         let (sin, cos) = (std::f64::consts::TAU * k as f64 / RIM_POINTS as f64).sin_cos();
         let flat = dot.surface_mm + (side * cos + up * sin) * radius_mm;
-        *place = seen.map_or(flat.normalize_or_zero() * optics.dome_radius_mm(), |hit| hit.surface_mm);
+        *place = seen
+            .map_or(center_mm + (flat - center_mm).normalize_or_zero() * optics.dome_radius_mm(), |hit| {
+                hit.surface_mm
+            });
     }
     SceneDot { id: dot.id, center_mm: dot.surface_mm, rim_mm, cut: None }
 }
@@ -174,6 +178,18 @@ fn check_rigid(file: &SceneFile) -> Result<(), DesignError> {
         return fault("objects", "contact is computed on springs only");
     }
     Ok(())
+}
+
+/// Contact is computed on a hemisphere only.
+fn check_dome(file: &SceneFile, design: &Design) -> Result<(), DesignError> {
+    let dome = design.optics().dome();
+    if dome.is_hemisphere() || file.objects.is_empty() {
+        return Ok(());
+    }
+    let problem =
+        format!("scene objects: the dome is {}, contact is computed on a hemisphere only", dome.kind());
+    let allowed = "a scene without objects, or a design whose dome is a hemisphere";
+    Err(DesignError::at("objects", "", problem, allowed))
 }
 
 /// Every load of the scene has a place inside the envelope; coils that bind are a matter of the frame.

@@ -1,5 +1,6 @@
 //! The pattern in the image, its dots on the dome, and the print passes.
 
+mod domes;
 mod outlines;
 mod refused;
 mod under_load;
@@ -39,7 +40,7 @@ fn optics(model: LensModel, pupil_mm: DVec3, rotation: DMat3) -> SensorOptics {
         },
         sensor_from_camera: Rigid::new(rotation, pupil_mm),
         layers: vec![layer("acrylic", 1.491, Some(1.0)), layer("silicone", 1.41, None)],
-        dome_radius_mm: 10.0,
+        dome: domecast_optics::DomeShape::hemisphere(10.0),
     })
     .unwrap()
 }
@@ -233,9 +234,9 @@ fn print_passes_are_few_and_reach_everything() {
         let own = 0.03;
         let reach = limit_deg.to_radians() - own;
         let reached = |count: usize, tilt: f64| {
-            let axis = region::dome_point(1.0, tilt, 0.0);
+            let axis = region::sphere_point(1.0, tilt, 0.0);
             [reach, 75f64.to_radians() - own].iter().all(|polar| {
-                let between = region::dome_point(1.0, *polar, std::f64::consts::PI / count as f64);
+                let between = region::sphere_point(1.0, *polar, std::f64::consts::PI / count as f64);
                 axis.angle_between(between) <= reach
             })
         };
@@ -245,10 +246,10 @@ fn print_passes_are_few_and_reach_everything() {
     }
     // The stroke's axis, in the pass's frame, is its +z; the azimuth keeps its direction.
     let pass = PrintPass::new(0.7, 2.0);
-    let axis = region::dome_point(1.0, 0.7, 2.0);
+    let axis = region::sphere_point(1.0, 0.7, 2.0);
     assert!((pass.pass_from_sensor * axis - DVec3::Z).length() < 1e-15);
-    let further = pass.pass_from_sensor * region::dome_point(1.0, 0.9, 2.0);
-    assert!((further - region::dome_point(1.0, 0.2, 2.0)).length() < 1e-15);
+    let further = pass.pass_from_sensor * region::sphere_point(1.0, 0.9, 2.0);
+    assert!((further - region::sphere_point(1.0, 0.2, 2.0)).length() < 1e-15);
 }
 
 #[test]

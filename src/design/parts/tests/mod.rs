@@ -1,5 +1,6 @@
 mod boards;
 mod checks;
+mod domes;
 mod exactness;
 mod mechanism;
 mod random_designs;

@@ -2,7 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::geometry::{depth_for_mm, depth_mm, lens, marks_angle_rad, press_mm, sheet_mm, usable_angle_rad};
+use super::geometry::{
+    depth_for_mm, depth_mm, lens, marks_angle_rad, press_mm, rim_mm, sheet_mm, usable_angle_rad,
+};
 use super::known::{Known, up};
 use super::rule::{Rule, fixed, follows};
 use domecast_optics::camera::Lens;
@@ -65,12 +67,12 @@ pub(super) const BODY: &[Rule] = &[
     }),
     follows(
         "white_markers.diameter_mm",
-        "8 % of the dome's radius, at least 0.8 mm and the smallest hole",
-        |k| k.number((0.08 * k.n("dome.radius_mm")).max(0.8).max(k.n("process.min_hole_diameter_mm"))),
+        "8 % of the rim's radius, at least 0.8 mm and the smallest hole",
+        |k| k.number((0.08 * rim_mm(k)).max(0.8).max(k.n("process.min_hole_diameter_mm"))),
     ),
     follows(
         "white_markers.positions_mm",
-        "four on the diagonals, 0.2 mm outside the dome's rim: (R + 0.2 + d/2) / sqrt 2",
+        "four on the diagonals, 0.2 mm outside the dome's rim: (r + 0.2 + d/2) / sqrt 2",
         markers,
     ),
     fixed("white_markers.reflectance", "0.9", "usual for white paint"),
@@ -114,7 +116,7 @@ fn field_of_view(k: &Known<'_>) -> Option<Value> {
 }
 
 fn layers(k: &Known<'_>) -> Option<Value> {
-    let thickness_mm = up(k.n("dome.radius_mm") / 12.5, 1.0).max(1.0);
+    let thickness_mm = up(rim_mm(k) / 12.5, 1.0).max(1.0);
     Some(json!([
         { "name": "acrylic", "index": { "r": 1.489, "g": 1.494, "b": 1.5015 }, "thickness_mm": thickness_mm },
         { "name": "silicone", "index": { "r": 1.409, "g": 1.412, "b": 1.417 } }
@@ -122,7 +124,7 @@ fn layers(k: &Known<'_>) -> Option<Value> {
 }
 
 fn markers(k: &Known<'_>) -> Option<Value> {
-    let off_axis = k.n("dome.radius_mm") + 0.2 + 0.5 * k.n("white_markers.diameter_mm");
+    let off_axis = rim_mm(k) + 0.2 + 0.5 * k.n("white_markers.diameter_mm");
     let side = up(off_axis / 2f64.sqrt(), 0.01);
     k.places(&[[side, side], [-side, side], [-side, -side], [side, -side]])
 }

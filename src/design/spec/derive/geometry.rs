@@ -3,8 +3,9 @@
 use std::f64::consts::PI;
 
 use super::super::lens::lens_spec;
-use super::super::sections::CameraSection;
+use super::super::sections::{CameraSection, DomeSection};
 use super::known::Known;
+use domecast_optics::DomeShape;
 use domecast_optics::camera::Lens;
 use glam::{DVec2, DVec3};
 
@@ -70,7 +71,7 @@ pub(super) fn marks_mm(k: &Known<'_>) -> f64 {
         .flatten()
         .filter_map(|place| Some(place.get(0)?.as_f64()?.hypot(place.get(1)?.as_f64()?)))
         .fold(0.0, f64::max);
-    (far + 0.5 * k.n("white_markers.diameter_mm")).max(k.n("dome.radius_mm"))
+    (far + 0.5 * k.n("white_markers.diameter_mm")).max(rim_mm(k))
 }
 
 /// How far the claimed loads press the platform down, with what they tilt it by, mm.
@@ -167,7 +168,24 @@ pub(super) fn spring_from_light_rad(k: &Known<'_>, count: usize, first_deg: f64)
     off.fold(180.0 / count.max(1) as f64, f64::min).to_radians()
 }
 
-/// The pixel and its slope of a place on the dome, for a camera that stands straight below.
-pub(super) fn dome_place(radius_mm: f64, polar_rad: f64, azimuth_rad: f64) -> DVec3 {
+/// A place on the sphere about its centre, mm.
+pub(super) fn sphere_place(radius_mm: f64, polar_rad: f64, azimuth_rad: f64) -> DVec3 {
     (radius_mm * polar_rad.sin() * DVec2::from_angle(azimuth_rad)).extend(radius_mm * polar_rad.cos())
+}
+
+/// The dome's outer face.
+pub(super) fn dome(k: &Known<'_>) -> DomeShape {
+    let optional = |field: &str| k.value(field).and_then(serde_json::Value::as_f64);
+    DomeSection {
+        radius_mm: k.n("dome.radius_mm"),
+        rim_angle_deg: optional("dome.rim_angle_deg"),
+        cylinder_height_mm: optional("dome.cylinder_height_mm"),
+        why: None,
+    }
+    .shape()
+}
+
+/// Radius of the circle in which the dome meets the sheet, mm.
+pub(super) fn rim_mm(k: &Known<'_>) -> f64 {
+    dome(k).rim_radius_mm()
 }

@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::geometry::rim_mm;
 use super::known::Known;
 use super::rule::{Rule, fixed, follows};
 
@@ -38,19 +39,25 @@ pub(super) const TOOLS: &[Rule] = &[
     fixed("mould.pins.chamfer_mm", "0.4", "so that the pins find their holes"),
     follows(
         "mould.pins.at_mm",
-        "three corners of four, R + 2.5 mm along x and y: the halves close one way only",
+        "three corners of four, the rim's radius + 2.5 mm along x and y: the halves close one way only",
         |k| {
-            let side = k.n("dome.radius_mm") + 2.5;
+            let side = rim_mm(k) + 2.5;
             k.places(&[[side, side], [-side, side], [-side, -side]])
         },
     ),
-    follows("mould.fill.diameter_mm", "0.3 R, from the smallest hole (at least 1.2 mm) to 3 mm", |k| {
-        let narrowest = k.n("process.min_hole_diameter_mm").max(1.2);
-        k.number((0.3 * k.n("dome.radius_mm")).min(3.0).max(narrowest))
-    }),
-    follows("mould.fill.radius_mm", "off the axis, 0.6 R, where the scar is bonded to the sheet", |k| {
-        k.number(0.6 * k.n("dome.radius_mm"))
-    }),
+    follows(
+        "mould.fill.diameter_mm",
+        "0.3 of the rim's radius, from the smallest hole (at least 1.2 mm) to 3 mm",
+        |k| {
+            let narrowest = k.n("process.min_hole_diameter_mm").max(1.2);
+            k.number((0.3 * rim_mm(k)).min(3.0).max(narrowest))
+        },
+    ),
+    follows(
+        "mould.fill.radius_mm",
+        "off the axis by 0.6 of the rim's radius, where the scar is bonded to the sheet",
+        |k| k.number(0.6 * rim_mm(k)),
+    ),
     fixed("mould.fill.azimuth_deg", "0", "between two vents"),
     follows("mould.fill.funnel_diameter_mm", "twice the fill hole", |k| {
         k.number(2.0 * k.n("mould.fill.diameter_mm"))
@@ -59,8 +66,8 @@ pub(super) const TOOLS: &[Rule] = &[
         k.number((0.5 * k.n("mould.base_thickness_mm")).min(2.0))
     }),
     fixed("mould.vents.count", "4", "at the rim, the highest line of the cavity when it is filled"),
-    follows("mould.vents.diameter_mm", "0.1 R, from the smallest hole to 1 mm", |k| {
-        k.number((0.1 * k.n("dome.radius_mm")).min(1.0).max(k.n("process.min_hole_diameter_mm")))
+    follows("mould.vents.diameter_mm", "0.1 of the rim's radius, from the smallest hole to 1 mm", |k| {
+        k.number((0.1 * rim_mm(k)).min(1.0).max(k.n("process.min_hole_diameter_mm")))
     }),
     fixed("mould.vents.inset_mm", "0.1", "just inside the rim"),
     fixed("mould.vents.first_azimuth_deg", "45", "clear of the fill hole"),

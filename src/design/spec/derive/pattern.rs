@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::super::resolve::optics;
 use super::super::sections::{CameraSection, DomeSection, OpticsSection};
-use super::geometry::dome_place;
+use super::geometry::{dome, sphere_place};
 use super::known::{Known, down, up};
 use super::rule::{Rule, fixed, follows};
 use domecast_optics::SensorOptics;
@@ -31,8 +31,9 @@ pub(super) const RULES: &[Rule] = &[
     fixed("print.pad_over_image", "1.3", "pads are taken 20 to 30 percent larger than the image"),
     fixed("print.dpi", "2400", "usual for pad-print films"),
     fixed("pattern.kind", "\"hexagonal\"", "the most dots for a distance"),
-    follows("pattern.polar_angle_deg", "60 degrees, or 5 less than the wrap limit", |k| {
-        let angle = (k.n("print.wrap_limit_deg") - 5.0).clamp(5.0, 60.0);
+    follows("pattern.polar_angle_deg", "60 degrees, or 5 less than the wrap limit, or a cap's rim", |k| {
+        let rim_deg = k.value("dome.rim_angle_deg").and_then(Value::as_f64).unwrap_or(90.0);
+        let angle = (k.n("print.wrap_limit_deg") - 5.0).clamp(5.0, 60.0).min(rim_deg);
         if k.has("pattern.image_radius_px") { None } else { k.number(angle) }
     }),
     follows(
@@ -66,10 +67,10 @@ fn region(k: &Known<'_>) -> Option<Region> {
     const AROUND: u32 = 16;
     const RINGS: u32 = 6;
     let optics = sensor(k)?;
-    let radius_mm = k.n("dome.radius_mm");
+    let shape = dome(k);
     let asked = k.value("pattern.polar_angle_deg").and_then(Value::as_f64);
-    let polar = asked.unwrap_or(60.0).clamp(1.0, 89.0).to_radians();
-    let pole = match optics.project(dome_place(radius_mm, 0.0, 0.0)) {
+    let polar = asked.unwrap_or(60.0).clamp(1.0, 89.0).to_radians().min(shape.sphere_end_rad());
+    let pole = match optics.project(shape.center_mm() + sphere_place(shape.radius_mm(), 0.0, 0.0)) {
         Ok(pole) => pole,
         Err(limit) => {
             k.wrong(format!("the dome's pole is not seen: {limit}"));
@@ -81,8 +82,9 @@ fn region(k: &Known<'_>) -> Option<Region> {
         for turn in 0..AROUND {
             let azimuth = std::f64::consts::TAU * f64::from(turn) / f64::from(AROUND);
             let at = polar * f64::from(ring) / f64::from(RINGS);
-            let point = dome_place(radius_mm, at, azimuth);
-            let Ok((pixel, slope)) = optics.project_with_jacobian(point) else { continue };
+            let point = sphere_place(shape.radius_mm(), at, azimuth);
+            let place = optics.project_with_jacobian(shape.center_mm() + point);
+            let Ok((pixel, slope)) = place else { continue };
             // the plate shows the dome from above: a step on it is a step on the dome with its height
             let fall = -point.truncate() / point.z.max(1e-6);
             let by_plate = slope * Matrix3x2::new(1.0, 0.0, 0.0, 1.0, fall.x, fall.y);

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::geometry::{
-    back_mm, bore_mm, depth_mm, lower_top_mm, pocket_mm, sheet_mm, tilt, view_mm, wall_mm,
+    back_mm, bore_mm, depth_mm, dome, lower_top_mm, pocket_mm, rim_mm, sheet_mm, tilt, view_mm, wall_mm,
 };
 use super::known::{Known, down, up};
 use super::room::{HOLE_IN_RECESS_MM, half_mm, ring_count, ring_mm, spring_count, springs_reach_mm};
@@ -23,9 +23,9 @@ pub(super) const LIGHTS: &[Rule] = &[
     ),
     follows(
         "leds.radiant_flux_mw",
-        "as much for each area of the dome, 20 (R / 10)^2 mW of each colour",
+        "as much for each area of the dome, 20 (R / 10) (height / 10) mW of each colour",
         |k| {
-            let each = super::known::tidy(20.0 * (0.1 * k.n("dome.radius_mm")).powi(2));
+            let each = super::known::tidy(20.0 * (0.1 * k.n("dome.radius_mm") * (0.1 * dome(k).height_mm())));
             Some(json!({ "r": each, "g": each, "b": each }))
         },
     ),
@@ -48,13 +48,10 @@ pub(super) const LIGHTS: &[Rule] = &[
     }),
     follows(
         "leds.board_mm",
-        "0.44 R wide, from the package and 0.4 mm to 4.4 mm; as high as the package",
+        "0.44 of the rim's radius wide, from the package and 0.4 mm to 4.4 mm; as high as the package",
         |k| {
             let package = k.at("leds.package_mm", 0);
-            k.numbers(&[
-                (0.44 * k.n("dome.radius_mm")).min(4.4).max(package + 0.4),
-                k.at("leds.package_mm", 1),
-            ])
+            k.numbers(&[(0.44 * rim_mm(k)).min(4.4).max(package + 0.4), k.at("leds.package_mm", 1)])
         },
     ),
     fixed("leds.board_thickness_mm", "0.8", "a thin board"),
@@ -168,7 +165,7 @@ pub(super) const OUTLINE: &[Rule] = &[
     }),
     follows("envelope.size_mm", "what the sensor takes, rounded up to a tenth", |k| {
         let bottom = k.n("platforms.lower.underside_z_mm").min(back_mm(k));
-        let height = k.n("dome.radius_mm") + k.n("elastomer.membrane_thickness_mm") - bottom;
+        let height = dome(k).height_mm() + k.n("elastomer.membrane_thickness_mm") - bottom;
         k.numbers(&[
             up(k.at("platforms.outer_mm", 0), 0.1),
             up(k.at("platforms.outer_mm", 1), 0.1),
@@ -192,7 +189,7 @@ fn sheet_size(k: &Known<'_>) -> Option<Value> {
     let lights = k.n("leds.center_radius_mm") + 0.25 - gap;
     let springs = if k.has("springs.places") { springs_reach_mm(k) } else { ring_mm(k, ring_count(k)) };
     let holes = springs + 0.5 * k.n("magnet_pockets.push_out_diameter_mm") + HOLE_IN_RECESS_MM - gap;
-    let half = (k.n("dome.radius_mm") + 0.8).max(markers).max(lights).max(holes);
+    let half = (rim_mm(k) + 0.8).max(markers).max(lights).max(holes);
     let side = up(2.0 * half, 0.1);
     k.numbers(&[side, side])
 }

@@ -67,17 +67,26 @@ fn claims(k: &Known<'_>) -> Option<Value> {
     if k.value("mount.kind").is_some_and(|kind| kind == "rigid") {
         return Some(Value::Array(Vec::new()));
     }
-    let radius = k.n("dome.radius_mm");
+    let dome = super::geometry::dome(k);
+    let (radius, height) = (dome.rim_radius_mm(), dome.height_mm());
+    // the press off centre acts half-way to the rim
+    let (off_axis, off_height) = if dome.center_z_mm() < 0.0 {
+        let above = (dome.radius_mm().powi(2) - 0.25 * radius * radius).sqrt();
+        (0.5 * radius, dome.center_z_mm() + above)
+    } else {
+        (0.5 * radius, 0.866 * radius + dome.center_z_mm())
+    };
+    let (off_axis, off_height) = (super::known::tidy(off_axis), super::known::tidy(off_height));
     let of = |share: f64| super::known::tidy(share * radius);
     // the push tilts too, which adds to what the spring at the end has to hold
     let push = of(0.05).min(super::known::tidy(0.85 * k.n("magnets.grip_force_n")));
     Some(json!([
-        { "name": "press", "force_n": [0, 0, -of(1.7)], "point_mm": [0, 0, radius] },
-        { "name": "press off centre", "force_n": [0, 0, -of(0.5)], "point_mm": [of(0.5), 0, of(0.866)] },
-        { "name": "push along x", "force_n": [push, 0, 0], "point_mm": [0, 0, radius] },
-        { "name": "push along y", "force_n": [0, push, 0], "point_mm": [0, 0, radius] },
-        { "name": "press and push", "force_n": [of(0.08), 0, -of(0.8)], "point_mm": [0, 0, radius] },
-        { "name": "twist", "force_n": [0, 0, -of(0.2)], "moment_nmm": [0, 0, of(0.5)], "point_mm": [0, 0, radius] }
+        { "name": "press", "force_n": [0, 0, -of(1.7)], "point_mm": [0, 0, height] },
+        { "name": "press off centre", "force_n": [0, 0, -of(0.5)], "point_mm": [off_axis, 0, off_height] },
+        { "name": "push along x", "force_n": [push, 0, 0], "point_mm": [0, 0, height] },
+        { "name": "push along y", "force_n": [0, push, 0], "point_mm": [0, 0, height] },
+        { "name": "press and push", "force_n": [of(0.08), 0, -of(0.8)], "point_mm": [0, 0, height] },
+        { "name": "twist", "force_n": [0, 0, -of(0.2)], "moment_nmm": [0, 0, of(0.5)], "point_mm": [0, 0, height] }
     ]))
 }
 

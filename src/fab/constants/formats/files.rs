@@ -6,7 +6,7 @@ use super::kalibr::kalibr_yaml;
 use super::mass::{MassProperties, mass_of_mesh};
 use super::mjcf::mjcf;
 use super::opencv::opencv_yaml;
-use super::robot::{BodyPart, Robot, urdf};
+use super::robot::{BodyPart, DOME_MESH, Robot, dome_obj, urdf};
 use super::ros::camera_info_yaml;
 use domecast_design::Design;
 use domecast_design::parts::Part;
@@ -35,6 +35,10 @@ pub fn format_files(design: &Design, constants: &Constants, parts: &[Part]) -> F
         Some(robot) => {
             made.files.push(("constants/sensor.urdf".into(), urdf(constants, &robot)));
             made.files.push(("constants/sensor.xml".into(), mjcf(constants, &robot)));
+            let dome = constants.optics.dome();
+            if !dome.is_hemisphere() {
+                made.files.push((format!("constants/{DOME_MESH}"), dome_obj(&dome)));
+            }
         }
         None => made.left_out.push("constants/sensor.urdf: the platforms are not among the parts".into()),
     }
@@ -47,7 +51,7 @@ fn robot_of(design: &Design, parts: &[Part]) -> Option<Robot> {
     let (upper, lower) = (named("upper_platform")?, named("lower_platform")?);
     let sections = design.sections();
     let sheet = mass_of_sheet(design);
-    let dome = MassProperties::hemisphere(sections.dome.radius_mm, sections.elastomer.density_g_per_cm3);
+    let dome = MassProperties::dome(&sections.dome.shape(), sections.elastomer.density_g_per_cm3);
     let print = |part: &Part| mass_of_mesh(&part.mesh, sections.process.density_g_per_cm3);
     let body = |part: &Part, mass: MassProperties| BodyPart {
         name: part.name.clone(),

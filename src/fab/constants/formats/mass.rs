@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use domecast_mesh::TriMesh;
+use domecast_optics::DomeShape;
 
 /// Mass, centre of mass and inertia of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +50,33 @@ impl MassProperties {
         let center = 0.375 * radius_mm;
         let side = mass_kg * radius_mm * radius_mm / 5.0;
         let second = DVec3::new(side, side, side - mass_kg * center * center);
+        Self::from_moments(mass_kg, DVec3::new(0.0, 0.0, center), DMat3::from_diagonal(second))
+    }
+
+    /// A solid dome on the plane z = 0.
+    pub fn dome(shape: &DomeShape, density_g_cm3: f64) -> Self {
+        if shape.is_hemisphere() {
+            return Self::hemisphere(shape.radius_mm(), density_g_cm3);
+        }
+        let (radius, center_z) = (shape.radius_mm(), shape.center_z_mm());
+        // Slices are discs: their squared radius is a polynomial of the height, of degree 2 at most in a piece, and so
+        // three Gaussian places give the second moments of a piece exactly.
+        let (mut second_z, mut second_r) = (0.0, 0.0);
+        for (low, high) in [(0.0, center_z.max(0.0)), (center_z.max(0.0), shape.height_mm())] {
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+            for (place, weight) in [(-(0.6_f64.sqrt()), 5.0), (0.0, 8.0), (0.6_f64.sqrt(), 5.0)] {
+                let z = middle + half * place;
+                let above = if center_z > 0.0 { (z - center_z).max(0.0) } else { z - center_z };
+                let square = radius * radius - above * above;
+                let slice = std::f64::consts::PI * square * (half * weight / 9.0);
+                second_z += slice * z * z;
+                second_r += slice * 0.25 * square;
+            }
+        }
+        let density = density_g_cm3 * 1e-6;
+        let (mass_kg, center) = (density * shape.volume_mm3(), shape.centroid_z_mm());
+        let (side, up) = (density * second_r, density * second_z - mass_kg * center * center);
+        let second = DVec3::new(side, side, up);
         Self::from_moments(mass_kg, DVec3::new(0.0, 0.0, center), DMat3::from_diagonal(second))
     }
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use nalgebra::Matrix6;
 
 use super::number::number;
-use super::robot::{BodyPart, Robot, triple};
+use super::robot::{BodyPart, DOME_MESH, Robot, triple};
 use domecast_runtime::constants::{Constants, matrix_of};
 
 /// Names of the joints, in the order of a displacement.
@@ -70,15 +70,16 @@ pub fn mjcf(constants: &Constants, robot: &Robot) -> String {
         joints.clear();
     }
     let tendons = tendons(&springs);
+    let (dome_mesh, dome_geometry) = dome_of(constants);
     format!(
         "<mujoco model=\"{name}\">\n  <!-- {note} -->\n  <compiler angle=\"radian\" meshdir=\".\"/>\n  <option \
          timestep=\"0.0001\" integrator=\"implicitfast\"/>\n  <asset>\n    <mesh name=\"lower\" \
          file=\"{lower_mesh}\" scale=\"0.001 0.001 0.001\"/>\n    <mesh name=\"upper\" file=\"{upper_mesh}\" \
-         scale=\"0.001 0.001 0.001\"/>\n  </asset>\n  <worldbody>\n    <body name=\"base\">\n      \
+         scale=\"0.001 0.001 0.001\"/>\n{dome_mesh}  </asset>\n  <worldbody>\n    <body name=\"base\">\n      \
          {lower_inertia}\n      <geom type=\"mesh\" mesh=\"lower\" pos=\"{back}\" contype=\"0\" \
          conaffinity=\"0\" group=\"2\"/>\n      <body name=\"sensor\" pos=\"{back}\">\n{joints}        \
          {upper_inertia}\n        <geom type=\"mesh\" mesh=\"upper\" contype=\"0\" conaffinity=\"0\" \
-         group=\"2\"/>\n        <geom name=\"dome\" type=\"sphere\" size=\"{radius}\" group=\"3\"/>\n        \
+         group=\"2\"/>\n        <geom name=\"dome\" {dome} group=\"3\"/>\n        \
          <site name=\"wrench\" pos=\"{at}\"/>\n      </body>\n    </body>\n  </worldbody>\n{tendons}  <sensor>\n    \
          <force name=\"force\" site=\"wrench\"/>\n    <torque name=\"torque\" site=\"wrench\"/>\n    <framepos \
          name=\"position\" objtype=\"site\" objname=\"wrench\"/>\n  </sensor>\n</mujoco>\n",
@@ -88,9 +89,19 @@ pub fn mjcf(constants: &Constants, robot: &Robot) -> String {
         lower_inertia = inertial(&robot.lower, mount),
         upper_inertia = inertial(&robot.upper, DVec3::ZERO),
         back = triple(-mount),
-        radius = number(constants.optics.dome_radius_mm * 1e-3),
+        dome = dome_geometry,
         at = triple(at),
     )
+}
+
+/// The dome's asset, and what its geom says: a sphere for a hemisphere, else a mesh.
+fn dome_of(constants: &Constants) -> (String, String) {
+    let shape = constants.optics.dome();
+    if shape.is_hemisphere() {
+        return (String::new(), format!("type=\"sphere\" size=\"{}\"", number(shape.radius_mm() * 1e-3)));
+    }
+    let mesh = format!("    <mesh name=\"dome\" file=\"{DOME_MESH}\" scale=\"0.001 0.001 0.001\"/>\n");
+    (mesh, "type=\"mesh\" mesh=\"dome\"".to_owned())
 }
 
 /// The fixed tendons that carry the 6x6.

@@ -41,12 +41,69 @@ mod tests {
     use domecast_design::calibration::{CalibrationHints, CameraCalibration};
     use domecast_design::layout::Layout;
     use domecast_mesh::TriMesh;
+    use domecast_optics::DomeShape;
     use domecast_runtime::constants::Constants;
 
     fn of(name: &str) -> Constants {
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs").join(name);
         let design = domecast_design::Design::load(&path).unwrap();
         constants::of(&design, &Layout::of_design(&design).unwrap()).unwrap()
+    }
+
+    /// A mesh of triangles from the OBJ of a dome.
+    fn mesh_of(obj: &str) -> TriMesh {
+        let mut mesh = TriMesh::default();
+        for line in obj.lines() {
+            let words: Vec<&str> = line.split(' ').collect();
+            let number = |k: usize| words[k].parse::<f64>().unwrap();
+            let corner = |k: usize| words[k].parse::<u32>().unwrap() - 1;
+            match words[0] {
+                "v" => mesh.vertices_mm.push(DVec3::new(number(1), number(2), number(3))),
+                "f" => {
+                    for k in 2..words.len() - 1 {
+                        mesh.triangles.push([corner(1), corner(k), corner(k + 1)]);
+                    }
+                }
+                _ => {}
+            }
+        }
+        mesh
+    }
+
+    #[test]
+    fn domes_weigh_what_their_meshes_do() {
+        for dome in [
+            DomeShape::cap(11.5, 60_f64.to_radians()),
+            DomeShape::cap(20.0, 20_f64.to_radians()),
+            DomeShape::hemisphere(10.0),
+            DomeShape::on_cylinder(6.0, 5.0),
+        ] {
+            // The mesh's corners lie on the face: it is smaller by the chords, a part of (pi / 64)^2 and (end / 16)^2.
+            let (exact, found) =
+                (MassProperties::dome(&dome, 1.1), mass_of_mesh(&mesh_of(&robot::dome_obj(&dome)), 1.1));
+            assert!((found.mass_kg / exact.mass_kg - 0.995).abs() < 0.006, "{dome:?} {found:?} {exact:?}");
+            assert!((found.center_m - exact.center_m).length() < 5e-5, "{dome:?} {found:?} {exact:?}");
+            for k in 0..3 {
+                let (a, b) = (found.inertia_kg_m2.col(k)[k], exact.inertia_kg_m2.col(k)[k]);
+                assert!((a / b - 0.99).abs() < 0.012, "{dome:?} {k}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn constants_carry_the_dome_and_those_of_old_mean_a_hemisphere() {
+        let cap = of("digit-rigid.json");
+        assert!(cap.optics.dome().center_z_mm() < 0.0);
+        let text = serde_json::to_string(&cap).unwrap();
+        let back: Constants = serde_json::from_str(&text).unwrap();
+        assert_eq!(back.optics.dome(), cap.optics.dome());
+        let whole = serde_json::to_string(&of("thumb24.json")).unwrap();
+        assert!(!whole.contains("dome_center_z_mm"));
+        assert!(serde_json::from_str::<Constants>(&whole).unwrap().optics.dome().is_hemisphere());
+        for dot in &cap.black_dots {
+            let pixel = cap.sensor().unwrap().project(DVec3::from_array(dot.surface_mm)).unwrap();
+            assert!((pixel - glam::DVec2::from_array(dot.image_px)).length() < 1e-9);
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::mass::MassProperties;
 use super::number::number;
+use domecast_optics::DomeShape;
 use domecast_runtime::constants::Constants;
 
 /// A body's mesh file, as seen from the folder of the constants, in the sensor frame at rest, mm.
@@ -26,6 +27,39 @@ pub struct Robot {
     pub upper: BodyPart,
     /// Height of the mounting face in the sensor frame at rest, mm.
     pub mount_z_mm: f64,
+}
+
+/// The mesh of a dome that is no hemisphere, beside the robot's file.
+pub(super) const DOME_MESH: &str = "dome.obj";
+
+/// A dome as a closed mesh in Wavefront OBJ, mm: a cap has no primitive in the robot formats. Its corners lie on the face.
+pub(super) fn dome_obj(dome: &DomeShape) -> String {
+    const AROUND: u32 = 64;
+    const UP: u32 = 16;
+    let mut text = String::from("# the dome, sensor frame, mm\n");
+    let mut corner = |p: DVec3| text += &format!("v {}\n", triple(p));
+    for ring in 0..UP {
+        let meridian = dome.meridian_end_rad() * (1.0 - f64::from(ring) / f64::from(UP));
+        for k in 0..AROUND {
+            let azimuth = std::f64::consts::TAU * f64::from(k) / f64::from(AROUND);
+            let at = dome.point_mm(meridian, azimuth);
+            corner(if ring == 0 { at.with_z(0.0) } else { at });
+        }
+    }
+    corner(dome.pole_mm());
+    corner(DVec3::ZERO);
+    let (pole, middle) = (UP * AROUND + 1, UP * AROUND + 2);
+    for k in 0..AROUND {
+        let (a, b) = (k + 1, (k + 1) % AROUND + 1);
+        text += &format!("f {middle} {b} {a}\n");
+        for ring in 0..UP - 1 {
+            let (low, high) = (ring * AROUND, (ring + 1) * AROUND);
+            text += &format!("f {} {} {} {}\n", low + a, low + b, high + b, high + a);
+        }
+        let top = (UP - 1) * AROUND;
+        text += &format!("f {} {} {pole}\n", top + a, top + b);
+    }
+    text
 }
 
 /// Three numbers with spaces between them.
@@ -60,12 +94,16 @@ fn urdf_link(part: &BodyPart, origin_m: DVec3, dome: &str) -> String {
 /// forces are stated about, `camera` the camera's frame.
 pub fn urdf(constants: &Constants, robot: &Robot) -> String {
     let mount = DVec3::new(0.0, 0.0, robot.mount_z_mm * 1e-3);
-    let radius_m = constants.optics.dome_radius_mm * 1e-3;
+    let shape = constants.optics.dome();
+    let geometry = if shape.is_hemisphere() {
+        format!("<sphere radius=\"{}\"/>", number(shape.radius_mm() * 1e-3))
+    } else {
+        format!("<mesh filename=\"{DOME_MESH}\" scale=\"0.001 0.001 0.001\"/>")
+    };
     let dome = format!(
-        "    <visual>\n      <origin xyz=\"0 0 0\" rpy=\"0 0 0\"/>\n      <geometry><sphere \
-         radius=\"{r}\"/></geometry>\n    </visual>\n    <collision>\n      <origin xyz=\"0 0 0\" rpy=\"0 0 \
-         0\"/>\n      <geometry><sphere radius=\"{r}\"/></geometry>\n    </collision>\n",
-        r = number(radius_m)
+        "    <visual>\n      <origin xyz=\"0 0 0\" rpy=\"0 0 0\"/>\n      <geometry>{geometry}</geometry>\n    \
+         </visual>\n    <collision>\n      <origin xyz=\"0 0 0\" rpy=\"0 0 0\"/>\n      \
+         <geometry>{geometry}</geometry>\n    </collision>\n"
     );
     let joint = |name: &str, parent: &str, child: &str, at: DVec3, rpy: DVec3| {
         format!(

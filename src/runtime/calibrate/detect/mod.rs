@@ -175,16 +175,16 @@ impl<'a> Detector<'a> {
     /// The black dots that are found at a pose.
     fn black_dots(&self, frame: &Gray, smooth: &Gray, pose: &Rigid) -> Vec<(usize, DVec2)> {
         let Ok(optics) = self.optics.at_pose(pose) else { return Vec::new() };
-        let radius_mm = self.optics.dome_radius_mm();
+        let dome = *self.optics.dome();
         let seen = |dot: &crate::constants::BlackDot| {
             let at = DVec3::from_array(dot.surface_mm);
             let east = DVec3::new(-at.y, at.x, 0.0).try_normalize().unwrap_or(DVec3::X);
-            let north = at.cross(east).normalize_or_zero();
+            let north = dome.outward_mm(at).cross(east).normalize_or_zero();
             let center = optics.project(at).ok()?;
             let mut outline = Vec::new();
             let offset = outline_centroid_offset(center, |cos, sin| {
                 let there = at + (east * cos + north * sin) * (0.5 * dot.diameter_mm);
-                let pixel = optics.project(there * (radius_mm / there.length())).ok()?;
+                let pixel = optics.project(dome.onto(there)).ok()?;
                 outline.push(pixel);
                 Some(pixel)
             })?;

@@ -6,7 +6,7 @@ use super::types::{Kind, Observation, OpticsFitError};
 use crate::constants::{CalibrationPriors, Constants};
 use domecast_optics::numeric::rotation_from_vector;
 use domecast_optics::pose::{Marker, outline_centroid_offset};
-use domecast_optics::{OpticsSpec, SensorOptics};
+use domecast_optics::{DomeShape, OpticsSpec, SensorOptics};
 
 /// What is fitted, apart from the poses. Numbers: pupil (3), camera rotation (3), thickness of each flat layer, index
 /// of each layer, x and y of each white marker, two steps along the dome of each dot; as departures from nominal.
@@ -37,9 +37,8 @@ pub(super) struct Black {
 }
 
 impl Black {
-    fn moved(&self, step: DVec2, dome_radius_mm: f64) -> DVec3 {
-        let there = self.at_mm + self.east * step.x + self.north * step.y;
-        there * (dome_radius_mm / there.length())
+    fn moved(&self, step: DVec2, dome: &DomeShape) -> DVec3 {
+        dome.onto(self.at_mm + self.east * step.x + self.north * step.y)
     }
 }
 
@@ -61,7 +60,7 @@ impl<'a> Problem<'a> {
         let black = |dot: &crate::constants::BlackDot| {
             let at_mm = DVec3::from_array(dot.surface_mm);
             let east = DVec3::new(-at_mm.y, at_mm.x, 0.0).try_normalize().unwrap_or(DVec3::X);
-            let north = at_mm.cross(east).normalize_or_zero();
+            let north = nominal.dome.outward_mm(at_mm).cross(east).normalize_or_zero();
             Black { at_mm, radius_mm: 0.5 * dot.diameter_mm, east, north }
         };
         let black_dots: Vec<Black> = constants.black_dots.iter().map(black).collect();
@@ -130,7 +129,7 @@ impl<'a> Problem<'a> {
 
     pub fn black(&self, x: &[f64], index: usize) -> DVec3 {
         let at = self.black_number(index);
-        self.black_dots[index].moved(DVec2::new(x[at], x[at + 1]), self.nominal.dome_radius_mm)
+        self.black_dots[index].moved(DVec2::new(x[at], x[at + 1]), &self.nominal.dome)
     }
 
     pub fn place(&self, x: &[f64], seen: &Seen) -> DVec3 {
@@ -147,10 +146,10 @@ impl<'a> Problem<'a> {
             Kind::Black => {
                 let dot = &self.black_dots[seen.index];
                 let at = self.black(x, seen.index);
-                let radius = self.nominal.dome_radius_mm;
+                let dome = self.nominal.dome;
                 outline_centroid_offset(center, |cos, sin| {
                     let there = at + (dot.east * cos + dot.north * sin) * dot.radius_mm;
-                    optics.project(there * (radius / there.length())).ok()
+                    optics.project(dome.onto(there)).ok()
                 })
             }
         }

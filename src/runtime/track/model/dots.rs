@@ -49,13 +49,13 @@ impl DotModel {
     pub fn image_at(&self, optics: &SensorOptics, center_px: DVec2) -> Option<(DVec2, SpotOutline)> {
         let at = self.surface_mm;
         let east = DVec3::new(-at.y, at.x, 0.0).try_normalize().unwrap_or(DVec3::X);
-        let north = at.cross(east).normalize_or_zero();
-        let radius = optics.dome_radius_mm();
+        let dome = optics.dome();
+        let north = dome.outward_mm(at).cross(east).normalize_or_zero();
         let mut outline = [DVec2::ZERO; 8];
         let mut next = 0;
         let offset = outline_centroid_offset(center_px, |cos, sin| {
             let there = at + (east * cos + north * sin) * self.radius_mm;
-            let pixel = optics.project(there * (radius / there.length())).ok()?;
+            let pixel = optics.project(dome.onto(there)).ok()?;
             outline[next] = pixel;
             next += 1;
             Some(pixel)

@@ -141,7 +141,7 @@ mod tests {
                 FlatLayer { name: "acrylic".into(), index: [1.49; 3], thickness_mm: Some(1.0) },
                 FlatLayer { name: "silicone".into(), index: [1.41; 3], thickness_mm: None },
             ],
-            dome_radius_mm: 10.0,
+            dome: domecast_optics::DomeShape::hemisphere(10.0),
         });
         let corners = [(11.0, 10.0), (-11.0, 10.0), (-11.0, -10.0), (11.0, -9.0)];
         let marker = |id: usize| Marker {

@@ -12,10 +12,10 @@ use glam::{DVec2, DVec3, Vec2, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use self::own::OwnLight;
-use self::places::{Scale, continued, disc_of, split};
+use self::places::{Scale, continued, split};
 use self::shells::Shells;
 use super::direct::EmitterRule;
-use super::dome_map::{DomeGrid, bicubic, direction_from_disc};
+use super::dome_map::{DomeGrid, bicubic};
 use super::tables::{Prepared, Tables, Ways};
 use crate::splines::{Degree, cubics, to_coefficients};
 
@@ -68,7 +68,7 @@ impl LightField {
                 pole = std::array::from_fn(|c| pole[c] + light * source.seen_mw[c]);
             }
             field.evaluations += 1;
-            let grid = DomeGrid::with_cells(8);
+            let grid = DomeGrid::with_cells(8).over(ways.face());
             (grid, vec![pole; grid.nodes * grid.nodes])
         };
         let own = parts.albedo.map(|albedo| OwnLight::new(ways, prepared, albedo, &grid, &table));
@@ -85,7 +85,7 @@ impl LightField {
     /// The table is small, so that it stays in the nearest caches, and looked up as a cubic spline: a picture of it has no
     /// creases of the table's making.
     fn set_still(&mut self, grid: &DomeGrid, table: &[[f64; 3]], own: Option<&OwnLight>) {
-        let more = |place: DVec2| own.map_or([0.0; 3], |own| own.at(direction_from_disc(place)));
+        let more = |place: DVec2| own.map_or([0.0; 3], |own| own.at(grid.face.place_of_disc(place)));
         let inside = |place: DVec2| -> [f64; 3] {
             let direct = bicubic(grid, table, grid.coordinates_of_disc(place));
             let more = more(place);
@@ -112,26 +112,28 @@ impl LightField {
     }
 
     fn brightest_node(&self, grid: &DomeGrid) -> [f64; 3] {
+        let reach = grid.face.reach() as f32;
         let inside = (0..grid.nodes * grid.nodes).map(|i| grid.place(i % grid.nodes, i / grid.nodes));
-        let light = inside.filter(|place| place.length() <= 1.0).map(|place| self.still_at(place.as_vec2()));
+        let light =
+            inside.filter(|place| place.length() <= 1.0).map(|place| self.still_at(place.as_vec2() * reach));
         let brightest = light.fold(Vec4::ZERO, Vec4::max);
         [brightest.x, brightest.y, brightest.z].map(f64::from)
     }
 
-    /// Irradiance of an undeformed point in this unit direction, for the channels red, green, blue; the fourth number means
+    /// Irradiance of an undeformed point at this place of the face ([`super::dome_map::DomeFace`]), for the channels red, green, blue; the fourth number means
     /// nothing.
     #[inline]
     pub fn still(&self, direction: Vec3A) -> Vec4 {
-        self.still_at(disc_of(direction)).max(Vec4::ZERO)
+        self.still_at(self.scale.flat(direction)).max(Vec4::ZERO)
     }
 
-    /// The undeformed membrane's light at a place of the disc.
+    /// The undeformed membrane's light at a place of the equal-area plane.
     #[inline]
     fn still_at(&self, disc: Vec2) -> Vec4 {
         self.cubic_at(&self.still, disc).max(Vec4::ZERO)
     }
 
-    /// A table on the undeformed membrane's grid at a place of the disc.
+    /// A table on the undeformed membrane's grid at a place of the equal-area plane.
     #[inline]
     fn cubic_at(&self, table: &[Vec4], disc: Vec2) -> Vec4 {
         let nodes = self.scale.nodes;

@@ -9,6 +9,7 @@ use crate::light::tables::{Prepared, Ways};
 /// The membrane's own light at the patches of a room.
 #[derive(Debug, Clone)]
 pub(super) struct OwnLight {
+    rings: Rings,
     pub indirect: Vec<[f64; 3]>,
     pub exitance: [Vec<f64>; 3],
 }
@@ -21,8 +22,8 @@ impl OwnLight {
         grid: &DomeGrid,
         table: &[[f64; 3]],
     ) -> Self {
-        let rings = Rings::USUAL;
-        let patch = |i: usize| rings.direction(i / rings.patches, i % rings.patches);
+        let rings = Rings::usual(grid.face);
+        let patch = |i: usize| rings.place(i / rings.patches, i % rings.patches);
         let lit = |i: usize| bicubic(grid, table, grid.coordinates(patch(i)));
         let light: Vec<[f64; 3]> = (0..rings.count()).map(lit).collect();
         let mut indirect = vec![[0.0; 3]; rings.count()];
@@ -35,13 +36,14 @@ impl OwnLight {
             }
             exitance[c] = balance.exitance;
         }
-        Self { indirect, exitance }
+        Self { rings, indirect, exitance }
     }
 
     /// Linear between rings and patches; level beyond the first and last ring.
     pub fn at(&self, direction: DVec3) -> [f64; 3] {
-        let Rings { rings, patches } = Rings::USUAL;
-        let ring = (direction.z * rings as f64 - 0.5).clamp(0.0, rings as f64 - 1.0);
+        let Rings { rings, patches, face } = self.rings;
+        let share = (direction.z - face.rim) / (1.0 - face.rim);
+        let ring = (share * rings as f64 - 0.5).clamp(0.0, rings as f64 - 1.0);
         let turn = direction.y.atan2(direction.x) / std::f64::consts::TAU;
         let patch = (turn * patches as f64 - 0.5).rem_euclid(patches as f64);
         let low = (ring as usize).min(rings - 2);

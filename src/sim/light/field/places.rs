@@ -1,14 +1,8 @@
-//! Places of a look-up: from a direction to the disc, to a grid over it, to a cell and the weights of its nodes.
+//! Places of a look-up: from a place of the dome to the equal-area plane, to a grid over it, to a cell and the weights of its nodes.
 
 use glam::{DVec2, Vec2, Vec3A};
 
 use crate::light::dome_map::DomeGrid;
-
-/// The disc's place of a unit direction, as [`super::dome_map::disc_continued`] tells it.
-#[inline]
-pub(super) fn disc_of(direction: Vec3A) -> Vec2 {
-    Vec2::new(direction.x, direction.y) * (1.0 + direction.z.max(-0.25)).sqrt().recip()
-}
 
 /// What leads from the disc to a grid.
 #[derive(Debug, Clone, Copy)]
@@ -20,6 +14,7 @@ pub(super) struct Scale {
     /// Beyond these a cubic, or a cell, lacks nodes.
     pub last_cubic: f32,
     pub last_cell: f32,
+    has_wall: bool,
 }
 
 impl Scale {
@@ -27,14 +22,25 @@ impl Scale {
         let nodes = grid.nodes as f32;
         Self {
             nodes: grid.nodes,
-            cells: 0.5 * grid.cells() as f32,
+            cells: (0.5 * grid.cells() as f64 / grid.face.reach()) as f32,
             middle: 0.5 * (nodes - 1.0),
             last_cubic: nodes - 2.001,
             last_cell: nodes - 2.0,
+            has_wall: grid.face.has_wall(),
         }
     }
 
-    /// Grid coordinates of a place in the disc's plane.
+    /// Where the equal-area plane has a place of the face; a sphere is continued some degrees below its rim.
+    #[inline]
+    pub fn flat(&self, place: Vec3A) -> Vec2 {
+        let aside = Vec2::new(place.x, place.y);
+        if self.has_wall && place.z < 0.0 {
+            return aside * (1.0 - place.z).sqrt();
+        }
+        aside * (1.0 + place.z.max(-0.25)).sqrt().recip()
+    }
+
+    /// Grid coordinates of a place of the equal-area plane.
     #[inline]
     pub fn place(&self, disc: Vec2) -> Vec2 {
         disc * self.cells + Vec2::splat(self.middle)

@@ -7,7 +7,7 @@
 
 use glam::{DVec2, Vec2, Vec3A, Vec4};
 
-use super::places::{Scale, continued, disc_of, split};
+use super::places::{Scale, continued, split};
 use crate::light::dome_map::{DomeGrid, bicubic};
 use crate::light::tables::{SHELL_CELLS, SHELLS, Tables, Ways};
 use crate::splines::{Degree, quadratics, to_coefficients};
@@ -35,7 +35,7 @@ pub(super) struct Shells {
 impl Shells {
     /// Sums up the lights' tables; `None` where there are none.
     pub fn new(ways: &Ways, outer: &Tables, inside: &[Tables]) -> Option<Self> {
-        let grid = DomeGrid::with_cells(SHELL_CELLS);
+        let grid = DomeGrid::with_cells(SHELL_CELLS).over(ways.face());
         let flux = |tables: &Tables| flux(ways, tables, &grid);
         let [second, third] = inside else { return None };
         let [outer, second, third] = [outer, second, third].map(flux);
@@ -64,7 +64,7 @@ impl Shells {
     #[inline]
     pub fn change(&self, distance_mm: f32, direction: Vec3A, normal: Vec3A) -> Vec3A {
         let nodes = self.scale.nodes;
-        let place = self.scale.place(disc_of(direction)) + Vec2::splat(0.5);
+        let place = self.scale.place(self.scale.flat(direction)) + Vec2::splat(0.5);
         let ((column, row), part) = split(place, 1.0, self.scale.last_cell);
         let (wx, wy) = quadratics(part);
         let start = (row - 1) * nodes + column - 1;

@@ -113,7 +113,7 @@ fn dots_are_seen_where_mitsuba_sees_them() {
             layer(&golden["acrylic_index"], Some(number(&golden["sheet_mm"]))),
             layer(&golden["silicone_index"], None),
         ],
-        dome_radius_mm: 10.0,
+        dome: domecast_optics::DomeShape::hemisphere(10.0),
     })
     .unwrap();
     let reach = number(&golden["dot_radius_mm"]) / 10.0;

@@ -14,7 +14,7 @@ fn scene(more: &str) -> crate::Scene {
 
 const ALL: LightUse = LightUse::ALL;
 
-fn ways_of(optics: &SensorOptics, source: Emitter) -> Ways {
+pub(super) fn ways_of(optics: &SensorOptics, source: Emitter) -> Ways {
     Ways {
         sources: vec![Source { emitter: source, optics: optics.clone(), seen_mw: [1.0, 0.5, 0.0] }],
         optics: [optics.clone(), optics.clone(), optics.clone()],

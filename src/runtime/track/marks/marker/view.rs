@@ -40,7 +40,7 @@ impl MarkerView {
             mm_by_px,
             place_mm: marker.position_mm.truncate(),
             radius_mm,
-            rim_mm: optics.dome_radius_mm(),
+            rim_mm: optics.dome().rim_radius_mm(),
             half_px: half as i32,
             around_px: std::array::from_fn(|k| {
                 let (sin, cos) = (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();

@@ -102,8 +102,7 @@ impl Contact {
     /// on a rigid mount. A force that is not found is a [`PressStatus::NotBalanced`] with what is left of it.
     ///
     /// # Errors
-    /// As [`Contact::press_with_force`]; the fault of the deepest pose that was tried, where the level ends before the
-    /// force is reached.
+    /// As [`Contact::press_with_force`]; [`ContactError::ForceTooLarge`] where the level ends before the force is reached.
     pub fn press_held_with_force(
         &self,
         indenter: &Indenter,
@@ -169,10 +168,20 @@ impl Contact {
             && best.as_ref().is_none_or(|best| best.status != PressStatus::Balanced)
             && let Some(error) = fault
         {
-            return Err(error);
+            return Err(match best {
+                Some(best) if fault_is_an_end(&error) => {
+                    ContactError::ForceTooLarge { force_n, reached_n: best.wrench.force_n.dot(way) }
+                }
+                _ => error,
+            });
         }
         best.ok_or_else(|| ContactError::BadPose(format!("the object does not meet the dome along {way}")))
     }
+}
+
+/// Whether the object can go no deeper.
+fn fault_is_an_end(error: &ContactError) -> bool {
+    matches!(error, ContactError::InsideSheet { .. } | ContactError::TooDeep { .. })
 }
 
 fn status_of(off_n: f64, force_n: f64) -> PressStatus {
@@ -258,6 +267,7 @@ mod tests {
         assert!(matches!(press(DVec3::Z, 1.0), Err(ContactError::BadPose(_))));
         assert!(matches!(press(-DVec3::Z, f64::NAN), Err(ContactError::Dimension { .. })));
         let deep = press(-DVec3::Z, 500.0);
-        assert!(matches!(deep, Err(ContactError::TooDeep { .. })), "{deep:?}");
+        let Err(ContactError::ForceTooLarge { force_n, reached_n }) = deep else { panic!("{deep:?}") };
+        assert!(force_n == 500.0 && reached_n > 1.0 && reached_n < 500.0, "{reached_n}");
     }
 }

@@ -168,6 +168,9 @@ fn way_out(error: &ContactError) -> Option<String> {
             "move `position_mm` away from the dome by at least {:.3} mm, or leave the depth to a force (`press`)",
             (depth_mm - limit_mm).max(0.0)
         )),
+        ContactError::ForceTooLarge { reached_n, .. } => {
+            Some(format!("ask for less force (`press.force`), at most {:.2} N", (100.0 * reached_n).floor() / 100.0))
+        }
         ContactError::Unseen { .. } => Some(
             "take smaller elements (`contact.element_mm`), a thicker object, or the geometric level (`contact.level`)"
                 .into(),

@@ -75,6 +75,8 @@ mod tests {
             "thumb24-pinhole.json",
             "thumb24-wide.json",
             "endoscope-r5.json",
+            "picam-r20.json",
+            "digit-rigid.json",
         ]
         .map(of)
         .to_vec();
@@ -104,7 +106,7 @@ mod tests {
                 looked += 1;
             }
         }
-        assert_eq!(looked, 2 * 9 + 5);
+        assert_eq!(looked, 2 * 11 + 7);
     }
 
     // A box from twelve triangles against the closed form, off its own centre.

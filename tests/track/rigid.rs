@@ -106,7 +106,8 @@ fn compare(tracked: &Tracked, drawn: &Drawn, constants: &Constants, to: &mut Mis
         to.square[1] += off_mm * off_mm;
         to.worst = [to.worst[0].max(off_px), to.worst[1].max(off_mm)];
         // On two axes; quantisation is not in the frame's own noise.
-        to.beyond_three_sd += usize::from(off_px > 3.0 * std::f64::consts::SQRT_2 * dot.sd_px.unwrap().hypot(0.02));
+        to.beyond_three_sd +=
+            usize::from(off_px > 3.0 * std::f64::consts::SQRT_2 * dot.sd_px.unwrap().hypot(0.02));
     }
 }
 

@@ -64,7 +64,7 @@ pub(super) const RING: &[Rule] = &[
 
 fn claims(k: &Known<'_>) -> Option<Value> {
     // A rigid mount promises no net wrench.
-    if k.value("mount.kind").is_some_and(|kind| kind == "rigid") {
+    if k.is_rigid() {
         return Some(Value::Array(Vec::new()));
     }
     let radius = k.n("dome.radius_mm");

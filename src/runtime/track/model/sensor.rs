@@ -80,7 +80,10 @@ fn is_rigid(constants: &Constants) -> Result<bool, TrackError> {
         return Err(TrackError::at("white_markers", problem));
     }
     if constants.black_dots.is_empty() {
-        return Err(TrackError::at("black_dots", "are none, nor are there white markers: nothing can be followed"));
+        return Err(TrackError::at(
+            "black_dots",
+            "are none, nor are there white markers: nothing can be followed",
+        ));
     }
     Ok(true)
 }

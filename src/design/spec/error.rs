@@ -35,7 +35,7 @@ pub struct DesignError {
 pub struct Cure {
     /// The field, as a path from the top.
     pub field: String,
-    /// Its new value.
+    /// Its new value; null: the field is to be left out.
     pub value: Value,
 }
 
@@ -56,6 +56,9 @@ impl Cure {
 
 impl fmt::Display for Cure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.value.is_null() {
+            return write!(f, "leaving {} out would do", self.field);
+        }
         write!(f, "{} = {} would do", self.field, self.value)
     }
 }

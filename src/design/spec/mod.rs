@@ -8,6 +8,7 @@
 mod body_rules;
 pub mod calibration;
 pub mod catalogue;
+mod change;
 mod derive;
 mod design;
 mod error;

@@ -14,7 +14,7 @@ pub(super) const SCREW_HOLE_MM: f64 = 2.2;
 /// Half of the head of a post's screw and its room, in diameters of the screw's hole.
 pub(super) const HEAD_PART: f64 = 1.05;
 /// What a post keeps from the sides, mm.
-pub(super) const INSET_MM: f64 = 0.2;
+const INSET_MM: f64 = 0.2;
 /// What the cable's exit is wider than the cable, mm.
 pub(super) const EXIT_MM: f64 = 0.7;
 
@@ -52,8 +52,7 @@ pub(super) fn half_mm(k: &Known<'_>, half_mm: f64) -> DVec2 {
     // holes in the corners: from the side, and to what is beside them
     let mut hole = diameter + 3.0 * wall_mm(k);
     if k.is_rigid() {
-        let post = 0.5 * k.n("mount.post_diameter_mm") + INSET_MM;
-        hole = hole.max(post + HEAD_PART * k.n("mount.hole_diameter_mm") + wall_mm(k));
+        hole = hole.max(post_inset_mm(k) + HEAD_PART * k.n("mount.hole_diameter_mm") + wall_mm(k));
     }
     let exit = 0.5 * (cable_mm(k) + EXIT_MM);
     let walls = DVec2::splat(half_mm.max(exit + hole)).max(pocket + wall_mm(k));
@@ -65,6 +64,12 @@ pub(super) fn half_mm(k: &Known<'_>, half_mm: f64) -> DVec2 {
     let (wider, longer) = (dvec2(beside.x, walls.y), dvec2(walls.x, beside.y));
     let rounded = |half: DVec2| (half * 4.0 - 1e-9).ceil() / 4.0;
     rounded(if wider.x * wider.y <= longer.x * longer.y { wider } else { longer })
+}
+
+/// How far from the sides a post stands in a corner, with a wall beside its screw's head, mm.
+pub(super) fn post_inset_mm(k: &Known<'_>) -> f64 {
+    let head = HEAD_PART * k.n("mount.hole_diameter_mm") + wall_mm(k);
+    (0.5 * k.n("mount.post_diameter_mm") + INSET_MM).max(head)
 }
 
 /// Width of the cable, mm.

@@ -3,7 +3,7 @@
 use glam::{DVec2, dvec2};
 use serde_json::Value;
 
-use super::board::{self, HEAD_PART, INSET_MM, SCREW_HOLE_MM};
+use super::board::{self, HEAD_PART, SCREW_HOLE_MM};
 use super::geometry::{bore_mm, lower_top_mm, view_mm, wall_mm};
 use super::known::{Known, lookup};
 use super::rule::{DerivedField, Rule, follows};
@@ -51,15 +51,18 @@ pub(super) const POSTS: &[Rule] = &[
     }),
 ];
 
-pub(super) const POST_PLACES: &[Rule] =
-    &[follows("mount.at_mm", "in the corners, 0.2 mm from the sides", |k| {
+pub(super) const POST_PLACES: &[Rule] = &[follows(
+    "mount.at_mm",
+    "in the corners, 0.2 mm from the sides, or a wall beside the screws' heads",
+    |k| {
         if !k.is_rigid() {
             return None;
         }
-        let inset = 0.5 * k.n("mount.post_diameter_mm") + INSET_MM;
+        let inset = board::post_inset_mm(k);
         let [x, y] = [0, 1].map(|axis| 0.5 * k.at("platforms.outer_mm", axis) - inset);
         k.places(&[[x, y], [-x, y], [-x, -y], [x, -y]])
-    })];
+    },
+)];
 
 /// Distance between two mounting holes at least, mm.
 const MIN_APART_MM: f64 = 4.0;

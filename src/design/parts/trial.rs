@@ -51,13 +51,18 @@ fn cure_of(design: &Design, passes: &[PrintPass], fault: &PartError, tries_left:
         PartError::Infeasible { part, field, .. } | PartError::Broken { part, field, .. } => (part, field),
         _ => return None,
     };
-    let named: Vec<&str> = fields.split(" or ").collect();
+    let mut named: Vec<&str> = fields.split(" or ").collect();
+    if named.contains(&"magnet_pockets.push_out_diameter_mm") {
+        // the holes are where the springs are
+        named.insert(0, "springs.places.ring.radius_mm");
+    }
     // What a rule would give instead, then a little more and less of each number.
     let off = design.off_their_rules().into_iter().filter(|cure| {
         named.iter().any(|field| cure.field.strip_prefix(field).is_some_and(|rest| !rest.starts_with('_')))
     });
     let by = |factor: f64| -> Vec<Cure> {
-        named.iter().flat_map(|field| design.scaled(field, factor)).take(MAX_FIELDS).collect()
+        let all = named.iter().flat_map(|field| design.scaled(field, factor));
+        all.filter(|cure| !is_bought(&cure.field)).take(MAX_FIELDS).collect()
     };
     let moved = SHARES.iter().flat_map(|share| {
         by(1.0 + share).into_iter().zip(by(1.0 - share)).flat_map(|(more, less)| [more, less])
@@ -67,6 +72,11 @@ fn cure_of(design: &Design, passes: &[PrintPass], fault: &PartError, tries_left:
     // In pieces, so that the smallest change that helps ends the search.
     let helps = |cure: &Cure| makes(design, cure, part, passes);
     tried.chunks(8).find_map(|some| some.par_iter().find_first(|cure| helps(cure)).cloned())
+}
+
+/// Whether a field is what somebody bought, not what is chosen.
+fn is_bought(field: &str) -> bool {
+    field.starts_with("camera_body.") && !field.ends_with("clearance_mm")
 }
 
 /// Whether the part can be made with a change.

@@ -91,19 +91,7 @@ impl Design {
     /// The given fields that a rule would give another value, each with that value.
     pub fn off_their_rules(&self) -> Vec<Cure> {
         let Ok(tree) = serde_json::from_str::<Value>(self.text()) else { return Vec::new() };
-        let by_rule = |field: &'static str| -> Option<Cure> {
-            let given = look(&tree, field)?;
-            if !is_numeric(given) {
-                return None;
-            }
-            let mut without = tree.clone();
-            set(&mut without, &Value::Null, field, Value::Null)?;
-            derive(&mut without).ok()?;
-            let value = look(&without, field)?;
-            let same = numbers(value).eq(numbers(given));
-            (!same).then(|| Cure { field: field.to_owned(), value: value.clone() })
-        };
-        fields().filter_map(by_rule).collect()
+        fields().filter_map(|field| by_rule(&tree, field).map(|(cure, _)| cure)).collect()
     }
 
     /// The numbers, and lists of numbers, at and below a field, each times a factor, to 0.01 away from what they were.
@@ -112,6 +100,65 @@ impl Design {
         let mut leaves = Vec::new();
         numbers_below(&whole, field, &mut leaves);
         leaves.into_iter().map(|(field, value)| Cure { field, value: scaled(&value, factor) }).collect()
+    }
+}
+
+/// What a rule gives a field that has another number in a tree, and the tree with all that the rules give then.
+fn by_rule(tree: &Value, field: &str) -> Option<(Cure, Value)> {
+    let given = look(tree, field)?;
+    if !is_numeric(given) {
+        return None;
+    }
+    let mut without = tree.clone();
+    set(&mut without, &Value::Null, field, Value::Null)?;
+    derive(&mut without).ok()?;
+    let value = look(&without, field)?.clone();
+    let same = numbers(&value).eq(numbers(given));
+    (!same).then(|| (Cure { field: field.to_owned(), value }, without))
+}
+
+/// The faults of a tree that no design can be made from, each without a cure with the first given field that, left to its
+/// rule, takes it away; best one that leaves no fault.
+pub(super) fn with_cures_by_rules(
+    tree: &Value,
+    mut error: DesignError,
+    judge: impl Fn(Value) -> Result<(), DesignError>,
+) -> DesignError {
+    let mut faults = std::mem::take(&mut error.more);
+    faults.insert(0, error);
+    if faults.iter().all(|fault| fault.cure.is_some()) {
+        return joined(faults);
+    }
+    let mut judged: Vec<(Cure, Vec<String>)> = Vec::new();
+    for field in fields() {
+        if let Some((cure, changed)) = by_rule(tree, field) {
+            let left = judge(changed).err().map(|error| error.kinds()).unwrap_or_default();
+            judged.push((cure, left));
+        }
+    }
+    let cured = |fault: DesignError| {
+        if fault.cure.is_some() {
+            return fault;
+        }
+        let kind = fault.kind();
+        let shared = |cure: &Cure| {
+            fault.field.split(['.', '[']).zip(cure.field.split('.')).take_while(|(a, b)| a == b).count()
+        };
+        let helps = judged.iter().filter(|(_, left)| !left.contains(&kind));
+        let best = helps.min_by_key(|(cure, left)| (left.len(), std::cmp::Reverse(shared(cure)))).cloned();
+        match best {
+            Some((cure, _)) => fault.with_tried(cure),
+            None => fault,
+        }
+    };
+    joined(faults.into_iter().map(cured).collect())
+}
+
+/// Faults as one error.
+fn joined(faults: Vec<DesignError>) -> DesignError {
+    match DesignError::all(faults) {
+        Err(error) => error,
+        Ok(()) => DesignError::at("", "", "no fault", ""),
     }
 }
 

@@ -120,6 +120,29 @@ impl DesignError {
         self
     }
 
+    /// The same fault, with a change that was tried and takes it away, beside the advice that it has.
+    #[must_use]
+    pub fn with_tried(mut self, cure: Cure) -> Self {
+        self.help = Some(match self.help.take() {
+            Some(help) => format!("{help}; {cure}"),
+            None => cure.to_string(),
+        });
+        self.cure = Some(Box::new(cure));
+        self
+    }
+
+    /// What the fault is about, without its numbers: the same before and after a change that does not take it away.
+    pub fn kind(&self) -> String {
+        let text: String =
+            self.problem.chars().filter(|c| !c.is_ascii_digit() && !"-.−".contains(*c)).collect();
+        format!("{}: {text}", self.field.split('[').next().unwrap_or_default())
+    }
+
+    /// The kinds of all faults.
+    pub fn kinds(&self) -> Vec<String> {
+        std::iter::once(self).chain(&self.more).map(Self::kind).collect()
+    }
+
     /// The same fault, with advice.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {

@@ -73,8 +73,12 @@ fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, DesignErro
     let filling = fill(&mut value, folder)?;
     let filled = if filling.fields.is_empty() { None } else { Some(format!("{value:#}\n")) };
     schema::check(schema::open_schema(), &value, "")?;
-    let derived = derive(&mut value)?;
-    let mut design = resolve::resolve(from_value(&value)?, filled.as_deref().unwrap_or(text), derived)?;
+    let text = filled.as_deref().unwrap_or(text);
+    let given = value.clone();
+    let judge = |whole: Value| resolve::resolve(from_value(&whole)?, text, Vec::new()).map(|_| ());
+    let resolved =
+        derive(&mut value).and_then(|derived| resolve::resolve(from_value(&value)?, text, derived));
+    let mut design = resolved.map_err(|error| change::with_cures_by_rules(&given, error, judge))?;
     design.warnings.extend(filling.warnings);
     Ok(design)
 }

@@ -3,7 +3,7 @@
 //!
 //! Tried are, in this order: what a rule would give where the design says something else; more and less of the numbers
 //! that the fault names; and what helps a view or a pattern in general: a deeper camera, a smaller dome, a wider mask,
-//! fewer and other dots.
+//! fewer and larger dots.
 
 use rayon::prelude::*;
 use serde_json::json;
@@ -11,6 +11,7 @@ use serde_json::json;
 use super::claims;
 use super::making::{lay_out, make_parts};
 use crate::constants;
+use crate::light::marker_noise_px;
 use domecast_design::{Cure, Design, DesignError};
 
 /// Changes of a number, smallest first; each up and down.
@@ -28,25 +29,28 @@ pub(super) fn with_cures(design: &Design, mut error: DesignError) -> DesignError
     faults.insert(0, error);
     let (mut quick_left, mut made_left) = (MAX_TRIED_IN_ALL, MAX_MADE);
     // What shows as the parts are made does not show before.
-    let early: Vec<String> = quick(design).err().iter().flat_map(kinds).collect();
+    let early: Vec<String> = quick(design).err().iter().flat_map(DesignError::kinds).collect();
     // Faults with a cure may go together with those without: with them mended one looks again.
     let cured = faults.iter().any(|fault| fault.cure.is_some());
     let mut found = faults.into_iter().map(|fault| {
         if fault.cure.is_some() {
             return fault;
         }
-        let kind = kind(&fault);
+        let kind = fault.kind();
         let cure = if early.contains(&kind) {
             let tried = some(candidates(design, &fault, true), MAX_TRIED, &mut quick_left);
             first_that_helps(design, &tried, &kind, &quick)
         } else if cured {
             None
+        } else if lit(design).is_err_and(|error| error.kinds().contains(&kind)) {
+            let tried = some(candidates(design, &fault, true), MAX_MADE, &mut made_left);
+            first_that_helps(design, &tried, &kind, &lit)
         } else {
             let tried = some(candidates(design, &fault, false), MAX_MADE, &mut made_left);
             first_that_helps(design, &tried, &kind, &with_parts)
         };
         match cure {
-            Some(cure) => fault.with_cure(cure),
+            Some(cure) => fault.with_tried(cure),
             None => fault,
         }
     });
@@ -73,6 +77,12 @@ fn quick(design: &Design) -> Result<(), DesignError> {
     Ok(())
 }
 
+/// What the sensor's own lights show.
+fn lit(design: &Design) -> Result<(), DesignError> {
+    marker_noise_px(design)?;
+    Ok(())
+}
+
 /// The same with the parts, made and assembled.
 fn with_parts(design: &Design) -> Result<(), DesignError> {
     let sight = claims::try_claims(design)?;
@@ -80,17 +90,6 @@ fn with_parts(design: &Design) -> Result<(), DesignError> {
     let springs = constants::springs_of(design, sight)?;
     make_parts(design, &layout, &springs)?;
     Ok(())
-}
-
-/// What a fault is about, without its numbers.
-fn kind(fault: &DesignError) -> String {
-    let text: String = fault.problem.chars().filter(|c| !c.is_ascii_digit() && !"-.".contains(*c)).collect();
-    let field = fault.field.split('[').next().unwrap_or_default();
-    format!("{field}: {text}")
-}
-
-fn kinds(error: &DesignError) -> Vec<String> {
-    std::iter::once(error).chain(&error.more).map(kind).collect()
 }
 
 /// Of the changes the first that leaves no fault, or the first without this kind of fault.
@@ -107,7 +106,7 @@ fn first_that_helps(
             .par_iter()
             .map(|cure| match design.changed(cure).and_then(|changed| judge(&changed)) {
                 Ok(()) => Some(true),
-                Err(error) => (!kinds(&error).contains(kind)).then_some(false),
+                Err(error) => (!error.kinds().contains(kind)).then_some(false),
             })
             .collect();
         let at = |wanted: bool| judged.iter().position(|one| *one == Some(wanted));
@@ -135,7 +134,9 @@ fn candidates(design: &Design, fault: &DesignError, of_view: bool) -> Vec<Cure> 
     let mut found = design.off_their_rules();
     found.sort_by_key(near);
     found.truncate(if of_view { 12 } else { MAX_MADE - 2 });
-    if of_view {
+    if fault.field.starts_with("pattern") || fault.field.starts_with("print") {
+        found.extend(of_the_pattern(design));
+    } else if of_view {
         found.extend(of_the_view(design));
     }
     for share in SHARES {
@@ -169,13 +170,25 @@ fn of_the_view(design: &Design) -> Vec<Cure> {
         found.push(change("camera.position_mm", json!([x, y, rounded(z * factor)])));
     }
     for factor in [0.9, 0.75, 0.5] {
-        let mask = &sections.runtime;
-        found
-            .push(change("runtime.mask_field_angle_deg", json!(rounded(mask.mask_field_angle_deg / factor))));
-        if let Some(polar_deg) = sections.pattern.polar_angle_deg {
-            found.push(change("pattern.polar_angle_deg", json!(rounded(polar_deg * factor))));
-        }
+        let mask_deg = sections.runtime.mask_field_angle_deg;
+        found.push(change("runtime.mask_field_angle_deg", json!(rounded(mask_deg / factor))));
         found.push(change("dome.radius_mm", json!(rounded(sections.dome.radius_mm * factor))));
+    }
+    found
+}
+
+/// What lets a pattern be seen and printed.
+fn of_the_pattern(design: &Design) -> Vec<Cure> {
+    let mut found = Vec::new();
+    let change = |field: &str, value: serde_json::Value| Cure { field: field.to_owned(), value };
+    for factor in [1.25, 1.6, 2.2, 3.5] {
+        found.extend(design.scaled("pattern.pitch_px", factor));
+        found.extend(design.scaled("pattern.dot_diameter_px", factor));
+        found.extend(design.scaled("pattern.count", 1.0 / factor));
+        found.extend(design.scaled("pattern.polar_angle_deg", 1.0 / factor));
+    }
+    for field in ["pattern.unprintable", "pattern.unseen"] {
+        found.push(change(field, json!("drop")));
     }
     found
 }

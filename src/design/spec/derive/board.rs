@@ -43,6 +43,14 @@ pub(super) fn pocket_mm(k: &Known<'_>) -> [DVec2; 2] {
     [center - half, center + half]
 }
 
+/// Whether a hole at a place leaves no thin wall beside the pocket: it lies wholly in it, or a wall beside it.
+pub(super) fn is_clear_of_pocket(k: &Known<'_>, at: DVec2, hole_mm: f64) -> bool {
+    let [low, high] = pocket_mm(k);
+    let inside = (at - low).min(high - at).min_element();
+    let outside = at.distance(at.clamp(low, high));
+    inside >= hole_mm + wall_mm(k) || outside >= hole_mm + wall_mm(k)
+}
+
 /// Half of each of the platforms' sides that a board asks for, mm: a wall round its pocket, and beside it, along one side,
 /// holes and posts in the corners.
 pub(super) fn half_mm(k: &Known<'_>, half_mm: f64) -> DVec2 {

@@ -165,7 +165,7 @@ fn run_own(
     out: Option<&Path>,
 ) -> Result<(), Failure> {
     let text = format!("{:#}\n", own.design(name, radius_mm)?);
-    let design = Design::from_str(&text)?;
+    let design = Design::from_text_with_cures(&text, Path::new(""))?;
     let laid_out = design.layout().map_err(DesignError::from)?.dots.len();
     let path = place(name, out);
     let schema = write_both(&path, text.as_bytes())?;

@@ -1,6 +1,7 @@
 //! Room for a camera's board in the lower platform.
 
 use glam::{DVec2, dvec2};
+use serde_json::Value;
 
 use super::geometry::wall_mm;
 use super::known::Known;
@@ -43,12 +44,35 @@ pub(super) fn pocket_mm(k: &Known<'_>) -> [DVec2; 2] {
     [center - half, center + half]
 }
 
-/// Whether a hole at a place leaves no thin wall beside the pocket: it lies wholly in it, or a wall beside it.
+/// A strip of a recess narrower than this stays full, mm, as the board's seat is made.
+const MAX_STRIP_MM: f64 = 1.0;
+
+/// Whether a hole at a place leaves no thin wall beside the pocket: it lies a wall beside it, or wholly in it and clear of
+/// the posts that the board bears on.
 pub(super) fn is_clear_of_pocket(k: &Known<'_>, at: DVec2, hole_mm: f64) -> bool {
     let [low, high] = pocket_mm(k);
+    let needed = hole_mm + wall_mm(k);
+    if at.distance(at.clamp(low, high)) >= needed {
+        return true;
+    }
     let inside = (at - low).min(high - at).min_element();
-    let outside = at.distance(at.clamp(low, high));
-    inside >= hole_mm + wall_mm(k) || outside >= hole_mm + wall_mm(k)
+    let screw = k.n("camera_body.board.hole_diameter_mm");
+    let post = 0.5 * screw + wall_mm(k).max(0.5 * screw);
+    let axes = DVec2::from_angle(turn_rad(k));
+    let middle = 0.5 * (low + high);
+    let holes = k.value("camera_body.board.holes_mm").and_then(Value::as_array);
+    let holes: Vec<DVec2> = holes
+        .into_iter()
+        .flatten()
+        .filter_map(|hole| Some(dvec2(hole.get(0)?.as_f64()?, hole.get(1)?.as_f64()?)))
+        .collect();
+    // posts stand where any hole's column meets any hole's row
+    let is_clear = |x: f64, y: f64| {
+        let post_at = middle + axes.rotate(dvec2(x, y));
+        (at - post_at).abs().max_element() >= post + needed
+    };
+    inside >= MAX_STRIP_MM + needed
+        && holes.iter().all(|column| holes.iter().all(|row| is_clear(column.x, row.y)))
 }
 
 /// Half of each of the platforms' sides that a board asks for, mm: a wall round its pocket, and beside it, along one side,

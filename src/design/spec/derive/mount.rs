@@ -72,10 +72,13 @@ const STEP_MM: f64 = 0.25;
 /// Up to four mounting holes along the sides, as far from each other as they can be, clear of posts, set screws, cable,
 /// bore, view and board; `None` where not even two find a place.
 pub(super) fn beside_posts(k: &Known<'_>) -> Option<Vec<[f64; 2]>> {
-    let hole = 0.5 * k.n("platforms.lower.mounting.hole_diameter_mm");
+    let heads = k.n("platforms.lower.mounting.counterbore_diameter_mm");
+    let hole = 0.5 * k.n("platforms.lower.mounting.hole_diameter_mm").max(heads);
     let (wall, inset) = (wall_mm(k), hole + 2.0 * wall_mm(k));
     let half = 0.5 * dvec2(k.at("platforms.outer_mm", 0), k.at("platforms.outer_mm", 1)) - inset;
-    let head = HEAD_PART * k.n("mount.hole_diameter_mm");
+    // counterbores keep from the posts themselves too
+    let post = if heads > 0.0 { 0.5 * k.n("mount.post_diameter_mm") } else { 0.0 };
+    let head = (HEAD_PART * k.n("mount.hole_diameter_mm")).max(post);
     let points = |field: &str| -> Vec<DVec2> {
         let list = k.value(field).and_then(Value::as_array);
         let place = |at: &Value| Some(dvec2(at.get(0)?.as_f64()?, at.get(1)?.as_f64()?));

@@ -158,13 +158,24 @@ pub(super) const LOWER: &[Rule] = &[
         k.number(k.n("process.min_hole_diameter_mm").max(2.2))
     }),
     follows(
+        "platforms.lower.mounting.counterbore_depth_mm",
+        "none; between short posts what the screws' heads are too high by, with 0.3 mm",
+        |k| k.number(counterbore_mm(k)),
+    ),
+    follows(
+        "platforms.lower.mounting.counterbore_diameter_mm",
+        "none, or twice the holes for the heads",
+        |k| {
+            let heads = 2.0 * k.n("platforms.lower.mounting.hole_diameter_mm");
+            k.number(if k.n("platforms.lower.mounting.counterbore_depth_mm") > 0.0 { heads } else { 0.0 })
+        },
+    ),
+    follows(
         "platforms.lower.mounting.at_mm",
         "in the corners, the hole's radius and two walls from the sides; on a rigid mount, whose posts stand there, up to \
          four along the sides, clear of posts, set screws and cable",
         mounting,
     ),
-    fixed("platforms.lower.mounting.counterbore_diameter_mm", "0", "no counterbores"),
-    fixed("platforms.lower.mounting.counterbore_depth_mm", "0", "no counterbores"),
     follows(
         "platforms.lower.wire_hole_diameter_mm",
         "for two thin wires, or the smallest hole; none over a camera's board or between posts: there the wires leave \
@@ -354,6 +365,15 @@ fn clamp_height(k: &Known<'_>) -> Option<Value> {
     // below the pockets where there is room
     let high = if high - pockets > low { high - pockets } else { high };
     k.number(super::known::tidy(0.5 * (low + high.max(low))))
+}
+
+/// How deep screws' heads have to be sunk under an upper platform that stands close above, mm.
+fn counterbore_mm(k: &Known<'_>) -> f64 {
+    if !k.is_rigid() {
+        return 0.0;
+    }
+    // a head is as high as its screw is thick
+    up((k.n("platforms.lower.mounting.hole_diameter_mm") + 0.3 - k.n("mount.height_mm")).max(0.0), 0.05)
 }
 
 fn mounting(k: &Known<'_>) -> Option<Value> {

@@ -13,7 +13,7 @@ const SHARES: [f64; 4] = [0.04, 0.12, 0.3, 0.6];
 /// Fields that are tried at most for a fault.
 const MAX_FIELDS: usize = 4;
 /// Changes that are tried at most in a run: each makes a part.
-const MAX_TRIED: usize = 24;
+const MAX_TRIED: usize = 16;
 
 /// The faults, each that names fields and no change with the first change that was found to help.
 pub(super) fn with_cures(design: &Design, passes: &[PrintPass], faults: Vec<PartError>) -> Vec<PartError> {

@@ -21,17 +21,22 @@ const SHARES: [f64; 4] = [0.04, 0.12, 0.3, 0.6];
 const MAX_TRIED: usize = 48;
 const MAX_TRIED_IN_ALL: usize = 72;
 /// The same where the parts have to be made, each in about a second; in a run.
-const MAX_MADE: usize = 6;
+const MAX_MADE: usize = 3;
+/// The same where the light has to be computed.
+const MAX_LIT: usize = 10;
+/// Given fields that are off their rules, tried first.
+const MAX_RULES: usize = 12;
 
 /// The faults, each that has no cure with the first change that was found to help.
 pub(super) fn with_cures(design: &Design, mut error: DesignError) -> DesignError {
     let mut faults = std::mem::take(&mut error.more);
     faults.insert(0, error);
-    let (mut quick_left, mut made_left) = (MAX_TRIED_IN_ALL, MAX_MADE);
+    let (mut quick_left, mut made_left, mut lit_left) = (MAX_TRIED_IN_ALL, MAX_MADE, MAX_LIT);
     // What shows as the parts are made does not show before.
     let early: Vec<String> = quick(design).err().iter().flat_map(DesignError::kinds).collect();
-    // Faults with a cure may go together with those without: with them mended one looks again.
-    let cured = faults.iter().any(|fault| fault.cure.is_some());
+    // What cures one fault often cures those that stand beside it.
+    let beside: Vec<Cure> = faults.iter().filter_map(|fault| fault.cure.as_deref().cloned()).collect();
+    let all: Vec<String> = faults.iter().map(DesignError::kind).collect();
     let mut found = faults.into_iter().map(|fault| {
         if fault.cure.is_some() {
             return fault;
@@ -39,15 +44,16 @@ pub(super) fn with_cures(design: &Design, mut error: DesignError) -> DesignError
         let kind = fault.kind();
         let cure = if early.contains(&kind) {
             let tried = some(candidates(design, &fault, true), MAX_TRIED, &mut quick_left);
-            first_that_helps(design, &tried, &kind, &quick)
-        } else if cured {
-            None
+            first_that_helps(design, &tried, (&kind, &all), &quick)
+        } else if !beside.is_empty() {
+            let tried = some(beside.clone(), MAX_MADE, &mut made_left);
+            first_that_helps(design, &tried, (&kind, &all), &with_parts)
         } else if lit(design).is_err_and(|error| error.kinds().contains(&kind)) {
-            let tried = some(candidates(design, &fault, true), MAX_MADE, &mut made_left);
-            first_that_helps(design, &tried, &kind, &lit)
+            let tried = some(candidates(design, &fault, false), MAX_LIT, &mut lit_left);
+            first_that_helps(design, &tried, (&kind, &all), &lit)
         } else {
             let tried = some(candidates(design, &fault, false), MAX_MADE, &mut made_left);
-            first_that_helps(design, &tried, &kind, &with_parts)
+            first_that_helps(design, &tried, (&kind, &all), &with_parts)
         };
         match cure {
             Some(cure) => fault.with_tried(cure),
@@ -92,11 +98,11 @@ fn with_parts(design: &Design) -> Result<(), DesignError> {
     Ok(())
 }
 
-/// Of the changes the first that leaves no fault, or the first without this kind of fault.
+/// Of the changes the first that leaves no fault, or the first without this kind of fault and with no new kind.
 fn first_that_helps(
     design: &Design,
     tried: &[Cure],
-    kind: &String,
+    (kind, known): (&String, &[String]),
     judge: &(dyn Fn(&Design) -> Result<(), DesignError> + Sync),
 ) -> Option<Cure> {
     let mut helps = None;
@@ -106,7 +112,11 @@ fn first_that_helps(
             .par_iter()
             .map(|cure| match design.changed(cure).and_then(|changed| judge(&changed)) {
                 Ok(()) => Some(true),
-                Err(error) => (!error.kinds().contains(kind)).then_some(false),
+                Err(error) => {
+                    let left = error.kinds();
+                    let only_known = left.iter().all(|one| known.contains(one));
+                    (only_known && !left.contains(kind)).then_some(false)
+                }
             })
             .collect();
         let at = |wanted: bool| judged.iter().position(|one| *one == Some(wanted));
@@ -133,7 +143,7 @@ fn candidates(design: &Design, fault: &DesignError, of_view: bool) -> Vec<Cure> 
     };
     let mut found = design.off_their_rules();
     found.sort_by_key(near);
-    found.truncate(if of_view { 12 } else { MAX_MADE - 2 });
+    found.truncate(MAX_RULES);
     if fault.field.starts_with("pattern") || fault.field.starts_with("print") {
         found.extend(of_the_pattern(design));
     } else if of_view {

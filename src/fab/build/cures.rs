@@ -69,8 +69,8 @@ pub(super) fn with_cures(design: &Design, mut error: DesignError) -> DesignError
 }
 
 /// The first changes, as many as are left.
-fn some(mut changes: Vec<Cure>, at_most: usize, left: &mut usize) -> Vec<Cure> {
-    changes.truncate(at_most.min(*left));
+fn some(mut changes: Vec<Cure>, max_count: usize, left: &mut usize) -> Vec<Cure> {
+    changes.truncate(max_count.min(*left));
     *left -= changes.len();
     changes
 }

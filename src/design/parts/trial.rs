@@ -62,7 +62,7 @@ fn cure_of(design: &Design, passes: &[PrintPass], fault: &PartError, tries_left:
     });
     let by = |factor: f64| -> Vec<Cure> {
         let all = named.iter().flat_map(|field| design.scaled(field, factor));
-        all.filter(|cure| !is_purchased(&cure.field)).take(MAX_FIELDS).collect()
+        all.filter(|cure| !Design::is_purchased(&cure.field)).take(MAX_FIELDS).collect()
     };
     let moved = SHARES.iter().flat_map(|share| {
         by(1.0 + share).into_iter().zip(by(1.0 - share)).flat_map(|(more, less)| [more, less])
@@ -72,11 +72,6 @@ fn cure_of(design: &Design, passes: &[PrintPass], fault: &PartError, tries_left:
     // In pieces, so that the smallest change that helps ends the search.
     let helps = |cure: &Cure| makes(design, cure, part, passes);
     tried.chunks(8).find_map(|some| some.par_iter().find_first(|cure| helps(cure)).cloned())
-}
-
-/// Whether a field is of a purchased part, not chosen.
-fn is_purchased(field: &str) -> bool {
-    field.starts_with("camera_body.") && !field.ends_with("clearance_mm")
 }
 
 /// Whether the part can be made with a change.

@@ -88,10 +88,20 @@ impl Design {
         Self::from_text(&tree.to_string(), Path::new(""))
     }
 
-    /// The given fields that a rule would give another value, each with that value.
+    /// The given fields that a rule would give another value, each with that value; those of purchased parts last.
     pub fn off_their_rules(&self) -> Vec<Cure> {
         let Ok(tree) = serde_json::from_str::<Value>(self.text()) else { return Vec::new() };
-        fields().filter_map(|field| by_rule(&tree, field).map(|(cure, _)| cure)).collect()
+        let mut found: Vec<Cure> =
+            fields().filter_map(|field| by_rule(&tree, field).map(|(cure, _)| cure)).collect();
+        found.sort_by_key(|cure| Self::is_purchased(&cure.field));
+        found
+    }
+
+    /// Whether a field is of a purchased camera, not chosen.
+    pub fn is_purchased(field: &str) -> bool {
+        let chosen = ["camera.position_mm", "camera.rotation_deg", "camera_body.min_sheet_gap_mm"];
+        let is_camera = field.starts_with("camera.") || field.starts_with("camera_body.");
+        is_camera && !field.ends_with("clearance_mm") && !chosen.contains(&field)
     }
 
     /// The numbers, and lists of numbers, at and below a field, each times a factor, to 0.01 away from what they were.
@@ -228,10 +238,14 @@ mod tests {
         let text =
             r#"{"version": 1, "name": "t", "camera": {"from": "misumi75"}, "dome": {"radius_mm": 10}}"#;
         let design: Design = text.parse().unwrap();
-        assert!(design.off_their_rules().is_empty());
+        let chosen = |design: &Design| -> Vec<Cure> {
+            let off = design.off_their_rules().into_iter();
+            off.filter(|cure| !Design::is_purchased(&cure.field)).collect()
+        };
+        assert_eq!(chosen(&design), []);
         let ruled = design.sections().sheet.clearance_mm;
         let change = Cure { field: "sheet.clearance_mm".into(), value: json!(ruled + 0.05) };
-        let off = design.changed(&change).unwrap().off_their_rules();
+        let off = chosen(&design.changed(&change).unwrap());
         assert_eq!(off, [Cure { field: "sheet.clearance_mm".into(), value: json!(ruled) }]);
         let longer = design.scaled("camera.position_mm", 1.5);
         assert_eq!(longer.len(), 1);

@@ -139,7 +139,7 @@ fn candidates(design: &Design, fault: &DesignError, of_view: bool) -> Vec<Cure> 
         let shared = |field: &&str| {
             field.split('.').zip(cure.field.split('.')).take_while(|(one, other)| one == other).count()
         };
-        std::cmp::Reverse(named.iter().map(shared).max().unwrap_or(0))
+        (Design::is_purchased(&cure.field), std::cmp::Reverse(named.iter().map(shared).max().unwrap_or(0)))
     };
     let mut found = design.off_their_rules();
     found.sort_by_key(near);

@@ -106,7 +106,7 @@ mod tests {
                 looked += 1;
             }
         }
-        assert_eq!(looked, 2 * 11 + 7);
+        assert_eq!(looked, 2 * 11 + 6);
     }
 
     // A box from twelve triangles against the closed form, off its own centre.

@@ -62,11 +62,11 @@ impl Design {
     /// # Errors
     /// As [`Design::from_text`].
     pub fn from_text_with_cures(text: &str, folder: &Path) -> Result<Self, DesignError> {
-        filled_design(text, Some(folder)).map_err(|(error, given)| match given {
-            Some(given) => change::with_cures_by_rules(&given, error, |whole| {
+        filled_design(text, Some(folder)).map_err(|fault| match *fault {
+            (error, Some(given)) => change::with_cures_by_rules(&given, error, |whole| {
                 resolve::resolve(from_value(&whole)?, text, Vec::new()).map(|_| ())
             }),
-            None => error,
+            (error, None) => error,
         })
     }
 
@@ -75,14 +75,17 @@ impl Design {
     /// # Errors
     /// The first fault of the text: see [`DesignError`].
     pub fn from_text(text: &str, folder: &Path) -> Result<Self, DesignError> {
-        filled_design(text, Some(folder)).map_err(|(error, _)| error)
+        filled_design(text, Some(folder)).map_err(|fault| fault.0)
     }
 }
 
+/// A fault, and the tree that it is of where every field is as the schema says.
+type Unresolved = (DesignError, Option<Value>);
+
 /// A design from its text, with what it takes from elsewhere; one that took something has a text of its own, complete
 /// in itself. A fault comes with the filled tree, where there is one whose every field is as the schema says.
-fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, (DesignError, Option<Value>)> {
-    let plain = |error| (error, None);
+fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, Box<Unresolved>> {
+    let plain = |error| Box::new((error, None));
     let mut value = parse_json(text).map_err(plain)?;
     check_version(&value).map_err(plain)?;
     let filling = fill(&mut value, folder).map_err(plain)?;
@@ -92,7 +95,7 @@ fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, (DesignErr
     let given = value.clone();
     let resolved =
         derive(&mut value).and_then(|derived| resolve::resolve(from_value(&value)?, text, derived));
-    let mut design = resolved.map_err(|error| (error, Some(given)))?;
+    let mut design = resolved.map_err(|error| Box::new((error, Some(given))))?;
     design.warnings.extend(filling.warnings);
     Ok(design)
 }
@@ -102,7 +105,7 @@ impl std::str::FromStr for Design {
 
     /// Resolves a design from its text, which lies in no folder: see [`Design::from_text`].
     fn from_str(text: &str) -> Result<Self, DesignError> {
-        filled_design(text, None).map_err(|(error, _)| error)
+        filled_design(text, None).map_err(|fault| fault.0)
     }
 }
 

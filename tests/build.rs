@@ -9,7 +9,15 @@ use std::process::Command;
 use common::domecast;
 use serde_json::Value;
 
-const DESIGNS: [&str; 5] = ["thumb24", "thumb24-fisheye", "thumb24-pinhole", "thumb24-wide", "endoscope-r5"];
+const DESIGNS: [&str; 7] = [
+    "thumb24",
+    "thumb24-fisheye",
+    "thumb24-pinhole",
+    "thumb24-wide",
+    "endoscope-r5",
+    "picam-r20",
+    "digit-rigid",
+];
 
 /// What a design gives or leaves to a rule.
 fn given(built: &Path, name: &str, field: &str) -> Value {

@@ -354,6 +354,11 @@ fn calibrations() {
 }
 
 #[test]
+fn mounts() {
+    run_topic("mounts");
+}
+
+#[test]
 fn every_topic_is_run() {
     let mut found = Vec::new();
     for entry in fs::read_dir(Path::new(REPOSITORY).join("tests/cases")).expect("the cases") {
@@ -365,6 +370,16 @@ fn every_topic_is_run() {
     found.sort();
     assert_eq!(
         found,
-        ["arguments", "calibrations", "constants", "designs", "frames", "points", "scenes", "tables"]
+        [
+            "arguments",
+            "calibrations",
+            "constants",
+            "designs",
+            "frames",
+            "mounts",
+            "points",
+            "scenes",
+            "tables"
+        ]
     );
 }

@@ -131,6 +131,22 @@ fn a_watched_design_is_built_again_when_it_is_saved() {
     fs::write(&design, text.replacen("\"pitch_px\": 18", "\"pitch_px\": 19", 1)).expect("written");
     wait_until("the second build", || !stamp().is_empty() && stamp() != first);
     assert!(domecast(&["check", "out"], folder.path()).status.success());
+    // a calibration that the design names is watched too
+    let lens = fs::read_to_string(folder.path().join("out/constants/opencv.yaml")).expect("a calibration");
+    let calibration = folder.path().join("lens.yaml");
+    fs::write(&calibration, &lens).expect("written");
+    let mut tree: Value = serde_json::from_str(&text).expect("JSON");
+    let camera = tree["camera"].as_object_mut().expect("a camera");
+    camera.retain(|key, _| ["field_of_view_deg", "position_mm", "rotation_deg"].contains(&key.as_str()));
+    camera.insert("calibration".into(), "lens.yaml".into());
+    let second = stamp();
+    fs::write(&design, tree.to_string()).expect("written");
+    wait_until("the third build", || !stamp().is_empty() && stamp() != second);
+    let third = stamp();
+    let moved = lens.replace("319.5", "319.75");
+    assert_ne!(moved, lens);
+    fs::write(&calibration, moved).expect("written");
+    wait_until("the build after the calibration changed", || !stamp().is_empty() && stamp() != third);
 }
 
 #[test]

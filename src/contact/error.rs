@@ -47,6 +47,13 @@ pub enum ContactError {
         /// How far it may, mm.
         limit_mm: f64,
     },
+    /// The force is not reached before the object meets the sheet or lies deeper than the level's model goes.
+    ForceTooLarge {
+        /// The force that was asked for, N.
+        force_n: f64,
+        /// The most that was found, N.
+        reached_n: f64,
+    },
     /// The object is so thin that it passes between the places where the level's surface can be touched.
     Unseen {
         /// How far it reaches into the undeformed dome, mm.
@@ -89,6 +96,11 @@ impl fmt::Display for ContactError {
                     "the object lies {depth_mm:.3} mm inside the dome, at most {limit_mm:.3} is modelled"
                 )
             }
+            Self::ForceTooLarge { force_n, reached_n } => write!(
+                f,
+                "{force_n:.3} N are not reached before the object meets the sheet or the end of the model, at most \
+                 {reached_n:.3} N"
+            ),
             Self::Unseen { depth_mm, spacing_mm } => write!(
                 f,
                 "the object reaches {depth_mm:.3} mm into the dome between the surface's nodes, which are {spacing_mm:.3} mm apart"

@@ -5,6 +5,7 @@
 mod bad;
 mod program;
 mod render;
+mod rigid;
 mod sequences;
 mod simulated;
 

@@ -19,16 +19,19 @@ pub struct Folders<'a> {
     pub accuracy: Option<&'a Path>,
 }
 
-/// Makes everything, then writes it whole. With `watch`, again whenever the design file changes.
+/// Makes everything, then writes it whole. With `watch`, again whenever the design file or the calibration
+/// that it names changes.
 pub fn run(output: &Output, design_file: &Path, folders: &Folders<'_>, watch: bool) -> Result<(), Failure> {
     if !watch {
         return once(output, design_file, folders, false);
     }
     let mut seen = None;
+    let mut files = vec![design_file.to_path_buf()];
     loop {
-        let now = stamp(design_file);
+        let now: Vec<_> = files.iter().map(|file| stamp(file)).collect();
         if seen.as_ref() != Some(&now) {
-            seen = Some(now);
+            files = watched_files(design_file);
+            seen = Some(files.iter().map(|file| stamp(file)).collect());
             match once(output, design_file, folders, true) {
                 // a fault in the design is what watching is for: say it, and wait for the next save
                 Err(failure @ (Failure::Input(_) | Failure::Write(_))) => output.failure(&failure),
@@ -38,6 +41,16 @@ pub fn run(output: &Output, design_file: &Path, folders: &Folders<'_>, watch: bo
         }
         std::thread::sleep(LOOK);
     }
+}
+
+/// The design, and the calibration that it names.
+fn watched_files(design_file: &Path) -> Vec<PathBuf> {
+    let named = || {
+        let design = domecast_design::parse_json(&domecast_design::read_text(design_file).ok()?).ok()?;
+        let name = design.pointer("/camera/calibration")?.as_str()?.to_owned();
+        Some(design_file.parent().unwrap_or(Path::new("")).join(name))
+    };
+    std::iter::once(design_file.to_path_buf()).chain(named()).collect()
 }
 
 /// What distinguishes one state of a file from the next; `None` while an editor has it away.

@@ -28,6 +28,13 @@ pub fn run(
     out: Option<&Path>,
 ) -> Result<(), Failure> {
     let mut constants = read_constants(constants_path)?;
+    if constants.springs.is_none() {
+        return Err(input_fault(
+            constants_path,
+            "has no springs (a rigid mount): there is no stiffness to fit, and no net wrench is promised",
+            "constants of a design with mount.kind = \"springs\"; on a rigid mount a load cell under the posts has the net wrench",
+        ));
+    }
     let text = read_text(measured)?;
     let table = Table::parse(&text)
         .map_err(|error| input_fault(measured, error.to_string(), "a table of displacements and wrenches"))?;

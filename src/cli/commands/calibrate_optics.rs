@@ -40,6 +40,14 @@ pub fn run(
         let problem = "has no \"tolerances\", which are the priors of this calibration";
         return Err(input_fault(constants_path, problem, "constants written by `domecast build`"));
     };
+    if constants.white_markers.is_empty() {
+        return Err(input_fault(
+            constants_path,
+            "has no white markers (a rigid mount): this calibration takes the pose of every frame from them",
+            "constants of a design with mount.kind = \"springs\"; on a rigid mount a lens measured before it is built in \
+             (camera.calibration), and `track --reference N`, which takes off what the first N frames without load show",
+        ));
+    }
     let (observations, missing) = if seen.is_dir() || is_png(seen) {
         let found = observations_in(output, &frames_of(seen)?, &constants)?;
         if let Some(path) = files.centroids {

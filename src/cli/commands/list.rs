@@ -1,76 +1,52 @@
 //! `domecast list KIND [KEY]`
 
-use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde_json::{Map, Value, json};
 
 use super::output::{Failure, Output};
 use domecast_design::catalogue::{self, CatalogueEntry, CatalogueKind};
 
-/// What can be listed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ListKind {
-    /// Camera modules.
-    Cameras,
-    /// Lights.
-    Leds,
-    /// Casting silicones.
-    Silicones,
-    /// Sheets of acrylic and glass.
-    Sheets,
-    /// Compression springs.
-    Springs,
-    /// Disc magnets.
-    Magnets,
+/// Reads the name of a kind; clap lists the names in help and faults.
+pub fn kind_parser() -> impl TypedValueParser<Value = CatalogueKind> {
+    let names = PossibleValuesParser::new(CatalogueKind::ALL.map(CatalogueKind::as_str));
+    names.try_map(|name| CatalogueKind::parse(&name).ok_or("is no kind of the catalogue"))
 }
 
-impl ListKind {
-    fn kind(self) -> CatalogueKind {
-        match self {
-            Self::Cameras => CatalogueKind::Cameras,
-            Self::Leds => CatalogueKind::Leds,
-            Self::Silicones => CatalogueKind::Silicones,
-            Self::Sheets => CatalogueKind::Sheets,
-            Self::Springs => CatalogueKind::Springs,
-            Self::Magnets => CatalogueKind::Magnets,
-        }
-    }
-
-    /// Heads of the table's columns and the fields below them.
-    fn columns(self) -> &'static [(&'static str, &'static str)] {
-        match self {
-            Self::Cameras => &[
-                ("width px", "camera.width"),
-                ("height px", "camera.height"),
-                ("view deg", "camera.field_of_view_deg"),
-                ("body", "camera_body.kind"),
-            ],
-            Self::Leds => &[("package mm", "leds.package_mm"), ("height mm", "leds.package_height_mm")],
-            Self::Silicones => &[
-                ("E MPa", "elastomer.young_modulus_mpa"),
-                ("nu", "elastomer.poisson_ratio"),
-                ("index", "layer.index"),
-                ("shrinkage %", "elastomer.shrinkage_percent"),
-            ],
-            Self::Sheets => &[("thickness mm", "layer.thickness_mm"), ("index", "layer.index")],
-            Self::Springs => &[
-                ("wire mm", "springs.wire_diameter_mm"),
-                ("outer mm", "springs.outer_diameter_mm"),
-                ("length mm", "springs.free_length_mm"),
-                ("coils", "springs.active_coils"),
-            ],
-            Self::Magnets => &[
-                ("diameter mm", "magnets.diameter_mm"),
-                ("thickness mm", "magnets.thickness_mm"),
-                ("grip N", "magnets.grip_force_n"),
-            ],
-        }
+/// Heads of the table's columns and the fields below them.
+fn columns(kind: CatalogueKind) -> &'static [(&'static str, &'static str)] {
+    match kind {
+        CatalogueKind::Cameras => &[
+            ("width px", "camera.width"),
+            ("height px", "camera.height"),
+            ("view deg", "camera.field_of_view_deg"),
+            ("body", "camera_body.kind"),
+        ],
+        CatalogueKind::Leds => &[("package mm", "leds.package_mm"), ("height mm", "leds.package_height_mm")],
+        CatalogueKind::Silicones => &[
+            ("E MPa", "elastomer.young_modulus_mpa"),
+            ("nu", "elastomer.poisson_ratio"),
+            ("index", "layer.index"),
+            ("shrinkage %", "elastomer.shrinkage_percent"),
+        ],
+        CatalogueKind::Sheets => &[("thickness mm", "layer.thickness_mm"), ("index", "layer.index")],
+        CatalogueKind::Springs => &[
+            ("wire mm", "springs.wire_diameter_mm"),
+            ("outer mm", "springs.outer_diameter_mm"),
+            ("length mm", "springs.free_length_mm"),
+            ("coils", "springs.active_coils"),
+        ],
+        CatalogueKind::Magnets => &[
+            ("diameter mm", "magnets.diameter_mm"),
+            ("thickness mm", "magnets.thickness_mm"),
+            ("grip N", "magnets.grip_force_n"),
+        ],
     }
 }
 
 /// Prints the catalogue's entries of a kind, or one of them with the source of every number.
-pub fn run(output: &Output, what: ListKind, key: Option<&str>) -> Result<(), Failure> {
+pub fn run(output: &Output, kind: CatalogueKind, key: Option<&str>) -> Result<(), Failure> {
     if let Some(key) = key {
-        let entry = catalogue::find(&[what.kind()], key)?;
+        let entry = catalogue::find(&[kind], key)?;
         output.say(&format!("{}: {}", entry.key, entry.name))?;
         if let Some(refused) = &entry.refused {
             output.say(&format!("  not for every section: {refused}"))?;
@@ -81,8 +57,8 @@ pub fn run(output: &Output, what: ListKind, key: Option<&str>) -> Result<(), Fai
         }
         return output.result(&entry_json(entry));
     }
-    let entries = catalogue::entries(what.kind());
-    let columns = what.columns();
+    let entries = catalogue::entries(kind);
+    let columns = columns(kind);
     let mut rows: Vec<Vec<String>> =
         vec![["key"].iter().chain(columns.iter().map(|(head, _)| head)).map(ToString::to_string).collect()];
     rows[0].push("name".into());
@@ -102,9 +78,9 @@ pub fn run(output: &Output, what: ListKind, key: Option<&str>) -> Result<(), Fai
     }
     output
         .say(&format!("in a design: \"from\": \"{}\"", entries.first().map_or("KEY", |entry| &entry.key)))?;
-    output.say(&format!("with sources: domecast list {} KEY", what.kind().as_str()))?;
+    output.say(&format!("with sources: domecast list {} KEY", kind.as_str()))?;
     let all: Vec<Value> = entries.iter().map(entry_json).collect();
-    output.result(&json!({ what.kind().as_str(): all }))
+    output.result(&json!({ kind.as_str(): all }))
 }
 
 /// A value as a table shows it: lists with a cross, an index by its green.

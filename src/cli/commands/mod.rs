@@ -95,8 +95,8 @@ enum Command {
     /// The catalogue of parts that a design can name by key, as `"from": KEY`.
     List {
         /// Which kind of part.
-        #[arg(value_enum)]
-        kind: list::ListKind,
+        #[arg(value_parser = list::kind_parser())]
+        kind: domecast_design::catalogue::CatalogueKind,
         /// One part with all its numbers and their sources.
         key: Option<String>,
     },

@@ -26,9 +26,12 @@ pub struct OwnSensor {
     /// The camera: a calibration file (OpenCV, ROS, Kalibr), or a key of `domecast list cameras` [default: that of --body].
     #[arg(long, requires = "radius")]
     camera: Option<PathBuf>,
-    /// The camera's body: a key of `domecast list cameras`.
+    /// The camera's body: a key of `domecast list cameras` [default: that of --camera, where it is a key].
     #[arg(long, requires = "radius")]
     body: Option<String>,
+    /// What carries the upper platform: springs, or posts (rigid: no net wrench is promised).
+    #[arg(long, requires = "radius", value_parser = ["springs", "rigid"])]
+    mount: Option<String>,
     /// Wanted number of dots; as many as come nearest are laid out.
     #[arg(long, requires = "radius")]
     dots: Option<u32>,
@@ -42,7 +45,8 @@ impl OwnSensor {
     fn design(&self, name: &str, radius_mm: f64) -> Result<Value, DesignError> {
         let mut design = json!({ "$schema": SCHEMA_NAME, "version": 1, "name": name });
         design["camera"] = self.camera()?;
-        if let Some(key) = &self.body {
+        if let Some(key) = self.body.clone().or_else(|| self.camera_key()) {
+            let key = key.as_str();
             let entry = catalogue::find(&[CatalogueKind::Cameras], key)?;
             let mut body = Map::new();
             let mut why = Map::new();
@@ -64,6 +68,9 @@ impl OwnSensor {
             body.insert("why".into(), Value::Object(why));
             design["camera_body"] = Value::Object(body);
         }
+        if self.mount.as_deref() == Some("rigid") {
+            design["mount"] = json!({ "kind": "rigid", "why": "asked for with --mount" });
+        }
         design["dome"] = json!({ "radius_mm": radius_mm, "why": "asked for with --radius" });
         let mut pattern = Map::new();
         let asked =
@@ -76,6 +83,12 @@ impl OwnSensor {
             design["pattern"] = Value::Object(pattern);
         }
         Ok(design)
+    }
+
+    /// The key that stands for a camera of the catalogue; `None` for a calibration file.
+    fn camera_key(&self) -> Option<String> {
+        let path = self.camera.as_ref()?;
+        (!path.is_file() && path.extension().is_none()).then(|| path.display().to_string())
     }
 
     /// The camera's section with its numbers, so that the design needs no other file.
@@ -152,7 +165,7 @@ fn run_own(
     out: Option<&Path>,
 ) -> Result<(), Failure> {
     let text = format!("{:#}\n", own.design(name, radius_mm)?);
-    let design = Design::from_str(&text)?;
+    let design = Design::from_text_with_cures(&text, Path::new(""))?;
     let laid_out = design.layout().map_err(DesignError::from)?.dots.len();
     let path = place(name, out);
     let schema = write_both(&path, text.as_bytes())?;

@@ -5,6 +5,7 @@
 //! for ([`search`]).
 
 mod approach;
+mod held;
 mod pressed;
 mod search;
 

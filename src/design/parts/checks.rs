@@ -20,6 +20,8 @@ use domecast_optics::numeric::Rigid;
 /// that bear on each other are cut from the same numbers and may overlap by
 /// rounding.
 const TOUCHING_MM3: f64 = 1e-4;
+/// So does a layer this thin, as a part of the way from the origin, whatever its area: both are coordinates' rounding.
+const ROUNDING: f64 = 1e-6;
 /// Stand-ins in these checks are meshed no finer than this, mm.
 const CHORD_MM: f64 = 0.03;
 
@@ -162,6 +164,10 @@ impl Thing {
             return Ok(());
         }
         let bounds = shared.to_mesh().bounds().unwrap_or(other.bounds);
+        let farthest = bounds.min_mm.abs().max(bounds.max_mm.abs()).max_element();
+        if bounds.size_mm().min_element() <= ROUNDING * farthest {
+            return Ok(());
+        }
         let middle = rest_from_other.transform_point3(0.5 * (bounds.min_mm + bounds.max_mm));
         let place = format!(
             "shares {volume:.4} mm3 with {} {when}, about ({:.2}, {:.2}, {:.2}); depth",

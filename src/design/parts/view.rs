@@ -81,7 +81,7 @@ struct Lines {
 }
 
 impl Lines {
-    /// In the frame of the platform; none may be empty of the dome's rim.
+    /// In the frame of the platform; of a pose at which the lens sees nothing of the rim there are none.
     fn over(
         optics: &SensorOptics,
         rim_radius_mm: f64,
@@ -99,13 +99,18 @@ impl Lines {
                 lines.extend(sight_lines(&moved, center, marker_radius_mm));
             }
         }
-        if all.rim.is_empty() {
+        Ok(all)
+    }
+
+    /// The same, if the dome's rim is among them.
+    fn with_rim(self) -> Result<Self, PartError> {
+        if self.rim.is_empty() {
             return Err(PartError::View {
                 problem: "the dome's rim cannot be seen at any position of the springs".into(),
                 field: "camera.position_mm".into(),
             });
         }
-        Ok(all)
+        Ok(self)
     }
 
     /// Takes in others, each brought into this one's frame.
@@ -150,7 +155,7 @@ impl ViewCone {
         (low_z_mm, high_z_mm): (f64, f64),
         margin_mm: f64,
     ) -> Result<Self, PartError> {
-        let lines = Lines::over(optics, rim_radius_mm, (markers_mm, marker_radius_mm), poses)?;
+        let lines = Lines::over(optics, rim_radius_mm, (markers_mm, marker_radius_mm), poses)?.with_rim()?;
         Ok(Self::of_lines(&lines, (low_z_mm, high_z_mm), margin_mm))
     }
 
@@ -182,7 +187,7 @@ impl ViewCone {
                 ..line
             });
         }
-        Ok(Self::of_lines(&lines, (low_z_mm, high_z_mm), margin_mm))
+        Ok(Self::of_lines(&lines.with_rim()?, (low_z_mm, high_z_mm), margin_mm))
     }
 
     fn of_lines(lines: &Lines, (low_z_mm, high_z_mm): (f64, f64), margin_mm: f64) -> Self {

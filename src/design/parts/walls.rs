@@ -36,15 +36,36 @@ const SAME_PLANE: f64 = 1e7;
 /// if it is fine enough for the search and not much finer.
 ///
 /// # Errors
-/// The thinnest wall below the limit: where, between what, which field.
+/// All walls below the limit: where, between what, which field; of features of the same two kinds the thinnest.
 pub(super) fn check(b: &Blueprint, m: &Measures, made: Option<&TriMesh>) -> Result<(), PartError> {
     let limit = m.process.min_wall_mm;
     if !b.printed || limit <= 0.0 {
         return Ok(());
     }
     let failed = |error: MeshError| PartError::Mesh { part: b.name.clone(), error };
-    distances(b, limit, &failed)?;
-    thicknesses(b, limit, made, &failed)
+    let mut thin = Thin::default();
+    distances(b, limit, &mut thin, &failed)?;
+    // Cuts that run into each other leave no material to look through.
+    if thin.0.is_empty() {
+        thicknesses(b, limit, made, &mut thin, &failed)?;
+    }
+    PartError::all(thin.0.into_iter().map(|(_, _, fault)| fault).collect())
+}
+
+/// The faults that were found, each with the kinds of its features and its thickness, mm.
+#[derive(Default)]
+struct Thin(Vec<([&'static str; 2], f64, PartError)>);
+
+impl Thin {
+    /// Takes in a wall; of the same two kinds of features the thinnest stays.
+    fn add(&mut self, mut kinds: [&'static str; 2], thickness_mm: f64, fault: PartError) {
+        kinds.sort_unstable();
+        match self.0.iter_mut().find(|(other, ..)| *other == kinds) {
+            Some(known) if thickness_mm < known.1 => *known = (kinds, thickness_mm, fault),
+            Some(_) => {}
+            None => self.0.push((kinds, thickness_mm, fault)),
+        }
+    }
 }
 
 /// The piece as a solid at a tolerance, whatever tolerance it has of its own.
@@ -52,7 +73,12 @@ fn solid_of(piece: &Piece, chord: Chord) -> Result<Solid, MeshError> {
     Piece { chord: None, ..piece.clone() }.solid(chord)
 }
 
-fn distances(b: &Blueprint, limit: f64, failed: &dyn Fn(MeshError) -> PartError) -> Result<(), PartError> {
+fn distances(
+    b: &Blueprint,
+    limit: f64,
+    thin: &mut Thin,
+    failed: &dyn Fn(MeshError) -> PartError,
+) -> Result<(), PartError> {
     let coarse = Chord::new(CHORD_SHARE * limit).map_err(failed)?;
     let material = b.added.iter().map(|f| solid_of(&f.piece, coarse)).collect::<Result<_, _>>();
     let body = material.and_then(Solid::union).map_err(failed)?;
@@ -62,12 +88,9 @@ fn distances(b: &Blueprint, limit: f64, failed: &dyn Fn(MeshError) -> PartError)
         // Only what is inside the part counts; a cut that misses it is a
         // mistake in the design.
         let Some(inside) = tool.intersection(&body).map_err(failed)? else {
-            return Err(b.infeasible(
-                format!("{} misses the part: cuts", feature.piece.name),
-                0.0,
-                limit,
-                feature.field,
-            ));
+            let place = format!("{} misses the part: cuts", feature.piece.name);
+            thin.add([feature.kind; 2], 0.0, b.infeasible(place, 0.0, limit, feature.field));
+            continue;
         };
         let bounds = inside.to_mesh().bounds();
         tools.push((feature, inside, bounds));
@@ -90,7 +113,7 @@ fn distances(b: &Blueprint, limit: f64, failed: &dyn Fn(MeshError) -> PartError)
             let Some(gap) = measured(b, one, two, limit).map_err(failed)? else { continue };
             if gap < limit * (1.0 - 2.0 * FINE_SHARE) {
                 let place = format!("wall between {} and {}", one.piece.name, two.piece.name);
-                return Err(b.infeasible(place, gap, limit, fields(one, two)));
+                thin.add([one.kind, two.kind], gap, b.infeasible(place, gap, limit, fields(one, two)));
             }
         }
     }
@@ -154,6 +177,7 @@ fn thicknesses(
     b: &Blueprint,
     limit: f64,
     made: Option<&TriMesh>,
+    thin: &mut Thin,
     failed: &dyn Fn(MeshError) -> PartError,
 ) -> Result<(), PartError> {
     let coarse = Chord::new(CHORD_SHARE * limit).map_err(failed)?;
@@ -178,7 +202,6 @@ fn thicknesses(
     // Facets of one plane share most of their corners: each is looked at from once.
     let mut looked = HashSet::new();
     let (skin, search) = (1e-3 * limit, SEARCH * limit);
-    let mut thinnest: Option<Wall> = None;
     for (indices, [p, q, r]) in mesh.triangles.iter().zip(mesh.iter_mm()) {
         let Some(normal) = (q - p).cross(r - p).try_normalize() else { continue };
         let middle = (p + q + r) / 3.0;
@@ -196,22 +219,20 @@ fn thicknesses(
             let seen = skin + fraction * (search - skin);
             let to = (point - normal * seen, other);
             let wall = exact(b, Wall { from: (point, normal), to, thickness: seen, facet: middle }, limit);
-            if thinnest.is_none_or(|w| wall.thickness < w.thickness) {
-                thinnest = Some(wall);
+            if wall.thickness >= limit * (1.0 - 2.0 * FINE_SHARE) {
+                continue;
             }
+            let (one, two) = (face_at(b, (wall.facet, wall.from.1)), face_at(b, wall.to));
+            let at = wall.from.0;
+            let place = format!(
+                "wall between {} and {} at ({:.2}, {:.2}, {:.2})",
+                one.piece.name, two.piece.name, at.x, at.y, at.z
+            );
+            let fault = b.infeasible(place, wall.thickness, limit, fields(one, two));
+            thin.add([one.kind, two.kind], wall.thickness, fault);
         }
     }
-    let Some(Wall { from, to, thickness, facet }) = thinnest else { return Ok(()) };
-    if thickness >= limit * (1.0 - 2.0 * FINE_SHARE) {
-        return Ok(());
-    }
-    let (one, two) = (face_at(b, (facet, from.1)), face_at(b, to));
-    let at = from.0;
-    let place = format!(
-        "wall between {} and {} at ({:.2}, {:.2}, {:.2})",
-        one.piece.name, two.piece.name, at.x, at.y, at.z
-    );
-    Err(b.infeasible(place, thickness, limit, fields(one, two)))
+    Ok(())
 }
 
 /// The same wall between the exact surfaces: each end is brought to the nearest point of its own surface, in turn

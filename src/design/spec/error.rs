@@ -35,7 +35,7 @@ pub struct DesignError {
 pub struct Cure {
     /// The field, as a path from the top.
     pub field: String,
-    /// Its new value.
+    /// Its new value; null: the field is to be left out.
     pub value: Value,
 }
 
@@ -56,6 +56,9 @@ impl Cure {
 
 impl fmt::Display for Cure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.value.is_null() {
+            return write!(f, "leaving {} out would do", self.field);
+        }
         write!(f, "{} = {} would do", self.field, self.value)
     }
 }
@@ -115,6 +118,29 @@ impl DesignError {
         self.help = Some(cure.to_string());
         self.cure = Some(Box::new(cure));
         self
+    }
+
+    /// The same fault, with a change that was tried and takes it away, beside the advice that it has.
+    #[must_use]
+    pub fn with_tried(mut self, cure: Cure) -> Self {
+        self.help = Some(match self.help.take() {
+            Some(help) => format!("{help}; {cure}"),
+            None => cure.to_string(),
+        });
+        self.cure = Some(Box::new(cure));
+        self
+    }
+
+    /// What the fault is about, without its numbers: the same before and after a change that does not take it away.
+    pub fn kind(&self) -> String {
+        let text: String =
+            self.problem.chars().filter(|c| !c.is_ascii_digit() && !"-.−".contains(*c)).collect();
+        format!("{}: {text}", self.field.split('[').next().unwrap_or_default())
+    }
+
+    /// The kinds of all faults.
+    pub fn kinds(&self) -> Vec<String> {
+        std::iter::once(self).chain(&self.more).map(Self::kind).collect()
     }
 
     /// The same fault, with advice.

@@ -8,6 +8,7 @@
 mod body_rules;
 pub mod calibration;
 pub mod catalogue;
+mod change;
 mod derive;
 mod design;
 mod error;
@@ -52,7 +53,21 @@ impl Design {
     /// The first fault of the file: see [`DesignError`].
     pub fn load(path: &Path) -> Result<Self, DesignError> {
         let folder = path.parent().unwrap_or(Path::new(""));
-        Self::from_text(&read_text(path)?, folder).map_err(|error| error.in_file(path))
+        Self::from_text_with_cures(&read_text(path)?, folder).map_err(|error| error.in_file(path))
+    }
+
+    /// [`Design::from_text`], where a fault of the rules between fields names a change that was tried and takes it away.
+    /// Trying takes some tenths of a second.
+    ///
+    /// # Errors
+    /// As [`Design::from_text`].
+    pub fn from_text_with_cures(text: &str, folder: &Path) -> Result<Self, DesignError> {
+        filled_design(text, Some(folder)).map_err(|fault| match *fault {
+            (error, Some(given)) => change::with_cures_by_rules(&given, error, |whole| {
+                resolve::resolve(from_value(&whole)?, text, Vec::new()).map(|_| ())
+            }),
+            (error, None) => error,
+        })
     }
 
     /// Resolves a design from its text; the paths in it are from `folder`.
@@ -60,20 +75,27 @@ impl Design {
     /// # Errors
     /// The first fault of the text: see [`DesignError`].
     pub fn from_text(text: &str, folder: &Path) -> Result<Self, DesignError> {
-        filled_design(text, Some(folder))
+        filled_design(text, Some(folder)).map_err(|fault| fault.0)
     }
 }
 
+/// A fault, and the tree that it is of where every field is as the schema says.
+type Unresolved = (DesignError, Option<Value>);
+
 /// A design from its text, with what it takes from elsewhere; one that took something has a text of its own, complete
-/// in itself.
-fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, DesignError> {
-    let mut value = parse_json(text)?;
-    check_version(&value)?;
-    let filling = fill(&mut value, folder)?;
+/// in itself. A fault comes with the filled tree, where there is one whose every field is as the schema says.
+fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, Box<Unresolved>> {
+    let plain = |error| Box::new((error, None));
+    let mut value = parse_json(text).map_err(plain)?;
+    check_version(&value).map_err(plain)?;
+    let filling = fill(&mut value, folder).map_err(plain)?;
     let filled = if filling.fields.is_empty() { None } else { Some(format!("{value:#}\n")) };
-    schema::check(schema::open_schema(), &value, "")?;
-    let derived = derive(&mut value)?;
-    let mut design = resolve::resolve(from_value(&value)?, filled.as_deref().unwrap_or(text), derived)?;
+    schema::check(schema::open_schema(), &value, "").map_err(plain)?;
+    let text = filled.as_deref().unwrap_or(text);
+    let given = value.clone();
+    let resolved =
+        derive(&mut value).and_then(|derived| resolve::resolve(from_value(&value)?, text, derived));
+    let mut design = resolved.map_err(|error| Box::new((error, Some(given))))?;
     design.warnings.extend(filling.warnings);
     Ok(design)
 }
@@ -83,7 +105,7 @@ impl std::str::FromStr for Design {
 
     /// Resolves a design from its text, which lies in no folder: see [`Design::from_text`].
     fn from_str(text: &str) -> Result<Self, DesignError> {
-        filled_design(text, None)
+        filled_design(text, None).map_err(|fault| fault.0)
     }
 }
 

@@ -1,7 +1,5 @@
 //! The claimed loads: each within every limit, or with the smaller load that is.
 
-use std::path::Path;
-
 use domecast_optics::numeric::Rigid;
 use domecast_springs::{Check, Direction, Limits, Suspension, Wrench, reach};
 use glam::DVec3;
@@ -110,16 +108,8 @@ fn scaled(claim: &LoadClaim, factor: f64) -> LoadClaim {
 
 /// Whether the design with this claim carries it.
 fn is_carried(design: &Design, index: usize, claim: &LoadClaim) -> bool {
-    let mut list = design.sections().loads.claims.clone();
-    let Some(place) = list.get_mut(index) else { return false };
-    *place = claim.clone();
-    let changed = || -> Option<Design> {
-        let mut tree: serde_json::Value = serde_json::from_str(design.text()).ok()?;
-        let loads = tree.as_object_mut()?.entry("loads").or_insert_with(|| json!({}));
-        loads.as_object_mut()?.insert("claims".into(), json!(list));
-        Design::from_text(&tree.to_string(), Path::new("")).ok()
-    };
-    let Some(changed) = changed() else { return false };
+    let change = Cure { field: format!("loads.claims[{index}]"), value: json!(claim) };
+    let Ok(changed) = design.changed(&change) else { return false };
     let Ok(suspension) = suspension_of(&changed) else { return false };
     let Some(case) = claims_of(&changed, &suspension).into_iter().nth(index) else { return false };
     if case.passed().next().is_some() {

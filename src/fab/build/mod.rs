@@ -17,6 +17,8 @@
 
 pub mod check;
 mod claims;
+mod cures;
+mod making;
 mod manifest;
 mod measured;
 mod tree;
@@ -36,12 +38,13 @@ use crate::artwork::RenderError;
 use crate::constants;
 use crate::light::LightCheck;
 use crate::report;
+use domecast_design::layout::LayoutError;
 use domecast_design::layout::report::LayoutReport;
-use domecast_design::layout::{Layout, LayoutError, LayoutSpec};
 use domecast_design::parts;
 use domecast_design::parts::PartError;
 use domecast_design::settings::SAFETY;
 use domecast_design::{Design, DesignError, DesignWarning};
+use making::{MadeParts, lay_out, make_parts};
 
 /// Why a build could not be made.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -145,7 +148,10 @@ pub fn build_with(
     step: &mut dyn FnMut(&str),
 ) -> Result<Build, BuildError> {
     make(design, measured, step).map_err(|error| match error {
-        BuildError::Design(error) => design.with_lints(with_value(design, *error)).into(),
+        BuildError::Design(error) => {
+            let error = cures::with_cures(design, with_value(design, *error));
+            design.with_lints(error).into()
+        }
         ours @ BuildError::Ours(_) => ours,
     })
 }
@@ -294,38 +300,6 @@ fn pretty(value: &impl serde::Serialize) -> Vec<u8> {
     let mut text = serde_json::to_string_pretty(value).unwrap_or_default();
     text.push('\n');
     text.into_bytes()
-}
-
-/// The parts, checked in their assembly, and their files.
-struct MadeParts {
-    made: Vec<parts::Part>,
-    assembly: parts::Assembly,
-    checked: parts::CheckedSensor,
-    files: Vec<parts::PartFile>,
-    /// Names of the positions at which the assembly was checked.
-    poses: Vec<String>,
-}
-
-fn make_parts(
-    design: &Design,
-    layout: &Layout,
-    springs: &constants::DesignSprings,
-) -> Result<MadeParts, PartError> {
-    let measures = springs.sight.measures()?;
-    let made = parts::build_seated(design, measures, &layout.passes)?;
-    let assembly = parts::Assembly::of(measures, &made)?;
-    let mut checked = parts::check_sensor(design, measures, &made, &assembly, &layout.dots)?;
-    checked.notes.extend(parts::stroke_notes(measures, &layout.passes));
-    let files = parts::files(design, measures, &made, &assembly)?;
-    let poses = measures.poses.iter().map(|pose| pose.name.clone()).collect();
-    Ok(MadeParts { made, assembly, checked, files, poses })
-}
-
-/// The layout of a design's dots, and what it was made from.
-fn lay_out(design: &Design) -> Result<(LayoutSpec, Layout), DesignError> {
-    let spec = LayoutSpec::of_design(design)?;
-    let layout = Layout::new(&spec)?;
-    Ok((spec, layout))
 }
 
 /// Makers report the field at fault; its value stands in the design.

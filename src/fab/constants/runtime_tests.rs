@@ -108,6 +108,7 @@ fn noise_leaves_the_bound_on_every_design_and_claim() {
         "thumb24-pinhole.json",
         "thumb24-wide.json",
         "endoscope-r5.json",
+        "picam-r20.json",
     ] {
         let design = thumb(name);
         let suspension = suspension_of(&design).unwrap();

@@ -30,19 +30,28 @@ pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), Desig
         // Light from outside does not grow with the lights.
         let stray = FULL * design.sections().exposure.stray_level;
         let factor = (MIN_DOME_LEVEL - stray) / (dome.median_level - stray).max(f64::MIN_POSITIVE);
-        let cure = brighter(design, 1.1 * factor.max(1.0));
-        let text = format!("{cure}, or a larger exposure.max_level_per_mw_mm2 where the camera has it");
-        return Err(DesignError::at(
-            "leds.radiant_flux_mw",
-            json!(leds.radiant_flux_mw),
+        // An exposure that follows the brightest place takes back what brighter lights give.
+        let follows = design.sections().exposure.level_per_mw_mm2.is_none() && !report.is_exposure_at_limit;
+        let field =
+            if follows { "leds.center_z_mm or leds.center_radius_mm" } else { "leds.radiant_flux_mw" };
+        let fault = DesignError::at(
+            field,
+            if follows { json!(leds.center_z_mm) } else { json!(leds.radiant_flux_mw) },
             format!(
                 "the dome is dark: its median is {} of 255 with the camera's exposure, and dots on it cannot be told from it",
                 typeset(dome.median_level)
             ),
             format!("a median of at least {}", typeset(MIN_DOME_LEVEL)),
-        )
-        .with_cure(cure)
-        .with_help(text));
+        );
+        if follows {
+            return Err(fault.with_help(
+                "the camera exposes for the brightest place: let the lights reach more of the dome \
+                 (leds.center_z_mm, leds.center_radius_mm, leds.tilt_deg, leds.lip_top_z_mm)",
+            ));
+        }
+        let cure = brighter(design, 1.1 * factor.max(1.0));
+        let text = format!("{cure}, or a larger exposure.max_level_per_mw_mm2 where the camera has it");
+        return Err(fault.with_cure(cure).with_help(text));
     }
     let dimmest = report.markers.iter().min_by(|a, b| a.contrast_levels.total_cmp(&b.contrast_levels));
     let Some(marker) = dimmest.filter(|marker| marker.contrast_levels < MIN_MARKER_RISE_LEVELS) else {

@@ -35,6 +35,9 @@
 //! A stage knows only the types of the ones before it. The white markers are looked for where the last frame's pose
 //! puts them, the dots where this frame's does.
 //!
+//! Constants with neither springs nor white markers are those of a rigid mount: its platform is at rest in every frame.
+//! The stages `pose` and `wrench` say nothing then, and the dots' displacements are those of the dome alone.
+//!
 //! # The steps, and what each buys
 //!
 //! The paper (arXiv 2303.03093) undistorts, blurs, masks, sharpens and greys every frame as a whole, thresholds it

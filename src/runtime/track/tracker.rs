@@ -151,7 +151,7 @@ impl Tracker {
             WrenchEstimate::at_pose(springs, &refined.pose, &refined.covariance, pose.variance_factor)
         });
         let displacements_mm =
-            pose.refined.map(|_| self.displacements.at_pose(optics, &model.dots, dots.tracks));
+            pose.is_known().then(|| self.displacements.at_pose(optics, &model.dots, dots.tracks));
         let is_empty = pose.refined.is_none() && dots.tracks.iter().all(|track| track.spot.is_none());
         let sharpness = is_empty.then(|| sharpness(&plane, &model.mask, &exposure));
         let discs = self.markers.discs();

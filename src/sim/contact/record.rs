@@ -19,10 +19,10 @@ pub struct ContactTruth {
     pub penetration_mm: Option<f64>,
     /// Iterations of the last contact solve; null where nothing was solved.
     pub iterations: Option<u32>,
-    /// What springs and contact are out of balance by, N (moments counted over the springs' reach); null where nothing was
-    /// solved.
+    /// What springs and contact are out of balance by, N (moments counted over the springs' reach), on a rigid mount what
+    /// a force that is asked for is missed by; null where nothing was solved.
     pub balance_residual_n: Option<f64>,
-    /// Contact solves that their balance took; null where nothing was solved.
+    /// Contact solves that this took; null where nothing was solved.
     pub solves: Option<u32>,
 }
 

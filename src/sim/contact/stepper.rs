@@ -102,8 +102,7 @@ impl<'a> Stepper<'a> {
             Ok(Touch { state, contact: None, solved: ContactTruth::away() })
         };
         let Some(object) = self.scene.objects().first() else { return free(self.scene) };
-        // Objects on a rigid mount are refused when the scene is read.
-        let Some(suspension) = self.scene.suspension() else { return free(self.scene) };
+        let suspension = self.scene.suspension();
         let radius_mm = self.scene.optics().dome_radius_mm();
         let before = self.last.as_ref();
         let solved = match object.hold_at(time_s) {
@@ -115,10 +114,16 @@ impl<'a> Stepper<'a> {
                 self.last = None;
                 return free(self.scene);
             }
-            Hold::At(pose) => self.contact.press(&object.indenter, suspension, &pose, before),
-            Hold::Pressed(pose, way, force_n) => {
-                self.contact.press_with_force(&object.indenter, suspension, &pose, way, force_n, before)
-            }
+            Hold::At(pose) => match suspension {
+                Some(suspension) => self.contact.press(&object.indenter, suspension, &pose, before),
+                None => self.contact.press_held(&object.indenter, &pose, before),
+            },
+            Hold::Pressed(pose, way, force_n) => match suspension {
+                Some(suspension) => {
+                    self.contact.press_with_force(&object.indenter, suspension, &pose, way, force_n, before)
+                }
+                None => self.contact.press_held_with_force(&object.indenter, &pose, way, force_n, before),
+            },
         };
         let pressed = solved.map_err(|error| {
             let fault = DesignError::at(
@@ -163,6 +168,9 @@ fn way_out(error: &ContactError) -> Option<String> {
             "move `position_mm` away from the dome by at least {:.3} mm, or leave the depth to a force (`press`)",
             (depth_mm - limit_mm).max(0.0)
         )),
+        ContactError::ForceTooLarge { reached_n, .. } => {
+            Some(format!("ask for less force (`press.force`), at most {:.2} N", (100.0 * reached_n).floor() / 100.0))
+        }
         ContactError::Unseen { .. } => Some(
             "take smaller elements (`contact.element_mm`), a thicker object, or the geometric level (`contact.level`)"
                 .into(),

@@ -22,7 +22,8 @@ const MAX_FRAMES: u32 = 17;
 /// All geometric effects that the scene calls for.
 pub fn called_for(scene: &Scene) -> Geometry {
     let lens = scene.optics().lens();
-    let moves = scene.motion().moves() || !scene.objects().is_empty();
+    // A rigid mount does not give way to what touches the dome.
+    let moves = scene.suspension().is_some() && (scene.motion().moves() || !scene.objects().is_empty());
     let layers = scene.optics().layers();
     let bends = layers.iter().any(|layer| layer.index != [1.0; 3]);
     Geometry {

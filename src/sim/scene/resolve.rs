@@ -64,8 +64,9 @@ fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
 fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimError> {
     check(&file)?;
     let layout = Layout::of_design(&design)?;
-    if design.is_rigid() {
-        check_rigid(&file)?;
+    if design.is_rigid() && file.motion.is_some() {
+        let allowed = "no `motion`: objects may press on the dome, or a design with mount.kind = \"springs\"";
+        return Err(DesignError::at("motion", "", "rigid mount: the platform does not move", allowed).into());
     }
     check_dome(&file, &design)?;
     let suspension = if design.is_rigid() { None } else { Some(suspension_of(&design)?) };
@@ -160,22 +161,6 @@ fn check(file: &SceneFile) -> Result<(), DesignError> {
                 "no `motion` beside objects: what they press is what the springs carry",
             ));
         }
-    }
-    Ok(())
-}
-
-/// A scene of a rigid mount shows the sensor at rest: the platform does not move, and what objects press is not computed
-/// without springs.
-fn check_rigid(file: &SceneFile) -> Result<(), DesignError> {
-    let fault = |field: &str, problem: &str| {
-        let problem = format!("rigid mount: {problem}");
-        Err(DesignError::at(field, "", problem, "a scene at rest, or a design with mount.kind = \"springs\""))
-    };
-    if file.motion.is_some() {
-        return fault("motion", "the platform does not move");
-    }
-    if !file.objects.is_empty() {
-        return fault("objects", "contact is computed on springs only");
     }
     Ok(())
 }

@@ -93,3 +93,25 @@ fn floor_under_a_slanting_pocket() {
         b
     });
 }
+
+#[test]
+fn all_thin_walls_come_together() {
+    let mut m = Measures::of(&thumb24()).unwrap();
+    m.process.min_wall_mm = LIMIT_MM;
+    let mut b = slab();
+    b.cut.push(Feature::new("hole a", "hole.a", hole(2.0)).at(0.0, 0.0));
+    b.cut.push(Feature::new("hole b", "hole.b", hole(1.5)).at(3.5 + 0.3, 0.0));
+    b.cut.push(Feature::new("hole b", "hole.b", hole(1.5)).at(-3.5 - 0.2, 0.0));
+    b.cut.push(Feature::new("hole c", "hole.c", hole(1.0)).at(0.0, 3.4));
+    let Err(PartError::Several(walls)) = walls::check(&b, &m, None) else { panic!("two kinds of walls") };
+    let named: Vec<(&str, f64)> = walls
+        .iter()
+        .map(|wall| match wall {
+            PartError::Infeasible { field, value_mm, .. } => (field.as_str(), *value_mm),
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(named.len(), 2, "{named:?}");
+    assert!(named[0].0 == "hole.a or hole.b" && (named[0].1 - 0.2).abs() < 0.003, "the thinnest: {named:?}");
+    assert!(named[1].0 == "hole.a or hole.c" && (named[1].1 - 0.4).abs() < 0.003, "{named:?}");
+}

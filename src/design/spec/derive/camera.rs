@@ -2,8 +2,10 @@
 
 use serde_json::{Value, json};
 
+use super::board::{above_mm, has_board};
 use super::geometry::{
-    depth_for_mm, depth_mm, lens, marks_angle_rad, press_mm, rim_mm, sheet_mm, usable_angle_rad,
+    depth_for_mm, depth_mm, lens, lower_top_mm, marks_angle_rad, press_mm, rim_mm, sheet_mm, travel_mm,
+    usable_angle_rad,
 };
 use super::known::{Known, up};
 use super::rule::{Rule, fixed, follows};
@@ -82,7 +84,8 @@ pub(super) const PLACE: &[Rule] = &[
     follows(
         "camera.position_mm",
         "on the axis, as near as it can be: the markers inside image, lens model and 62 degrees under the claimed \
-         loads, the body below the upper platform at full travel and in its bore for 2.4 mm",
+         loads, the body below the upper platform at full travel and in its bore for 2.4 mm, or the block high enough for a \
+         board's screws",
         position,
     ),
     follows("runtime.mask_radius_px", "half of the image's smaller side", |k| {
@@ -135,9 +138,10 @@ fn position(k: &Known<'_>) -> Option<Value> {
         k.wrong("the lens shows nothing about its axis");
     }
     let (front, length) = (k.n("camera_body.front_from_pupil_mm"), k.n("camera_body.length_mm"));
-    let (under, springs) = (-k.n("platforms.upper.underside_z_mm"), k.n("springs.free_length_mm"));
-    let clear = under + front + 0.7 * springs + 0.5;
-    let held = under + springs + 2.4 + front - length;
+    let under = -k.n("platforms.upper.underside_z_mm");
+    let clear = under + front + travel_mm(k) + 0.5;
+    let holds = if has_board(k) { above_mm(k) } else { 2.4 };
+    let held = -lower_top_mm(k) + holds + front - length;
     let gap = sheet_mm(k) + front + k.n("camera_body.min_sheet_gap_mm") + press_mm(k);
     let depth = depth_for_mm(k, angle_rad).max(clear).max(held).max(gap);
     k.numbers(&[0.0, 0.0, -up(depth, 0.1)])

@@ -76,7 +76,17 @@ pub(super) fn marks_mm(k: &Known<'_>) -> f64 {
 
 /// How far the claimed loads press the platform down, with what they tilt it by, mm.
 pub(super) fn press_mm(k: &Known<'_>) -> f64 {
-    0.46 * k.n("springs.free_length_mm")
+    if k.is_rigid() { 0.0 } else { 0.46 * k.n("springs.free_length_mm") }
+}
+
+/// How far the upper platform can come down at all, mm.
+pub(super) fn travel_mm(k: &Known<'_>) -> f64 {
+    if k.is_rigid() { 0.0 } else { 0.7 * k.n("springs.free_length_mm") }
+}
+
+/// Distance between the platforms, mm.
+pub(super) fn between_mm(k: &Known<'_>) -> f64 {
+    k.n(if k.is_rigid() { "mount.height_mm" } else { "springs.free_length_mm" })
 }
 
 /// Distance off the axis at which a ray that leaves the pupil at an angle meets the sheet's top, mm; `gap_mm` is the
@@ -148,7 +158,7 @@ pub(super) fn tilt(k: &Known<'_>) -> (f64, f64) {
 
 /// Height of the lower platform's top, mm.
 pub(super) fn lower_top_mm(k: &Known<'_>) -> f64 {
-    k.n("platforms.upper.underside_z_mm") - k.n("springs.free_length_mm")
+    k.n("platforms.upper.underside_z_mm") - between_mm(k)
 }
 
 /// Height of the camera's back, mm.

@@ -35,6 +35,11 @@ impl<'a> Known<'a> {
         lookup(self.tree, path).is_some()
     }
 
+    /// Whether the platform stands on posts.
+    pub(super) fn is_rigid(&self) -> bool {
+        self.value("mount.kind").is_some_and(|kind| kind == "rigid")
+    }
+
     /// The field as JSON.
     pub(super) fn value(&self, path: &str) -> Option<&'a Value> {
         lookup(self.tree, path)

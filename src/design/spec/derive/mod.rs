@@ -6,6 +6,7 @@
 //! The rules are those that `designs/thumb24.json` was drawn by, written out: heights from what must fit over each
 //! other, radii from the camera's view, sides from the radii and the process's walls. They are choices, not optima.
 
+mod board;
 mod camera;
 mod geometry;
 mod known;
@@ -34,6 +35,7 @@ fn rules() -> impl Iterator<Item = &'static Rule> {
         camera::LAYERS,
         camera::BODY,
         springs::PURCHASED,
+        mount::POSTS,
         platforms::LIGHTS,
         springs::LOADS,
         platforms::HEIGHTS,
@@ -41,6 +43,8 @@ fn rules() -> impl Iterator<Item = &'static Rule> {
         platforms::LIGHT_PLACES,
         springs::RING,
         platforms::OUTLINE,
+        mount::POST_PLACES,
+        platforms::LOWER,
         pattern::RULES,
         making::TOOLS,
         making::EXACTNESS,

@@ -2,10 +2,15 @@
 
 use serde_json::{Value, json};
 
+use glam::DVec2;
+
+use super::board::{self, has_board};
 use super::geometry::{
-    back_mm, bore_mm, depth_mm, dome, lower_top_mm, pocket_mm, rim_mm, sheet_mm, tilt, view_mm, wall_mm,
+    back_mm, bore_mm, depth_mm, dome, lower_top_mm, pocket_mm, rim_mm, sheet_mm, tilt, travel_mm, view_mm,
+    wall_mm,
 };
 use super::known::{Known, down, up};
+use super::mount::beside_posts;
 use super::room::{HOLE_IN_RECESS_MM, half_mm, ring_count, ring_mm, spring_count, springs_reach_mm};
 use super::rule::{Rule, fixed, follows};
 
@@ -100,15 +105,18 @@ pub(super) const LIGHT_PLACES: &[Rule] = &[
     }),
 ];
 
-pub(super) const OUTLINE: &[Rule] = &[
-    follows(
-        "platforms.outer_mm",
-        "square; sheet and rim, boards, springs, and mounting holes in the corners, each with its wall",
-        |k| {
-            let half = half_mm(k, springs_reach_mm(k) + pocket_mm(k) + wall_mm(k));
-            k.numbers(&[2.0 * half, 2.0 * half])
-        },
-    ),
+pub(super) const OUTLINE: &[Rule] = &[follows(
+    "platforms.outer_mm",
+    "square; sheet and rim, boards, springs, and mounting holes in the corners, each with its wall; round a camera's \
+         board a wall, and holes and posts beside it",
+    |k| {
+        let half = half_mm(k, springs_reach_mm(k) + pocket_mm(k) + wall_mm(k));
+        let sides = if has_board(k) { board::half_mm(k, half) } else { DVec2::splat(half) };
+        k.numbers(&[2.0 * sides.x, 2.0 * sides.y])
+    },
+)];
+
+pub(super) const LOWER: &[Rule] = &[
     follows(
         "platforms.lower.clamp.hole_diameter_mm",
         "for tapping the thinnest of M2 to M6 of which a set screw, sunk by three diameters, reaches the body; where \
@@ -116,8 +124,7 @@ pub(super) const OUTLINE: &[Rule] = &[
         tapped,
     ),
     follows("platforms.lower.cable_exit.width_mm", "the cable and 0.7 mm", |k| {
-        let flat = k.has("camera_body.cable_width_mm");
-        k.number(k.n(if flat { "camera_body.cable_width_mm" } else { "camera_body.cable_diameter_mm" }) + 0.7)
+        k.number(board::cable_mm(k) + board::EXIT_MM)
     }),
     follows(
         "platforms.lower.cable_exit.height_mm",
@@ -126,8 +133,8 @@ pub(super) const OUTLINE: &[Rule] = &[
     ),
     follows(
         "platforms.lower.cable_exit.azimuth_deg",
-        "below the second spring, clear of screws and wires",
-        |k| k.number(spring_azimuth_deg(k, 1)),
+        "where the board says that its cable leaves; else below the second spring, clear of screws and wires",
+        |k| k.number(board::cable_deg(k).unwrap_or_else(|| spring_azimuth_deg(k, 1))),
     ),
     follows(
         "platforms.lower.underside_z_mm",
@@ -149,15 +156,33 @@ pub(super) const OUTLINE: &[Rule] = &[
         k.number(k.n("process.min_hole_diameter_mm").max(2.2))
     }),
     follows(
+        "platforms.lower.mounting.counterbore_depth_mm",
+        "none; between short posts what the screws' heads are too high by, with 0.3 mm",
+        |k| k.number(counterbore_mm(k)),
+    ),
+    follows(
+        "platforms.lower.mounting.counterbore_diameter_mm",
+        "none, or twice the holes for the heads",
+        |k| {
+            let heads = 2.0 * k.n("platforms.lower.mounting.hole_diameter_mm");
+            k.number(if k.n("platforms.lower.mounting.counterbore_depth_mm") > 0.0 { heads } else { 0.0 })
+        },
+    ),
+    follows(
         "platforms.lower.mounting.at_mm",
-        "in the corners, the hole's radius and three walls from the sides",
+        "in the corners, the hole's radius and two walls from the sides; on a rigid mount, whose posts stand there, up to \
+         four along the sides, clear of posts, set screws and cable",
         mounting,
     ),
-    fixed("platforms.lower.mounting.counterbore_diameter_mm", "0", "no counterbores"),
-    fixed("platforms.lower.mounting.counterbore_depth_mm", "0", "no counterbores"),
-    follows("platforms.lower.wire_hole_diameter_mm", "for two thin wires, or the smallest hole", |k| {
-        k.number(k.n("process.min_hole_diameter_mm").max(1.5))
-    }),
+    follows(
+        "platforms.lower.wire_hole_diameter_mm",
+        "for two thin wires, or the smallest hole; none over a camera's board or between posts: there the wires leave \
+         between the platforms",
+        |k| {
+            let hole = k.n("process.min_hole_diameter_mm").max(1.5);
+            k.number(if has_board(k) || k.is_rigid() { 0.0 } else { hole })
+        },
+    ),
     follows("platforms.lower.wire_hole_ring_radius_mm", "a wall and 0.45 mm from the nearest side", |k| {
         let half = 0.5 * k.at("platforms.outer_mm", 0).min(k.at("platforms.outer_mm", 1));
         let hole = 0.5 * k.n("platforms.lower.wire_hole_diameter_mm");
@@ -203,7 +228,9 @@ fn underside(k: &Known<'_>) -> Option<Value> {
     let boards =
         k.n("leds.center_z_mm") + k.n("leds.board_offset_mm") - foot - k.n("process.min_wall_mm") - 0.2;
     let pockets = k.n("magnets.thickness_mm") + k.n("magnet_pockets.depth_clearance_mm") + wall_mm(k);
-    k.number(down(boards.min(-(sheet_mm(k) + pockets)), 0.1))
+    // the posts' screws end a wall below the sheet
+    let screws = if k.is_rigid() { 2.0 * k.n("mount.hole_diameter_mm") + wall_mm(k) } else { 0.0 };
+    k.number(down(boards.min(-(sheet_mm(k) + pockets.max(screws))), 0.1))
 }
 
 fn light_radius(k: &Known<'_>) -> Option<Value> {
@@ -219,8 +246,7 @@ fn lip(k: &Known<'_>) -> Option<Value> {
     let top = k.n("leds.center_z_mm") + 0.5 * k.n("leds.emitter_mm");
     let lens = 0.5 * k.n("camera_body.lens_diameter_mm") + 1.0;
     // the platform comes down on the camera, at most until the sheet's gap closes
-    let down_mm = 0.7 * k.n("springs.free_length_mm");
-    let front = k.n("camera_body.front_from_pupil_mm") - depth_mm(k) + down_mm;
+    let front = k.n("camera_body.front_from_pupil_mm") - depth_mm(k) + travel_mm(k);
     let inner = view_mm(k, top).min(radius - 0.2);
     let line = top - (top - front).max(0.0) * (radius - inner) / (radius + lens);
     // and a quarter of the package behind it, which keeps the light's foot dark
@@ -339,7 +365,21 @@ fn clamp_height(k: &Known<'_>) -> Option<Value> {
     k.number(super::known::tidy(0.5 * (low + high.max(low))))
 }
 
+/// How deep screws' heads have to be sunk under an upper platform that stands close above, mm.
+fn counterbore_mm(k: &Known<'_>) -> f64 {
+    if !k.is_rigid() {
+        return 0.0;
+    }
+    // a head is as high as its screw is thick
+    up((k.n("platforms.lower.mounting.hole_diameter_mm") + 0.3 - k.n("mount.height_mm")).max(0.0), 0.05)
+}
+
 fn mounting(k: &Known<'_>) -> Option<Value> {
+    if k.is_rigid()
+        && let Some(places) = beside_posts(k)
+    {
+        return k.places(&places);
+    }
     let from_side = 0.5 * k.n("platforms.lower.mounting.hole_diameter_mm") + 2.0 * wall_mm(k);
     let x = 0.5 * k.at("platforms.outer_mm", 0) - from_side;
     let y = 0.5 * k.at("platforms.outer_mm", 1) - from_side;

@@ -87,7 +87,7 @@ pub(super) fn half_mm(k: &Known<'_>, springs_mm: f64) -> f64 {
         (k.n("platforms.upper.rim_height_mm") - sheet_mm(k) - k.n("leds.center_z_mm")) * cos / sin.max(0.3);
     let lights = k.n("leds.center_radius_mm") + deep / sin.max(0.3) + lean + wall;
     let camera = bore_mm(k) + wall;
-    // set screws pass the mounting holes 15 degrees off
-    let screws = 8.8;
+    // set screws pass the mounting holes, or the wider heads of the posts' screws, 15 degrees off
+    let screws = if k.is_rigid() { 12.5 } else { 8.8 };
     up(sheet.max(lights).max(springs_mm).max(camera).max(screws).max(marks_mm(k) + wall), 0.25)
 }

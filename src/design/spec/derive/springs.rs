@@ -1,7 +1,9 @@
 //! Springs, magnets, and the loads that they carry.
 
+use glam::DVec2;
 use serde_json::{Value, json};
 
+use super::board::{has_board, is_clear_of_pocket};
 use super::geometry::{pocket_mm, wall_mm};
 use super::known::{Known, down, up};
 use super::room::{HOLE_IN_RECESS_MM, first_deg, half_mm, ring_count, ring_mm, spring_count};
@@ -45,7 +47,8 @@ pub(super) const RING: &[Rule] = &[
     follows(
         "springs.places",
         "on a ring as far in as view, camera and lights allow, and moved out to the platforms' wall; six of them, two \
-         between neighbouring lights, or three where six would need a ring half as wide again",
+         between neighbouring lights, or three where six would need a ring half as wide again; their push-out holes clear of \
+         the edge of a camera board's pocket",
         places,
     ),
     follows(
@@ -64,7 +67,7 @@ pub(super) const RING: &[Rule] = &[
 
 fn claims(k: &Known<'_>) -> Option<Value> {
     // A rigid mount promises no net wrench.
-    if k.value("mount.kind").is_some_and(|kind| kind == "rigid") {
+    if k.is_rigid() {
         return Some(Value::Array(Vec::new()));
     }
     let dome = super::geometry::dome(k);
@@ -100,10 +103,25 @@ fn places(k: &Known<'_>) -> Option<Value> {
     // the push-out holes lead up into the sheet's recess
     let recess = 0.5 * k.at("sheet.size_mm", 0).min(k.at("sheet.size_mm", 1)) + k.n("sheet.clearance_mm");
     let hole = 0.5 * k.n("magnet_pockets.push_out_diameter_mm");
-    let radius_mm = down((reach - wall).min(recess - hole - HOLE_IN_RECESS_MM), 0.01);
+    let widest_mm = down((reach - wall).min(recess - hole - HOLE_IN_RECESS_MM), 0.01);
+    let radius_mm = if has_board(k) { beside_pocket_mm(k, count, widest_mm, hole) } else { widest_mm };
     Some(
         json!({ "ring": { "count": count, "radius_mm": radius_mm, "first_azimuth_deg": first_deg(k, count) } }),
     )
+}
+
+/// The widest ring, up to a radius, whose push-out holes leave no thin wall beside a board's pocket, mm.
+fn beside_pocket_mm(k: &Known<'_>, count: usize, widest_mm: f64, hole_mm: f64) -> f64 {
+    const STEP_MM: f64 = 0.05;
+    let narrowest_mm = ring_mm(k, count);
+    let is_clear = |radius: &f64| {
+        (0..count).all(|i| {
+            let azimuth_deg = first_deg(k, count) + 360.0 * i as f64 / count as f64;
+            is_clear_of_pocket(k, *radius * DVec2::from_angle(azimuth_deg.to_radians()), hole_mm)
+        })
+    };
+    let steps = (0..400).map(|step| down(widest_mm - STEP_MM * f64::from(step), 0.01));
+    steps.take_while(|radius| *radius >= narrowest_mm).find(is_clear).unwrap_or(widest_mm)
 }
 
 fn wire(k: &Known<'_>) -> Option<Value> {

@@ -43,7 +43,11 @@ fn radius_and_lens_make_a_design() {
 fn every_rule_reads_only_what_stands_before_it() {
     // from the minimal design every rule is applied; one that read a later field would find no number
     let mut design = minimal(10.0);
-    let given = derive(&mut design).unwrap();
+    let mut given = derive(&mut design).unwrap();
+    // posts are a rigid mount's
+    let mut rigid = minimal(10.0);
+    rigid["mount"] = json!({ "kind": "rigid" });
+    given.extend(derive(&mut rigid).unwrap().into_iter().filter(|field| field.field.starts_with("mount.")));
     for rule in rules() {
         let is_other = ["camera.field_of_view_deg", "camera.distortion"].contains(&rule.field);
         let found = given.iter().any(|field| field.field == rule.field);
@@ -68,6 +72,42 @@ fn a_given_field_wins_and_the_others_follow_it() {
     assert!(depth(&design) > depth(&plain), "longer springs need a deeper camera");
     let outer = |design: &Value| design["platforms"]["outer_mm"][0].as_f64().unwrap();
     assert!(outer(&design) > outer(&plain), "thicker walls need more room");
+}
+
+#[test]
+fn cameras_on_boards_and_rigid_mounts_follow_from_a_radius() {
+    for camera in crate::catalogue::entries(crate::catalogue::CatalogueKind::Cameras) {
+        for mount in ["springs", "rigid"] {
+            for radius_mm in [4.0, 10.0, 25.0] {
+                let text = json!({
+                    "version": 1, "name": "least", "camera": { "from": camera.key },
+                    "camera_body": { "from": camera.key }, "dome": { "radius_mm": radius_mm },
+                    "mount": { "kind": mount },
+                });
+                let name = format!("{} {mount} R = {radius_mm}", camera.key);
+                let design: Design =
+                    text.to_string().parse().unwrap_or_else(|error| panic!("{name}: {error}"));
+                assert_eq!(design.is_rigid(), mount == "rigid", "{name}");
+                let sections = design.sections();
+                let holes = &sections.platforms.lower.mounting.at_mm;
+                assert!(holes.len() >= 2, "{name}: {holes:?}");
+                if design.is_rigid() {
+                    assert_eq!(sections.mount.at_mm.len(), 4, "{name}");
+                    for hole in holes {
+                        let apart = |post: &[f64; 2]| (post[0] - hole[0]).hypot(post[1] - hole[1]);
+                        let nearest = sections.mount.at_mm.iter().map(apart).fold(f64::INFINITY, f64::min);
+                        assert!(nearest > 0.5 * sections.mount.post_diameter_mm + 1.1, "{name}: {nearest}");
+                    }
+                }
+                if let Some(board) = &sections.camera_body.board {
+                    let needed = board.size_mm[0].max(board.size_mm[1]) + 2.0 * board.clearance_mm;
+                    let outer = sections.platforms.outer_mm;
+                    assert!(outer[0].min(outer[1]) > needed, "{name}: {outer:?}");
+                    assert!(sections.platforms.lower.clamp.azimuth_deg.is_empty(), "{name}");
+                }
+            }
+        }
+    }
 }
 
 #[test]

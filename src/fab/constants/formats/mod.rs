@@ -132,6 +132,8 @@ mod tests {
             "thumb24-pinhole.json",
             "thumb24-wide.json",
             "endoscope-r5.json",
+            "picam-r20.json",
+            "digit-rigid.json",
         ]
         .map(of)
         .to_vec();
@@ -161,7 +163,7 @@ mod tests {
                 looked += 1;
             }
         }
-        assert_eq!(looked, 2 * 9 + 5);
+        assert_eq!(looked, 2 * 11 + 6);
     }
 
     // A box from twelve triangles against the closed form, off its own centre.

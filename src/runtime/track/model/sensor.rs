@@ -26,7 +26,8 @@ pub(in crate::track) struct SensorModel {
     pub markers: MarkerModels,
     /// Farthest that the platform can be pressed, mm.
     pub max_press_mm: f64,
-    pub solver: PoseSolver,
+    /// Finds a pose from nothing; `None` of a rigid mount: its platform has one pose, at rest.
+    pub solver: Option<PoseSolver>,
     pub mask: Mask,
 }
 
@@ -47,21 +48,42 @@ impl SensorModel {
         if !(mask.center_px.iter().chain(matrix).all(|v| v.is_finite()) && mask.radius_px > 0.0) {
             return Err(TrackError::at("mask", "is no circle in the undistorted frame"));
         }
-        if constants.white_markers.is_empty() {
-            let problem = "are none (a rigid mount): the tracker follows the dots of a platform whose pose it finds by them";
-            return Err(TrackError::at("white_markers", problem));
-        }
+        let is_rigid = is_rigid(constants)?;
         let press_mm =
             constants.springs.as_ref().and_then(|s| s.stiffness_at.last()).map(|e| e.compression_mm);
         let max_shift_mm = press_mm.map_or(DEFAULT_MAX_SHIFT_MM, |press| press.clamp(0.5, 100.0) + 2.0);
         // Eight residuals less six of the pose: the solver's gate lets 1.84 times its noise pass as rms.
         let options = PoseOptions::new(max_residual_px.min(MAX_AMBIGUOUS_RMS_PX) / 1.84, max_shift_mm);
-        let solver = PoseSolver::new(&optics, &constants.markers(), options)
-            .map_err(|error| TrackError::at("white_markers", format!("are not usable: {error}")))?;
+        let unusable = |error| TrackError::at("white_markers", format!("are not usable: {error}"));
+        let solver = if is_rigid {
+            None
+        } else {
+            Some(PoseSolver::new(&optics, &constants.markers(), options).map_err(unusable)?)
+        };
         let dots = dots_of(constants, &optics)?;
         let max_press_mm = press_mm.unwrap_or(DEFAULT_MAX_PRESS_MM).clamp(0.0, 100.0);
         let markers = MarkerModels::new(constants, &optics, at_mm, max_press_mm)?;
         let mask = Mask::new(optics.lens(), camera, mask);
         Ok(Self { optics, dots, markers, max_press_mm, solver, mask })
     }
+}
+
+/// Constants with neither springs nor white markers are those of a rigid mount: the platform is at rest in every frame,
+/// and the dots are all that there is to follow.
+fn is_rigid(constants: &Constants) -> Result<bool, TrackError> {
+    if !constants.white_markers.is_empty() {
+        return Ok(false);
+    }
+    if constants.springs.is_some() {
+        let problem = "are none, but there are springs: where the platform is on them is found by four white markers; \
+            leave out `springs` if it cannot move (a rigid mount)";
+        return Err(TrackError::at("white_markers", problem));
+    }
+    if constants.black_dots.is_empty() {
+        return Err(TrackError::at(
+            "black_dots",
+            "are none, nor are there white markers: nothing can be followed",
+        ));
+    }
+    Ok(true)
 }

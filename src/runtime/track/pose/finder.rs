@@ -34,12 +34,21 @@ pub(in crate::track) struct PoseEstimate<'a> {
     pub refined: Option<&'a RefinedPose>,
     /// By what the covariance is to be multiplied: markers scatter more than their own deviations say.
     pub variance_factor: f64,
+    /// Whether the platform cannot move (a rigid mount): it is at rest, and nothing is measured of its pose.
+    pub is_fixed: bool,
     /// Whether another pose fits as well.
     pub is_ambiguous: bool,
     /// Markers that the pose rests on.
     pub sightings: usize,
     /// Each marker of the constants against the pose, where both are found.
     pub markers: &'a [Option<MarkerAtPose>],
+}
+
+impl PoseEstimate<'_> {
+    /// Whether it is known where the platform is.
+    pub fn is_known(&self) -> bool {
+        self.is_fixed || self.refined.is_some()
+    }
 }
 
 /// Finds the pose in frame after frame.
@@ -51,6 +60,8 @@ pub(in crate::track) struct PoseFinder {
     sightings: Vec<MarkerSighting>,
     residual_scale: ResidualScale,
     markers: Vec<Option<MarkerAtPose>>,
+    /// Whether the platform cannot move: its pose is that at rest, always.
+    is_fixed: bool,
     /// The last pose that was found, and what this frame gave.
     pose: Option<Rigid>,
     refined: Option<RefinedPose>,
@@ -61,13 +72,15 @@ impl PoseFinder {
     /// For a sensor; `max_residual_px`: largest rms of the residuals that is a pose.
     pub fn new(model: &SensorModel, max_residual_px: f64) -> Self {
         let count = model.markers.all.len();
+        let is_fixed = model.solver.is_none();
         Self {
             optics: model.optics.clone(),
             max_residual_px,
             sightings: Vec::with_capacity(count),
             residual_scale: ResidualScale::new(count),
             markers: vec![None; count],
-            pose: None,
+            is_fixed,
+            pose: is_fixed.then(Rigid::identity),
             refined: None,
             is_ambiguous: false,
         }
@@ -85,7 +98,7 @@ impl PoseFinder {
 
     /// Forgets all frames.
     pub fn restart(&mut self) {
-        self.pose = None;
+        self.pose = self.is_fixed.then(Rigid::identity);
         self.refined = None;
         self.residual_scale.restart();
     }
@@ -93,6 +106,9 @@ impl PoseFinder {
     /// The pose of the next frame, and the markers that it rests on.
     pub fn find(&mut self, frame: &MarkerFrame<'_, '_>, model: &SensorModel, markers: &mut MarkerIdentities) {
         self.is_ambiguous = false;
+        if self.is_fixed {
+            return;
+        }
         let followed = self.pose.and_then(|pose| self.follow(frame, markers, &pose));
         self.refined = followed.or_else(|| self.find_anywhere(frame, model, markers));
         match (&self.refined, self.pose) {
@@ -111,6 +127,7 @@ impl PoseFinder {
         PoseEstimate {
             refined: self.refined.as_ref(),
             variance_factor: self.residual_scale.variance_factor(),
+            is_fixed: self.is_fixed,
             is_ambiguous: self.is_ambiguous,
             sightings: self.sightings.len(),
             markers: &self.markers,
@@ -225,7 +242,8 @@ impl PoseFinder {
         for (to, from) in sightings.iter_mut().zip(&self.sightings) {
             *to = Sighting { id: from.marker.id, centroid_px: from.centroid_px };
         }
-        self.is_ambiguous = model.solver.solve(&sightings).is_ok_and(|estimate| estimate.is_ambiguous());
+        let solved = model.solver.as_ref().and_then(|solver| solver.solve(&sightings).ok());
+        self.is_ambiguous = solved.is_some_and(|estimate| estimate.is_ambiguous());
         Some(refined)
     }
 

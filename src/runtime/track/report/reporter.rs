@@ -30,7 +30,7 @@ pub(in crate::track) struct FrameFindings<'a> {
     /// Where there is a pose.
     pub wrench: Option<WrenchEstimate>,
     pub dots: DotsFound<'a>,
-    /// Of each dot, mm; where there is a pose.
+    /// Of each dot, mm; where the platform's pose is known.
     pub displacements_mm: Option<&'a [Option<DVec3>]>,
     /// Sharpness of the frame, measured where neither a pose nor a dot is found.
     pub sharpness: Option<f64>,
@@ -124,7 +124,7 @@ impl Reporter {
         }
     }
 
-    /// The dots of a frame, also of one in which nothing was looked for; `displacements_mm`: where there is a pose.
+    /// The dots of a frame, also of one in which nothing was looked for; `displacements_mm`: where the pose is known.
     pub fn dots(&mut self, dots: &DotsFound<'_>, displacements_mm: Option<&[Option<DVec3>]>) {
         self.result.searched = dots.searched;
         self.result.false_dots.clear();
@@ -159,6 +159,9 @@ impl Reporter {
             to.residual_px = at_pose.map(|at| at.residual_px);
             to.image_px = at_pose.map(|at| at.image_px);
         }
+        if pose.is_fixed {
+            return;
+        }
         let are_all_found = discs.iter().all(Option::is_some);
         self.problem_if(pose.is_ambiguous, Problem::AmbiguousPose);
         if let Some(refined) = pose.refined {
@@ -185,7 +188,7 @@ impl Reporter {
         }
         self.dots(&findings.dots, findings.displacements_mm);
         let tracks = findings.dots.tracks;
-        let known = findings.pose.refined.is_some();
+        let known = findings.pose.is_known();
         let is_blurred = self.checks.are_blurred(tracks)
             || findings.sharpness.is_some_and(|sharpness| sharpness < MIN_SHARPNESS);
         self.problem_if(is_blurred, Problem::Blurred);
@@ -199,7 +202,7 @@ impl Reporter {
         self.problem_if(lost as f64 > (MAX_LOST_PART * wanted as f64).max(1.0), Problem::DotsLost);
         let nothing =
             findings.discs.iter().all(Option::is_none) && tracks.iter().all(|track| track.spot.is_none());
-        self.problem_if(!known && nothing, Problem::NoMarks);
+        self.problem_if(findings.pose.refined.is_none() && nothing, Problem::NoMarks);
         let good = known && self.result.problems.iter().all(|p| p >= Problem::Frozen);
         self.reference.apply(&mut self.result, good);
     }

@@ -53,7 +53,7 @@ pub struct Tracked {
     pub frame: u64,
     /// What is wrong with it.
     pub problems: Problems,
-    /// `rest_from_platform`.
+    /// `rest_from_platform`; nothing is measured of it on a rigid mount, and then there is none, nor a wrench.
     pub pose: Option<Rigid>,
     /// Standard deviations of the displacement (mm, rad) about the springs' reference point, or the origin.
     pub pose_sd: Option<Displacement>,

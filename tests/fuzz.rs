@@ -90,7 +90,7 @@ fn corrupt_structure(bytes: &[u8], random: &mut Random) -> Vec<u8> {
             0 => Value::Null,
             1 => json!([]),
             2 => json!("text"),
-            3 => json!([1e308, -1e308, 5e-324, 1e15, -1][random.below(5)]),
+            3 => json!([1e308, -1e308, 5e-324, 1e15, -1.0][random.below(5)]),
             4 => other,
             _ => scaled.map_or_else(|| value.clone(), |number| json!(number)),
         };

@@ -117,6 +117,9 @@ impl Place {
             }
             _ => {}
         }
+        if about.permissions().readonly() {
+            return Err(refused(out, "is marked read-only", kind));
+        }
         if is_mount_point(real, base) {
             return Err(refused(out, "is a mount point, which cannot be replaced", kind));
         }

@@ -146,8 +146,10 @@ impl Drop for Staging {
 
 /// Puts `new` at `out`; what stood there is then at `new`, or at `old`.
 fn place(new: &Path, out: &Path, old: &Path) -> io::Result<()> {
-    if fs::symlink_metadata(out).is_err() {
-        return rename_new(new, out);
+    let Ok(about) = fs::symlink_metadata(out) else { return rename_new(new, out) };
+    if !about.is_symlink() {
+        // whom the user lets read it is theirs to say
+        let _ = fs::set_permissions(new, about.permissions());
     }
     match exchange(new, out) {
         Err(error) if error.kind() == io::ErrorKind::Unsupported => replace(new, out, old),

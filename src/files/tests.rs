@@ -55,6 +55,27 @@ fn an_unchanged_result_is_replaced_and_nothing_is_left() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn permissions_are_the_users() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = tempfile::tempdir().unwrap();
+    let (out, table) = (place.path().join("out"), place.path().join("t.csv"));
+    result(&out, "one", &ANY).unwrap();
+    file(&table, "one", &ANY).unwrap();
+    let set = |path: &Path, mode: u32| fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    set(&out, 0o750);
+    set(&table, 0o640);
+    result(&out, "two", &ANY).unwrap();
+    file(&table, "two", &ANY).unwrap();
+    assert_eq!((mode(&out), mode(&table)), (0o750, 0o640));
+    set(&out, 0o550);
+    set(&table, 0o440);
+    assert!(result(&out, "three", &FORCE).unwrap_err().to_string().contains("read-only"));
+    assert!(file(&table, "three", &FORCE).unwrap_err().to_string().contains("read-only"));
+}
+
 #[test]
 fn what_was_changed_or_added_is_refused_by_name_and_kept_by_force() {
     let spoil: [(&str, fn(&Path)); 6] = [

@@ -43,7 +43,7 @@ pub fn trace(output: &Output, design: &Path, pixels: &Path, pose: Option<&Path>)
         let by_pixel = optics.trace_with_jacobian(pixel).map_or(f64::NAN, |(_, by_pixel)| by_pixel.norm());
         let raster_px = DVec2::new(f64::from(width), f64::from(height));
         let sd_mm = ROUNDING * by_pixel * pixel.abs().max(raster_px).length();
-        if !(sd_mm <= MAX_ROUNDING_SD) {
+        if sd_mm.is_nan() || sd_mm > MAX_ROUNDING_SD {
             return none(ILL_CONDITIONED, sd_mm.is_finite().then_some(sd_mm));
         }
         json!({
@@ -75,7 +75,7 @@ pub fn project(output: &Output, design: &Path, points: &Path, pose: Option<&Path
         let by_point =
             optics.project_with_jacobian(place_mm).map_or(f64::NAN, |(_, by_point)| by_point.norm());
         let sd_px = ROUNDING * by_point * place_mm.abs().max(DVec3::splat(scale_mm)).length();
-        if !(sd_px <= MAX_ROUNDING_SD) {
+        if sd_px.is_nan() || sd_px > MAX_ROUNDING_SD {
             return none(ILL_CONDITIONED, sd_px.is_finite().then_some(sd_px));
         }
         json!({

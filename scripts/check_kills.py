@@ -79,13 +79,19 @@ def states(scenario, inputs, work):
     return before, after, [call for call in numbered[first:] if call[0] != "renameat2" or not scenario.traced]
 
 
-def killed_at(scenario, inputs, work, call, before, after):
+def killed_at(scenario, inputs, work, call, before, after, picked):
     folder = work / "killed"
     folder.mkdir()
     scenario.prepare(folder, inputs)
-    kill = ["strace", "-f", "-qq", "-o", os.devnull, "-e", f"trace={CALLS}"]
-    kill += ["-e", "inject={}:signal=KILL:when={}".format(*call), *scenario.traced]
+    strace = ["strace", "-f", "-qq", "-o", os.devnull, "-e", f"trace={CALLS}"]
+    kill = [*strace, "-e", "inject={}:signal=KILL:when={}".format(*call), *scenario.traced]
     ended = run(scenario.new, folder, kill)
+    # the run that ends what was begun may be killed too
+    name, count = picked.choice(["unlink", "unlinkat", "rmdir", "rename", "openat"]), picked.randint(1, 4)
+    count *= 12 if name == "openat" else 1
+    again = [*strace, "-e", f"inject={name}:signal=KILL:when={count}", *scenario.traced]
+    if picked.random() < 0.5:
+        run([scenario.new[0], "check", scenario.place], folder, again)
     # the next run of another command, which fails for a file and must not mind
     recovered = run([scenario.new[0], "check", scenario.place], folder)
     found, problems = contents(folder), []
@@ -125,7 +131,7 @@ def check_kills(program, inputs, work, wanted):
             early, end = calls[: -some * 2 // 3], calls[-some * 2 // 3 :]
             calls = picked.sample(early, some - len(end)) + end
         for call in calls:
-            problems = killed_at(scenario, inputs, work, call, before, after)
+            problems = killed_at(scenario, inputs, work, call, before, after, picked)
             if problems:
                 faults.append(f"{scenario.name}, {call[0]} {call[1]}: {'; '.join(problems)}")
         kills += len(calls)

@@ -220,6 +220,32 @@ fn prepare(out: &Path, is_folder: bool, random: &mut Random) {
     }
 }
 
+/// An earlier result in which one file, or its hash in the marker, was changed.
+fn edited_result(out: &Path, random: &mut Random) {
+    static EARLIER: OnceLock<BTreeMap<PathBuf, Vec<u8>>> = OnceLock::new();
+    let earlier = EARLIER.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, bytes) in seeds() {
+            fs::write(folder.path().join(name), bytes).expect("written");
+        }
+        let track = ["track", "frame_0000.png", "--constants", "constants.json", "--overlay", "o", "--quiet"];
+        let output = program(&track, folder.path());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let found = contents(&folder.path().join("o"));
+        found.into_iter().map(|(path, bytes)| (path.file_name().expect("a name").into(), bytes)).collect()
+    });
+    let _ = fs::remove_dir_all(out);
+    fs::create_dir(out).expect("made");
+    let edited = random.below(earlier.len());
+    for (index, (name, bytes)) in earlier.iter().enumerate() {
+        let mut changed = bytes.clone();
+        while index == edited && changed == *bytes {
+            corrupt_bytes(&mut changed, random);
+        }
+        fs::write(out.join(name), changed).expect("written");
+    }
+}
+
 /// One run; whether it was done, and what is wrong with it.
 fn faults(run: u64, place: &Path) -> (bool, Vec<String>) {
     let mut random = Random::new(run);
@@ -278,6 +304,9 @@ fn faults(run: u64, place: &Path) -> (bool, Vec<String>) {
     }
     if let Some((name, is_folder)) = result {
         prepare(&folder.join(name), is_folder, &mut random);
+    }
+    if plan == 8 && !folder.join("o").is_symlink() {
+        edited_result(&folder.join("o"), &mut random);
     }
     let before = contents(&folder);
     let output = program(arguments, &folder);

@@ -148,9 +148,13 @@ pub(crate) fn command_of(path: &Path) -> Option<String> {
 }
 
 /// What of a folder or file is not as an earlier result left it. A folder that lacks files of the result is unchanged:
-/// nothing in it would be lost; so is an empty one.
+/// nothing in it would be lost; so are an empty one and a file without content, as `mktemp` makes them.
 pub(crate) fn foreign_entries(path: &Path) -> io::Result<ForeignEntries> {
-    if !fs::symlink_metadata(path)?.is_dir() {
+    let about = fs::symlink_metadata(path)?;
+    if about.is_file() && about.len() == 0 {
+        return Ok(ForeignEntries::default());
+    }
+    if !about.is_dir() {
         let mark = platform::mark_of(path).unwrap_or_default();
         let noted = mark.split_once(' ').map(|(_, hash)| hash);
         let unchanged = hash_of(path).is_ok_and(|hash| noted == Some(hash.as_str()));

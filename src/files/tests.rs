@@ -46,6 +46,8 @@ fn file(out: &Path, text: &str, rules: &OutputRules<'_>) -> Result<Option<PathBu
 #[test]
 fn an_unchanged_result_is_replaced_and_nothing_is_left() {
     let place = tempfile::tempdir().unwrap();
+    fs::create_dir_all(place.path().join("deep/out")).unwrap();
+    fs::write(place.path().join("deep/t.csv"), "").unwrap();
     for text in ["one", "two"] {
         assert_eq!(result(&place.path().join("deep/out"), text, &ANY).unwrap(), None);
         assert_eq!(file(&place.path().join("deep/t.csv"), text, &ANY).unwrap(), None);

@@ -106,7 +106,7 @@ impl fmt::Display for WriteError {
                 path.file_name().unwrap_or_default().display()
             ),
             Self::Place { path, problem, allowed } => {
-                write!(f, "{}: {problem}; allowed: {allowed}; nothing was changed there", path.display())
+                write!(f, "{}: {problem}; allowed: {allowed}", path.display())
             }
         }
     }

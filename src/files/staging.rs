@@ -123,13 +123,19 @@ impl Staging {
         }
         placed.map_err(WriteError::io("put the new result in place", shown))?;
         // the result is in place: a failure from here on must not say that it is not
-        let _ = out.parent().map_or(Ok(()), sync_folder);
+        for parent in self.rest.ancestors().skip(1) {
+            let _ = sync_folder(&self.base.join(parent));
+        }
         let tidied = tidy(&self.base, &self.folder, &self.rest);
         drop(live);
-        tidied.map(|tidied| tidied.kept).map_err(WriteError::io(
-            "remove the earlier result, which the new one has replaced, from the hidden folder",
-            &self.folder,
-        ))
+        tidied.map(|tidied| tidied.kept).map_err(|error| WriteError::Place {
+            path: shown.to_path_buf(),
+            problem: format!(
+                "the new result is there; the earlier one is still in {} ({error})",
+                self.folder.display()
+            ),
+            allowed: "a folder whose entries can be removed; the next run tries again",
+        })
     }
 }
 

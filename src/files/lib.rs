@@ -45,8 +45,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 pub use error::{ForeignEntries, WriteError};
-pub use listing::list_files;
-pub use marker::{MARKER_NAME, marked_files};
+pub use marker::{MARKER_NAME, list_files, marked_files};
 pub use place::OutputRules;
 use place::{Kind, Place, parent_of};
 pub use recovery::{recover, tidy_on_signals};

@@ -4,19 +4,6 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use super::marker::MARKER_NAME;
-
-/// All files below `folder`, as sorted paths with `/`; the marker of a result is not among them. Links are listed, not
-/// followed.
-///
-/// # Errors
-/// What the system says when the folder cannot be read.
-pub fn list_files(folder: &Path) -> io::Result<Vec<String>> {
-    let mut files = entries_of(folder, &|_| true)?;
-    files.retain(|path| !path.ends_with('/') && path != MARKER_NAME);
-    Ok(files)
-}
-
 /// All files and empty folders below `folder`, sorted. A folder ends in `/`; one that `enters` declines (it gets the
 /// path with its `/`) is listed and not entered.
 pub(crate) fn entries_of(folder: &Path, enters: &dyn Fn(&str) -> bool) -> io::Result<Vec<String>> {

@@ -133,6 +133,17 @@ fn marker_of(folder: &Path) -> Option<Marker> {
     Some(Marker { command, files: rows.map(file).collect::<Option<_>>()? })
 }
 
+/// All files below `folder`, as sorted paths with `/`; the marker of a result is not among them. Links are listed, not
+/// followed.
+///
+/// # Errors
+/// What the system says when the folder cannot be read.
+pub fn list_files(folder: &Path) -> io::Result<Vec<String>> {
+    let mut files = entries_of(folder, &|_| true)?;
+    files.retain(|path| !path.ends_with('/') && path != MARKER_NAME);
+    Ok(files)
+}
+
 /// The files of a result, as its marker lists them, whether they are still there or not; `None` where there is no whole
 /// marker.
 pub fn marked_files(folder: &Path) -> Option<Vec<String>> {

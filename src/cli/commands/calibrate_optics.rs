@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::input::{input_fault, measured_beside, read_constants};
 use super::output::{Failure, Output};
-use domecast_design::{read_at_most, read_text};
+use domecast_design::{read_text, read_up_to};
 use domecast_files::StagedFile;
 use domecast_runtime::calibrate::detect::Detector;
 use domecast_runtime::calibrate::optics::{Kind, Observation, fit};
@@ -132,7 +132,7 @@ fn observations_in(
     for (number, path) in frames.iter().enumerate() {
         output.step(&format!("finding the marks in frame {number}"));
         let fault = |problem: String| input_fault(path, problem, FRAMES);
-        let bytes = std::fs::File::open(path).and_then(|file| read_at_most(file, MAX_FRAME_BYTES));
+        let bytes = std::fs::File::open(path).and_then(|file| read_up_to(file, MAX_FRAME_BYTES));
         let bytes = bytes.map_err(|error| fault(format!("cannot be read ({error})")))?;
         let frame = Gray::from_png(&bytes).map_err(|error| fault(error.to_string()))?;
         let found = detector.observe(&frame, number).map_err(|error| fault(error.to_string()))?;

@@ -42,7 +42,7 @@ pub fn read_text(path: &Path) -> Result<String, DesignError> {
 /// What cannot be read, more than 16 MiB, bytes that are not UTF-8.
 pub fn read_text_from(stream: impl Read) -> Result<String, DesignError> {
     let fault = |problem: String, allowed: &str| DesignError::at("", "", problem, allowed);
-    let bytes = read_at_most(stream, MAX_FILE_BYTES)
+    let bytes = read_up_to(stream, MAX_FILE_BYTES)
         .map_err(|error| fault(format!("cannot be read ({error})"), "UTF-8 text of at most 16 MiB"))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
@@ -54,7 +54,7 @@ pub fn read_text_from(stream: impl Read) -> Result<String, DesignError> {
 ///
 /// # Errors
 /// What the system says, and `FileTooLarge` for more than `max_bytes`.
-pub fn read_at_most(stream: impl Read, max_bytes: u64) -> io::Result<Vec<u8>> {
+pub fn read_up_to(stream: impl Read, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     stream.take(max_bytes + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > max_bytes {

@@ -116,37 +116,47 @@ fn a_single_file_of_ours_is_replaced_until_it_is_edited() {
 fn whatever_ends_a_run_nothing_is_left() {
     use std::os::unix::process::ExitStatusExt;
     let folder = tempfile::tempdir().expect("a folder");
-    let at = |name: &str| folder.path().join(name);
-    let build = ["build", DESIGN, "--out", "deep/out"];
-    for (signal, number) in [("-INT", 2), ("-TERM", 15), ("-KILL", 9)] {
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/designs/scenes/still.json");
+    let build: &[&str] = &["build", DESIGN, "--out", "deep/out"];
+    // frames are written all the while
+    let simulate: &[&str] = &["simulate", scene, "--frames", "2000", "--out", "deep/out"];
+    let signals = [("-INT", 2), ("-TERM", 15), ("-KILL", 9)];
+    for (command, (signal, number)) in [build, simulate].into_iter().flat_map(|c| signals.map(|s| (c, s))) {
         let mut child = Command::new(env!("CARGO_BIN_EXE_domecast"))
-            .args(build)
+            .args(command)
             .current_dir(folder.path())
             .stdout(Stdio::null())
+            .stderr(Stdio::piped())
             .spawn()
             .expect("it starts");
         let began = Instant::now();
-        let hidden = || {
+        let is_begun = || {
             let entries = fs::read_dir(folder.path()).expect("the folder");
-            entries.filter_map(|entry| Some(entry.ok()?.file_name())).find(|name| {
-                let name = name.to_string_lossy();
-                name.starts_with(".domecast-")
+            let mut hidden = entries.filter_map(|entry| Some(entry.ok()?.path()));
+            hidden.any(|path| {
+                let waits_for = if command == build { "target" } else { "draft/frame_0003.png" };
+                path.to_string_lossy().contains("/.domecast-") && path.join(waits_for).exists()
             })
         };
-        while hidden().is_none() && began.elapsed() < Duration::from_secs(60) {
+        while !is_begun() {
+            assert!(began.elapsed() < Duration::from_secs(60), "the result is made beside its place");
             std::thread::sleep(Duration::from_millis(1));
         }
-        assert!(hidden().is_some(), "the result is made beside its place");
         let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill");
         assert!(sent.success());
-        assert_eq!(child.wait().expect("it ends").signal(), Some(number), "as the signal would end it");
+        let status = child.wait().expect("it ends");
+        assert_eq!(status.signal(), Some(number), "as the signal would end it");
+        let mut said = String::new();
+        let stderr = child.stderr.take().expect("it is piped");
+        std::io::Read::read_to_string(&mut { stderr }, &mut said).expect("text");
+        assert!(!said.contains("error"), "a signal is no fault: {said}");
         if number == 9 {
             // any command that is run there ends what was begun, and says so
             let next = domecast(&["list", "cameras", "--quiet"], folder.path());
             assert!(String::from_utf8_lossy(&next.stderr).contains("deep/out: a run was stopped here"));
         }
-        assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 0, "{signal}");
+        assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 0, "{command:?} {signal}");
     }
-    assert!(domecast(&build, folder.path()).status.success());
-    assert!(at("deep/out/manifest.json").is_file());
+    assert!(domecast(build, folder.path()).status.success());
+    assert!(folder.path().join("deep/out/manifest.json").is_file());
 }

@@ -41,13 +41,13 @@ mod staging;
 mod tests;
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 pub use error::{ForeignEntries, WriteError};
 pub use marker::{MARKER_NAME, list_files, marked_files};
 pub use place::OutputRules;
-use place::{Kind, Place, parent_of};
+use place::{Kind, Place};
 pub use recovery::{recover, tidy_on_signals};
 use staging::Staging;
 
@@ -89,9 +89,22 @@ impl StagedFolder {
     /// # Errors
     /// [`WriteError::Io`] with the file's final place.
     pub fn write(&self, path: &str, bytes: &[u8]) -> Result<(), WriteError> {
-        let file = self.fresh.join(path);
-        let written = fs::create_dir_all(parent_of(&file)).and_then(|()| fs::write(&file, bytes));
+        let made = self.make_folders(Path::new(path));
+        let written = made.and_then(|()| fs::write(self.fresh.join(path), bytes));
         written.map_err(WriteError::io("write the file", &self.out.join(path)))
+    }
+
+    /// Makes the folders that lead to a file; not the folder itself, which a signal may have removed.
+    fn make_folders(&self, path: &Path) -> io::Result<()> {
+        let folders: Vec<&Path> =
+            path.ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty()).collect();
+        for folder in folders.into_iter().rev() {
+            match fs::create_dir(self.fresh.join(folder)) {
+                Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(error),
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// Marks the folder and puts it in its place, in one step where the system has one. Something that stood there and

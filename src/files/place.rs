@@ -44,7 +44,7 @@ fn refused(path: &Path, problem: impl Into<String>, kind: Kind) -> WriteError {
 }
 
 /// The folder that holds `path`.
-pub(crate) fn parent_of(path: &Path) -> &Path {
+fn parent_of(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

@@ -80,7 +80,8 @@ fn permissions_are_the_users() {
 
 #[test]
 fn what_was_changed_or_added_is_refused_by_name_and_kept_by_force() {
-    let spoil: [(&str, fn(&Path)); 6] = [
+    type Spoil = (&'static str, fn(&Path));
+    let spoil: [Spoil; 6] = [
         ("a.txt", |out| fs::write(out.join("a.txt"), "mine").unwrap()),
         ("d.txt", |out| fs::write(out.join("d.txt"), "mine").unwrap()),
         ("b/e/", |out| fs::create_dir(out.join("b/e")).unwrap()),

@@ -125,9 +125,9 @@ def check_kills(program, inputs, work, wanted):
     picked, kills, faults = random.Random(24), 0, []
     for scenario in scenarios:
         before, after, calls = states(scenario, inputs, work)
-        if len(calls) > wanted // len(scenarios):
+        some = -(-wanted // len(scenarios))
+        if len(calls) > some:
             # the replacement itself, which is at the end, in full; of the rest a sample
-            some = wanted // len(scenarios)
             early, end = calls[: -some * 2 // 3], calls[-some * 2 // 3 :]
             calls = picked.sample(early, some - len(end)) + end
         for call in calls:

@@ -22,7 +22,9 @@ struct Random(u64);
 impl Random {
     fn new(run: u64) -> Self {
         let mut random = Self(run.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x2545_f491_4f6c_dd1d);
-        (0..8).for_each(|_| drop(random.below(2)));
+        for _ in 0..8 {
+            random.below(2);
+        }
         random
     }
 

@@ -11,6 +11,7 @@ use crate::accuracy::{Accuracy, AccuracyError};
 use domecast_design::DesignError;
 use domecast_fab::build::{DESIGN_NAME, DesignRecord, MANIFEST_NAME, Manifest, Tree, sha256_hex};
 use domecast_fab::numbers::significant;
+use domecast_files::StagedFolder;
 use domecast_sim::{Scene, SimError};
 
 /// Measures, then writes the result whole.
@@ -34,6 +35,12 @@ pub fn run(
             })
         })
         .transpose()?;
+    let out = out.map_or_else(
+        || PathBuf::from("output").join(format!("{}-accuracy", design.name())),
+        Path::to_path_buf,
+    );
+    let inputs: Vec<&Path> = [design_file].into_iter().chain(scene_file).collect();
+    let staged = StagedFolder::new(&out, "accuracy", &output.rules(&inputs))?;
     let done = |done: u32, doing: &str| {
         let filled = (20 * done / accuracy::STEPS) as usize;
         output.step(&format!("[{}{}] {doing}", "=".repeat(filled), " ".repeat(20 - filled)));
@@ -54,12 +61,9 @@ pub fn run(
     let text =
         serde_json::to_string_pretty(&manifest).map_err(|error| Failure::Internal(error.to_string()))?;
     tree.add(MANIFEST_NAME, text.into_bytes());
-    let out = out.map_or_else(
-        || PathBuf::from("output").join(format!("{}-accuracy", design.name())),
-        Path::to_path_buf,
-    );
     output.step("writing");
-    tree.write(&out)?;
+    tree.fill(&staged)?;
+    output.kept(staged.commit()?);
     output.steps_done();
     summarize(output, &measured)?;
     output.say(&format!(

@@ -8,6 +8,7 @@ use serde_json::json;
 use super::output::{Failure, Output};
 use domecast_fab::build;
 use domecast_fab::build::{Build, BuildError, Measured};
+use domecast_files::StagedFolder;
 
 /// How often a watched design is looked at: fast enough to feel immediate, slow enough to cost nothing.
 const LOOK: Duration = Duration::from_millis(250);
@@ -63,6 +64,9 @@ fn once(output: &Output, design_file: &Path, folders: &Folders<'_>, watched: boo
     let began = Instant::now();
     output.step("reading the design");
     let design = domecast_design::Design::load(design_file)?;
+    let out = folders.out.map_or_else(|| PathBuf::from("output").join(design.name()), Path::to_path_buf);
+    let inputs: Vec<&Path> = [design_file].into_iter().chain(folders.accuracy).collect();
+    let staged = StagedFolder::new(&out, "build", &output.rules(&inputs))?;
     let measured = match folders.accuracy.map(|dir| Measured::read(dir, &design)).transpose() {
         // a design that is being changed has left its measurement behind; the rest is still wanted
         Err(error) if watched => {
@@ -86,9 +90,9 @@ fn once(output: &Output, design_file: &Path, folders: &Folders<'_>, watched: boo
     if watched {
         result.keep_fresh();
     }
-    let out = folders.out.map_or_else(|| PathBuf::from("output").join(design.name()), Path::to_path_buf);
     output.step("writing");
-    result.tree.write(&out)?;
+    result.tree.fill(&staged)?;
+    output.kept(staged.commit()?);
     output.steps_done();
     summarize(output, &result, &out, began.elapsed())?;
     if design.settings().any_chosen() {

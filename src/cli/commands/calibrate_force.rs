@@ -8,7 +8,7 @@ use serde_json::json;
 use super::input::{input_fault, measured_beside, read_constants};
 use super::output::{Failure, Output};
 use domecast_design::read_text;
-use domecast_files::write_file;
+use domecast_files::StagedFile;
 use domecast_optics::pose::{PoseOptions, PoseSolver, Sighting};
 use domecast_runtime::calibrate::Table;
 use domecast_runtime::calibrate::force::{Pair, fit};
@@ -35,6 +35,8 @@ pub fn run(
             "constants of a design with mount.kind = \"springs\"; on a rigid mount a load cell under the posts has the net wrench",
         ));
     }
+    let path = out.map_or_else(|| measured_beside(constants_path), Path::to_path_buf);
+    let mut file = StagedFile::new(&path, "calibrate-force", &output.rules(&[measured, constants_path]))?;
     let text = read_text(measured)?;
     let table = Table::parse(&text)
         .map_err(|error| input_fault(measured, error.to_string(), "a table of displacements and wrenches"))?;
@@ -63,8 +65,8 @@ pub fn run(
     };
     constants.refit_plain_runtime();
     constants.calibrations.push(json!({ "kind": "force", "pairs": pairs.len(), "fit": found }));
-    let path = out.map_or_else(|| measured_beside(constants_path), Path::to_path_buf);
-    write_file(&path, constants.to_json().as_bytes())?;
+    file.write(constants.to_json().as_bytes())?;
+    output.kept(file.commit()?);
     output.steps_done();
     output.say(&format!("{} pairs, model {:?}", pairs.len(), found.model))?;
     for axis in &found.axes {

@@ -7,8 +7,8 @@ use serde_json::json;
 
 use super::input::{input_fault, measured_beside, read_constants};
 use super::output::{Failure, Output};
-use domecast_design::read_text;
-use domecast_files::write_file;
+use domecast_design::{read_text, read_up_to};
+use domecast_files::StagedFile;
 use domecast_runtime::calibrate::detect::Detector;
 use domecast_runtime::calibrate::optics::{Kind, Observation, fit};
 use domecast_runtime::calibrate::{Table, TableError};
@@ -17,6 +17,8 @@ use domecast_runtime::frames::Gray;
 
 const COLUMNS: &str = "columns frame,kind,id,u,v; kind is white or black; the lowest frame is at rest";
 
+/// Bytes at most of a frame's file.
+const MAX_FRAME_BYTES: u64 = 1 << 28;
 const FRAMES: &str = "a folder of PNG frames, raw as the camera gives them; the first by name are at rest";
 
 /// Where results go.
@@ -36,6 +38,13 @@ pub fn run(
     rest_frames: usize,
 ) -> Result<(), Failure> {
     let constants = read_constants(constants_path)?;
+    let path = files.out.map_or_else(|| measured_beside(constants_path), Path::to_path_buf);
+    let inputs = [seen, constants_path];
+    let mut file = StagedFile::new(&path, "calibrate-optics", &output.rules(&inputs))?;
+    let mut centroids = files
+        .centroids
+        .map(|path| StagedFile::new(path, "calibrate-optics", &output.rules(&inputs)))
+        .transpose()?;
     let Some(priors) = constants.tolerances else {
         let problem = "has no \"tolerances\", which are the priors of this calibration";
         return Err(input_fault(constants_path, problem, "constants written by `domecast build`"));
@@ -50,8 +59,9 @@ pub fn run(
     }
     let (observations, missing) = if seen.is_dir() || is_png(seen) {
         let found = observations_in(output, &frames_of(seen)?, &constants)?;
-        if let Some(path) = files.centroids {
-            write_file(path, table_of(&found.0).as_bytes())?;
+        if let Some(mut file) = centroids.take() {
+            file.write(table_of(&found.0).as_bytes())?;
+            output.kept(file.commit()?);
         }
         found
     } else {
@@ -67,8 +77,8 @@ pub fn run(
         "rms_px": found.rms_px,
         "parameters": found.parameters,
     }));
-    let path = files.out.map_or_else(|| measured_beside(constants_path), Path::to_path_buf);
-    write_file(&path, found.constants.to_json().as_bytes())?;
+    file.write(found.constants.to_json().as_bytes())?;
+    output.kept(file.commit()?);
     output.steps_done();
     let [before, after] = found.rms_px;
     output.say(&format!(
@@ -130,7 +140,8 @@ fn observations_in(
     for (number, path) in frames.iter().enumerate() {
         output.step(&format!("finding the marks in frame {number}"));
         let fault = |problem: String| input_fault(path, problem, FRAMES);
-        let bytes = std::fs::read(path).map_err(|error| fault(format!("cannot be read ({error})")))?;
+        let bytes = std::fs::File::open(path).and_then(|file| read_up_to(file, MAX_FRAME_BYTES));
+        let bytes = bytes.map_err(|error| fault(format!("cannot be read ({error})")))?;
         let frame = Gray::from_png(&bytes).map_err(|error| fault(error.to_string()))?;
         let found = detector.observe(&frame, number).map_err(|error| fault(error.to_string()))?;
         missing += found.black_missing;

@@ -10,7 +10,7 @@ use super::output::{Failure, Output};
 use domecast_design::layout::calibrate::{CalibrateError, Calibration, Printed, calibrate};
 use domecast_design::layout::{Layout, LayoutSpec};
 use domecast_design::{Design, DesignError, parse_json, read_text};
-use domecast_files::write_file;
+use domecast_files::StagedFile;
 
 /// Which artwork was printed and measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -37,6 +37,8 @@ pub fn run(
 ) -> Result<(), Failure> {
     output.step("reading");
     let design = Design::load(design_file)?;
+    let out = out.map_or_else(|| beside(design_file), Path::to_path_buf);
+    let mut file = StagedFile::new(&out, "calibrate-print", &output.rules(&[measured, design_file]))?;
     let text = read_text(measured)?;
     let printed = marks.map(|marks| match marks {
         Marks::Target => Printed::Target,
@@ -47,8 +49,8 @@ pub fn run(
     let new_text = with_map(&design, &found)?;
     // The new design must stand on its own before it is written.
     let new_design = Design::from_str(&new_text).map_err(|error| error.in_file(design_file))?;
-    let out = out.map_or_else(|| beside(design_file), Path::to_path_buf);
-    write_file(&out, new_text.as_bytes())?;
+    file.write(new_text.as_bytes())?;
+    output.kept(file.commit()?);
     output.steps_done();
     if let Err(error) = LayoutSpec::of_design(&new_design).and_then(|spec| Layout::new(&spec)) {
         output.warn(&format!("the new map does not print the design's pattern: {error}"));

@@ -37,6 +37,9 @@ struct Arguments {
     /// No progress and no summary; errors are still printed.
     #[arg(long, short, global = true)]
     quiet: bool,
+    /// Write even where something else than an unchanged earlier result stands: that is kept as NAME.bak-N.
+    #[arg(long, global = true)]
+    force: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -215,7 +218,11 @@ pub fn run() -> ExitCode {
             return ExitCode::from(code);
         }
     };
-    let output = Output::new(arguments.json, arguments.quiet);
+    let output = Output::new(arguments.json, arguments.quiet, arguments.force);
+    domecast_files::tidy_on_signals();
+    for note in domecast_files::recover(std::env::args_os().skip(1)) {
+        output.note(&note);
+    }
     // no input should lead to a panic; if one does, it is our fault and has its own exit code
     let ran = std::panic::catch_unwind(|| dispatch(&output, &arguments.command));
     let done = ran.unwrap_or_else(|_| Err(Failure::Internal("it stopped at the place named above".into())));

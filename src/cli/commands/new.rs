@@ -1,6 +1,5 @@
 //! `domecast new NAME`
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -11,6 +10,7 @@ use super::output::{Failure, Output};
 use domecast_design::calibration::{CalibrationHints, CameraCalibration};
 use domecast_design::catalogue::{self, CatalogueKind};
 use domecast_design::{Design, DesignError};
+use domecast_files::{OutputRules, StagedFile};
 
 /// The paper's sensor: every field is there, each with its reason.
 const START: &str = include_str!("../../../designs/thumb24.json");
@@ -124,7 +124,7 @@ impl OwnSensor {
 }
 
 /// Writes a starting design and the schema that lets an editor complete and check it. Nothing is overwritten but an
-/// earlier schema.
+/// earlier schema of ours.
 pub fn run(
     output: &Output,
     name: &str,
@@ -147,7 +147,8 @@ pub fn run(
     let fresh = renamed(&text, start.name(), name);
     domecast_design::Design::from_str(&fresh)?;
     let path = place(name, out);
-    let schema = write_both(&path, fresh.as_bytes())?;
+    let inputs: Vec<&Path> = from.into_iter().collect();
+    let schema = write_both(output, &path, fresh.as_bytes(), &output.rules(&inputs))?;
     output.say(&format!("{}: a start, equal to {} but in its name", path.display(), start.name()))?;
     output.say(&format!("{}: lets an editor complete and check it", schema.display()))?;
     output.say("change it, then:")?;
@@ -168,7 +169,8 @@ fn run_own(
     let design = Design::from_text_with_cures(&text, Path::new(""))?;
     let laid_out = design.layout().map_err(DesignError::from)?.dots.len();
     let path = place(name, out);
-    let schema = write_both(&path, text.as_bytes())?;
+    let inputs: Vec<&Path> = own.camera.as_deref().into_iter().collect();
+    let schema = write_both(output, &path, text.as_bytes(), &output.rules(&inputs))?;
     let derived = design.derived().len();
     output.say(&format!("{}: {laid_out} dots, {derived} fields left to rules", path.display()))?;
     if let Some(asked) = own.dots.filter(|asked| *asked as usize != laid_out) {
@@ -193,33 +195,30 @@ fn place(name: &str, out: Option<&Path>) -> PathBuf {
 }
 
 /// Writes the design, which must not be there yet, and the schema beside it.
-fn write_both(path: &PathBuf, bytes: &[u8]) -> Result<PathBuf, DesignError> {
-    let schema = path.with_file_name(SCHEMA_NAME);
-    write_new(path, bytes)?;
-    std::fs::write(&schema, format!("{:#}\n", domecast_design::design_schema()))
-        .map_err(|error| refused(&schema, &error))?;
-    Ok(schema)
-}
-
-fn refused(path: &Path, error: &std::io::Error) -> DesignError {
-    DesignError::at("", "", format!("cannot be written ({error})"), "a folder that can be written")
-        .in_file(path)
-}
-
-/// Writes a file that must not exist yet.
-fn write_new(path: &PathBuf, bytes: &[u8]) -> Result<(), DesignError> {
-    if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-        std::fs::create_dir_all(parent).map_err(|error| refused(parent, &error))?;
+fn write_both(
+    output: &Output,
+    path: &Path,
+    bytes: &[u8],
+    rules: &OutputRules<'_>,
+) -> Result<PathBuf, Failure> {
+    if !rules.force && path.symlink_metadata().is_ok() {
+        let problem = "this file exists and is not overwritten";
+        return Err(DesignError::at("", "", problem, "a name that is not taken")
+            .with_help("choose another name, or another place with --out")
+            .in_file(path)
+            .into());
     }
-    let mut file = std::fs::File::create_new(path).map_err(|error| match error.kind() {
-        std::io::ErrorKind::AlreadyExists => {
-            DesignError::at("", "", "this file exists and is not overwritten", "a name that is not taken")
-                .with_help("choose another name, or another place with --out")
-                .in_file(path)
-        }
-        _ => refused(path, &error),
-    })?;
-    file.write_all(bytes).map_err(|error| refused(path, &error))
+    let mut design = StagedFile::new(path, "new", rules)?;
+    design.write(bytes)?;
+    let schema = path.with_file_name(SCHEMA_NAME);
+    let text = format!("{:#}\n", domecast_design::design_schema());
+    if std::fs::read(&schema).ok().is_none_or(|earlier| earlier != text.as_bytes()) {
+        let mut file = StagedFile::new(&schema, "new", rules)?;
+        file.write(text.as_bytes())?;
+        output.kept(file.commit()?);
+    }
+    output.kept(design.commit()?);
+    Ok(schema)
 }
 
 /// The text with its name replaced and the schema named on top; layout and reasons stay as they are.

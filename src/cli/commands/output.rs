@@ -1,11 +1,12 @@
 //! How results, progress and failures reach a person or a program.
 
 use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
 use domecast_design::DesignError;
-use domecast_files::WriteError;
+use domecast_files::{OutputRules, WriteError};
 
 /// Why a command did not do what it was asked for.
 #[derive(Debug)]
@@ -68,12 +69,30 @@ pub struct Output {
     json: bool,
     quiet: bool,
     progress: bool,
+    force: bool,
 }
 
 impl Output {
     /// Progress shows only on a terminal.
-    pub fn new(json: bool, quiet: bool) -> Self {
-        Self { json, quiet, progress: !json && !quiet && io::stderr().is_terminal() }
+    pub fn new(json: bool, quiet: bool, force: bool) -> Self {
+        Self { json, quiet, progress: !json && !quiet && io::stderr().is_terminal(), force }
+    }
+
+    /// What may be replaced by the result of a command that reads `inputs`.
+    pub fn rules<'a>(&self, inputs: &'a [&'a Path]) -> OutputRules<'a> {
+        OutputRules { force: self.force, inputs }
+    }
+
+    /// Something of the user's files that they must know of, whatever the mode; never on standard output.
+    pub fn note(&self, line: &str) {
+        let _ = writeln!(io::stderr(), "note: {line}");
+    }
+
+    /// Says where the thing is that stood in a result's place and was not an unchanged earlier result.
+    pub fn kept(&self, copy: Option<PathBuf>) {
+        if let Some(copy) = copy {
+            self.note(&format!("what stood in the result's place is kept as {}", copy.display()));
+        }
     }
 
     /// Whether the result is wanted as JSON.
@@ -110,6 +129,14 @@ impl Output {
         if !self.json && !self.quiet {
             let _ = writeln!(io::stderr(), "warning: {line}");
         }
+    }
+
+    /// A fault that does not stop the command: a warning, which `--quiet` does not silence.
+    pub fn fault(&self, line: &str) {
+        if self.quiet && !self.json {
+            self.error(line);
+        }
+        self.warn(line);
     }
 
     /// A fault, for people, whatever the mode.

@@ -1,16 +1,23 @@
 //! `domecast trace` and `domecast project`: points in, one JSON object a line out, in order.
 
 use std::fmt::Write as _;
-use std::io::Read as _;
 use std::path::Path;
 
 use glam::{DVec2, DVec3};
 use serde_json::{Value, json};
 
 use super::output::{Failure, Output};
-use domecast_design::{DesignError, load_optics, parse_json, read_text};
+use domecast_design::{DesignError, load_optics, parse_json, read_text, read_text_from};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
+
+/// Rounding of a double, relative: what every coordinate that is read is off by.
+const ROUNDING: f64 = f64::EPSILON / 2.0;
+/// Standard deviation, px or mm, that rounding alone may give an answer. Beyond it the answer means nothing, and is none.
+const MAX_ROUNDING_SD: f64 = 1e-3;
+
+/// The status of an answer that rounding drowns.
+const ILL_CONDITIONED: &str = "ill_conditioned";
 
 /// Answers this many points at a time, so that output starts early and memory stays flat.
 const CHUNK: usize = 4096;
@@ -23,17 +30,27 @@ pub fn trace(output: &Output, design: &Path, pixels: &Path, pose: Option<&Path>)
     answer(output, pixels, ["u", "v"], |[u, v]| {
         let pixel = DVec2::new(u, v);
         let in_image = in_image_bounds(pixel, width, height);
-        match optics.trace(pixel) {
-            Ok(hit) => json!({
-                "pixel": [u, v], "status": "ok",
-                "surface_mm": hit.surface_mm.to_array(), "normal": hit.normal.to_array(),
-                "field_angle_rad": hit.field_angle_rad, "in_image": in_image,
-            }),
-            Err(limit) => json!({
-                "pixel": finite([u, v]), "status": limit.as_str(),
-                "surface_mm": null, "normal": null, "field_angle_rad": null, "in_image": in_image,
-            }),
+        let none = |status: &str, sd_mm: Option<f64>| {
+            json!({
+                "pixel": finite([u, v]), "status": status, "surface_mm": null, "normal": null,
+                "field_angle_rad": null, "in_image": in_image, "rounding_sd_mm": sd_mm,
+            })
+        };
+        let hit = match optics.trace(pixel) {
+            Ok(hit) => hit,
+            Err(limit) => return none(limit.as_str(), None),
+        };
+        let by_pixel = optics.trace_with_jacobian(pixel).map_or(f64::NAN, |(_, by_pixel)| by_pixel.norm());
+        let raster_px = DVec2::new(f64::from(width), f64::from(height));
+        let sd_mm = ROUNDING * by_pixel * pixel.abs().max(raster_px).length();
+        if sd_mm.is_nan() || sd_mm > MAX_ROUNDING_SD {
+            return none(ILL_CONDITIONED, sd_mm.is_finite().then_some(sd_mm));
         }
+        json!({
+            "pixel": [u, v], "status": "ok",
+            "surface_mm": hit.surface_mm.to_array(), "normal": hit.normal.to_array(),
+            "field_angle_rad": hit.field_angle_rad, "in_image": in_image, "rounding_sd_mm": sd_mm,
+        })
     })
 }
 
@@ -42,14 +59,29 @@ pub fn project(output: &Output, design: &Path, points: &Path, pose: Option<&Path
     let optics = optics(design, pose)?;
     let spec = optics.lens().spec();
     let (width, height) = (spec.width, spec.height);
-    answer(output, points, ["x", "y", "z"], |point| match optics.project(DVec3::from_array(point)) {
-        Ok(pixel) => json!({
+    let scale_mm = optics.dome_radius_mm();
+    answer(output, points, ["x", "y", "z"], |point| {
+        let none = |status: &str, sd_px: Option<f64>| {
+            json!({
+                "point_mm": finite(point), "status": status, "image_px": null, "in_image": null,
+                "rounding_sd_px": sd_px,
+            })
+        };
+        let place_mm = DVec3::from_array(point);
+        let pixel = match optics.project(place_mm) {
+            Ok(pixel) => pixel,
+            Err(limit) => return none(limit.as_str(), None),
+        };
+        let by_point =
+            optics.project_with_jacobian(place_mm).map_or(f64::NAN, |(_, by_point)| by_point.norm());
+        let sd_px = ROUNDING * by_point * place_mm.abs().max(DVec3::splat(scale_mm)).length();
+        if sd_px.is_nan() || sd_px > MAX_ROUNDING_SD {
+            return none(ILL_CONDITIONED, sd_px.is_finite().then_some(sd_px));
+        }
+        json!({
             "point_mm": point, "status": "ok", "image_px": pixel.to_array(),
-            "in_image": in_image_bounds(pixel, width, height),
-        }),
-        Err(limit) => json!({
-            "point_mm": finite(point), "status": limit.as_str(), "image_px": null, "in_image": null,
-        }),
+            "in_image": in_image_bounds(pixel, width, height), "rounding_sd_px": sd_px,
+        })
     })
 }
 
@@ -120,11 +152,7 @@ struct Row<const N: usize> {
 
 fn read_rows<const N: usize>(path: &Path, names: [&str; N]) -> Result<Vec<Row<N>>, DesignError> {
     let text = if path.as_os_str() == "-" {
-        let mut text = String::new();
-        std::io::stdin().read_to_string(&mut text).map_err(|error| {
-            DesignError::at("", "", format!("standard input cannot be read ({error})"), "UTF-8 text")
-        })?;
-        text
+        read_text_from(std::io::stdin()).map_err(|error| error.in_file(Path::new("standard input")))?
     } else {
         read_text(path)?
     };
@@ -132,7 +160,12 @@ fn read_rows<const N: usize>(path: &Path, names: [&str; N]) -> Result<Vec<Row<N>
     if text.trim_start().starts_with(['[', '{']) {
         json_rows(text, names).map_err(|error| error.in_file(path))
     } else {
-        csv_rows(text, names).map_err(|error| error.in_file(path))
+        let rows = csv_rows(text, names).map_err(|error| error.in_file(path))?;
+        if rows.is_empty() {
+            let allowed = format!("a row of {} for each point, or a JSON list", names.join(","));
+            return Err(DesignError::at("", "", "holds no point", allowed).in_file(path));
+        }
+        Ok(rows)
     }
 }
 

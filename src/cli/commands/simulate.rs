@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::output::{Failure, Output};
 use domecast_design::DesignError;
+use domecast_files::StagedFolder;
 use domecast_sim::run;
 use domecast_sim::run::{ContactFault, RunError};
 use domecast_sim::{Plan, Scene, SimError};
@@ -47,18 +48,23 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
     };
     let mut scene = Scene::load(path).map_err(in_file)?;
     scene.override_run(options.frames, options.seed).map_err(in_file)?;
+    let out = options.out.clone().unwrap_or_else(|| PathBuf::from("output").join(scene.name()));
+    // the plan may take a while: a place that is refused is refused before it
+    let staged = match options.explain {
+        true => None,
+        false => Some(StagedFolder::new(&out, "simulate", &output.rules(&[path, scene.folder()]))?),
+    };
     output.step("planning the effects");
     let plan =
         if options.everything { Plan::everything(&scene) } else { Plan::of(&scene) }.map_err(in_file)?;
-    if options.explain {
+    let Some(staged) = staged else {
         output.steps_done();
         explain(output, &scene, &plan)?;
         return output.result(&json!({ "ok": true, "scene": scene.name(), "plan": plan }));
-    }
-    let out = options.out.clone().unwrap_or_else(|| PathBuf::from("output").join(scene.name()));
+    };
     let count = scene.frame_count();
     let draw = || {
-        run::run(&scene, &plan, &out, &mut |done| {
+        run::fill(&scene, &plan, &staged, &mut |done| {
             output.step(&format!("{} frame {done} of {count}", bar(done, count)))
         })
     };
@@ -74,6 +80,7 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
         RunError::Scene(error) => in_file(error),
         RunError::Write(error) => Failure::Write(error),
     })?;
+    output.kept(staged.commit()?);
     for (frame, note) in &summary.notes {
         output.warn(&format!("frame {frame}: {note}"));
     }

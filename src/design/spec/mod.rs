@@ -41,7 +41,7 @@ pub use explain::{Explained, explain};
 pub use fill::{Filled, Filling, fill, read_filled};
 pub use schema::{design_schema, schema_of};
 pub use sections::DesignFile;
-pub use source::{parse as parse_json, read_text};
+pub use source::{parse as parse_json, read_text, read_text_from, read_up_to};
 
 /// The fields that tracing and projecting need; nothing else in the file matters to them.
 const OPTICS_FIELDS: [&str; 4] = ["name", "camera", "optics", "dome"];

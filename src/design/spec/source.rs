@@ -2,6 +2,8 @@
 //! are faults here, because the second value would silently win.
 
 use std::fmt;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
@@ -29,12 +31,37 @@ pub fn read_text(path: &Path) -> Result<String, DesignError> {
     if about.len() > MAX_FILE_BYTES {
         return Err(fault(format!("the file has {} bytes", about.len()), "at most 16 MiB"));
     }
-    let bytes = std::fs::read(path)
+    let file = File::open(path)
         .map_err(|error| fault(format!("cannot be read ({error})"), "a readable JSON file"))?;
+    read_text_from(file).map_err(|error| error.in_file(path))
+}
+
+/// Reads text that a person or a program wrote from a file, a device or a pipe.
+///
+/// # Errors
+/// What cannot be read, more than 16 MiB, bytes that are not UTF-8.
+pub fn read_text_from(stream: impl Read) -> Result<String, DesignError> {
+    let fault = |problem: String, allowed: &str| DesignError::at("", "", problem, allowed);
+    let bytes = read_up_to(stream, MAX_FILE_BYTES)
+        .map_err(|error| fault(format!("cannot be read ({error})"), "UTF-8 text of at most 16 MiB"))?;
     String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         fault(format!("byte {offset} is not UTF-8"), "UTF-8 text")
     })
+}
+
+/// Reads a stream whose length nobody knows before: a device may have no end.
+///
+/// # Errors
+/// What the system says, and `FileTooLarge` for more than `max_bytes`.
+pub fn read_up_to(stream: impl Read, max_bytes: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    stream.take(max_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes {
+        let problem = format!("it holds more than {max_bytes} bytes");
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));
+    }
+    Ok(bytes)
 }
 
 /// Parses JSON text into a tree, with the line and column of the first fault.

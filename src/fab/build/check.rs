@@ -19,7 +19,7 @@ use crate::artwork;
 use crate::hash::sha256_hex;
 use domecast_design::layout::Layout;
 use domecast_design::{Design, DesignError};
-use domecast_files::list_files;
+use domecast_files::{list_files, marked_files};
 use domecast_mesh::{inspect, read_stl};
 use domecast_runtime::constants::Constants;
 
@@ -112,8 +112,14 @@ fn check_files(dir: &Path, manifest: &Manifest) -> Result<String, String> {
     let listed =
         |path: &String| path == MANIFEST_NAME || manifest.files.iter().any(|file| file.path == *path);
     let found = list_files(dir).map_err(|error| error.to_string())?;
-    match found.iter().find(|path| !listed(path)) {
-        Some(path) => Err(format!("{path}: not in the manifest")),
+    if let Some(path) = found.iter().find(|path| !listed(path)) {
+        return Err(format!("{path}: not in the manifest"));
+    }
+    // the folder's marker lists what was written, whatever became of the manifest
+    let written = marked_files(dir).unwrap_or_default();
+    let named = manifest.parts.iter().map(|part| &part.file);
+    match written.iter().chain(named).find(|path| !listed(path)) {
+        Some(path) => Err(format!("{path}: was built, and is missing here and in the manifest")),
         None => Ok(format!("{} files, every hash agrees", manifest.files.len())),
     }
 }

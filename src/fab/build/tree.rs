@@ -1,11 +1,9 @@
 //! The files of a result, kept in memory until all of them exist.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::manifest::MANIFEST_NAME;
-use domecast_files::{StagedFolder, WriteError};
+use domecast_files::{OutputRules, StagedFolder, WriteError};
 
 /// Files by their path in the folder (with `/`), kept in memory until all of them exist.
 #[derive(Debug, Default, Clone)]
@@ -29,32 +27,22 @@ impl Tree {
         self.files.iter().map(|(path, bytes)| (path.as_str(), bytes.as_slice()))
     }
 
-    /// Writes the folder `out`, whole or not at all.
+    /// Writes the folder `out`, whole or not at all, in the place of nothing or of an unchanged earlier result. One that
+    /// was changed meanwhile is kept: the path is that of the copy.
     ///
     /// # Errors
     /// [`WriteError`]; then `out` is as it was.
-    pub fn write(&self, out: &Path) -> Result<(), WriteError> {
-        let staged = StagedFolder::new(out, |entries| foreign_entry(out, entries))?;
-        for (path, bytes) in self.files() {
-            staged.write(path, bytes)?;
-        }
+    pub fn write(&self, out: &Path) -> Result<Option<PathBuf>, WriteError> {
+        let staged = StagedFolder::new(out, "build", &OutputRules::default())?;
+        self.fill(&staged)?;
         staged.commit()
     }
-}
 
-/// The first entry of an existing folder that its own manifest does not explain; `None` where the folder is empty, or an
-/// earlier result with nothing added.
-fn foreign_entry(out: &Path, entries: &[String]) -> Option<String> {
-    let listed = listed_files(&out.join(MANIFEST_NAME));
-    let explained = |path: &String| path == MANIFEST_NAME || listed.contains(path);
-    // a manifest alone, or one that cannot be read, explains nothing
-    let lone_manifest = || entries.first().filter(|_| listed.is_empty());
-    entries.iter().find(|path| !explained(path)).or_else(lone_manifest).cloned()
-}
-
-fn listed_files(manifest: &Path) -> Vec<String> {
-    let text = fs::read_to_string(manifest).unwrap_or_default();
-    let value: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
-    let files = value.get("files").and_then(serde_json::Value::as_array).cloned().unwrap_or_default();
-    files.iter().filter_map(|file| Some(file.get("path")?.as_str()?.to_owned())).collect()
+    /// Writes the files into a folder that was staged before they were made.
+    ///
+    /// # Errors
+    /// [`WriteError`]; then the folder's place is as it was.
+    pub fn fill(&self, staged: &StagedFolder) -> Result<(), WriteError> {
+        self.files().try_for_each(|(path, bytes)| staged.write(path, bytes))
+    }
 }

@@ -7,6 +7,7 @@
 //! assert!(fault.to_string().starts_with("is not a constants file"));
 //! ```
 
+use std::io::Read as _;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -33,6 +34,8 @@ pub use plain_input::{PlainError, PlainInput};
 pub use plain_pnp::PlainRuntimeSolver;
 pub use stiffness::{matrix_of, rows, stiffness_between, wrench_by_table};
 
+/// Bytes at most that are read of a file.
+const MAX_FILE_BYTES: u64 = 1 << 24;
 /// Names of the six axes of a displacement.
 pub const POSE_AXES: [&str; 6] = ["tx", "ty", "tz", "rx", "ry", "rz"];
 /// Names of the six axes of a wrench.
@@ -62,8 +65,11 @@ impl Constants {
     /// [`ConstantsError`]: the file cannot be read, or is of another form or version.
     pub fn load(path: &Path) -> Result<Self, ConstantsError> {
         let fault = |problem: String| ConstantsError { file: None, problem }.in_file(path);
-        let text =
-            std::fs::read_to_string(path).map_err(|error| fault(format!("cannot be read: {error}")))?;
+        let mut text = String::new();
+        // a device may have no end
+        std::fs::File::open(path)
+            .and_then(|file| file.take(MAX_FILE_BYTES).read_to_string(&mut text))
+            .map_err(|error| fault(format!("cannot be read: {error}")))?;
         text.parse().map_err(|error: ConstantsError| error.in_file(path))
     }
 }
@@ -74,8 +80,8 @@ impl FromStr for Constants {
     /// Reads the text of a constants file.
     fn from_str(text: &str) -> Result<Self, ConstantsError> {
         let fault = |problem| ConstantsError { file: None, problem };
-        let constants: Self =
-            serde_json::from_str(text).map_err(|error| fault(format!("is not a constants file: {error}")))?;
+        let constants: Self = serde_json::from_str(text.strip_prefix('\u{feff}').unwrap_or(text))
+            .map_err(|error| fault(format!("is not a constants file: {error}")))?;
         if constants.format != FORMAT || constants.version != VERSION {
             return Err(fault(format!(
                 "has format \"{}\" version {}; this release reads \"{FORMAT}\" version {VERSION}",

@@ -5,7 +5,6 @@
 
 mod coded;
 mod error;
-mod folder;
 mod parts;
 pub(crate) mod render;
 mod timing;
@@ -18,7 +17,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Mutex, PoisonError, mpsc};
 use std::time::Duration;
 
-use domecast_files::StagedFolder;
+use domecast_files::{OutputRules, StagedFolder};
 
 use crate::SimError;
 use crate::contact::between::Around;
@@ -30,7 +29,6 @@ use crate::work::Work;
 
 use coded::CodedFrame;
 pub use error::RunError;
-use folder::foreign_entry;
 pub use parts::{ContactFault, PLAN_NAME, Summary, TRUTH_NAME, VIDEO_NAME};
 use parts::{Pending, Sent};
 use writer::Writer;
@@ -54,7 +52,22 @@ pub fn run(
     out: &Path,
     progress: &mut dyn FnMut(u32),
 ) -> Result<Summary, RunError> {
-    let staged = StagedFolder::new(out, foreign_entry)?;
+    let staged = StagedFolder::new(out, "simulate", &OutputRules::default())?;
+    let summary = fill(scene, plan, &staged, progress)?;
+    staged.commit()?;
+    Ok(summary)
+}
+
+/// [`run`] into a folder that was staged before, and is committed by the caller.
+///
+/// # Errors
+/// [`RunError`].
+pub fn fill(
+    scene: &Scene,
+    plan: &Plan,
+    staged: &StagedFolder,
+    progress: &mut dyn FnMut(u32),
+) -> Result<Summary, RunError> {
     let renderer = Renderer::new(scene, plan)?;
     let state = Pending::default();
     let (send, receive) = mpsc::channel();
@@ -72,7 +85,6 @@ pub fn run(
     // numbers, strings and lists only: nothing here can fail to be written
     let text = serde_json::to_string_pretty(plan).unwrap_or_default() + "\n";
     staged.write(PLAN_NAME, text.as_bytes())?;
-    staged.commit()?;
     Ok(summary)
 }
 

@@ -6,15 +6,68 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Nominal size where the file ends: players of the first AVI form read no further than 2^31 bytes.
-const LARGEST_BYTES: u64 = 2_000_000_000;
+/// Bytes of frames after which the next file begins: players of the first AVI form read no further than 2^31 bytes, and
+/// the index follows.
+const MAX_BYTES: u64 = 2_000_000_000;
 const HEADER_BYTES: usize = 224;
 
-/// Writes a video frame by frame.
+/// Writes the frames into as many files as their sizes ask for.
 #[derive(Debug)]
-pub struct VideoWriter {
+pub struct VideoFiles {
+    first: PathBuf,
+    rate_hz: f64,
+    max_bytes: u64,
+    /// The file that is being written, and its number from 1.
+    open: Option<VideoWriter>,
+    files: u32,
+}
+
+impl VideoFiles {
+    /// A video whose first file is `first`: `video.avi`, then `video-2.avi`.
+    pub fn new(first: PathBuf, rate_hz: f64) -> Self {
+        Self { first, rate_hz, max_bytes: MAX_BYTES, open: None, files: 0 }
+    }
+
+    /// Adds a frame, coded as JPEG.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn add(&mut self, width: usize, height: usize, jpeg: &[u8]) -> io::Result<()> {
+        let max_bytes = self.max_bytes;
+        if let Some(full) = self.open.take_if(|video| !video.has_room(jpeg, max_bytes)) {
+            full.finish()?;
+        }
+        let video = match &mut self.open {
+            Some(video) => video,
+            None => {
+                self.files += 1;
+                let path = match self.files {
+                    1 => self.first.clone(),
+                    number => {
+                        let stem = self.first.file_stem().unwrap_or_default().to_string_lossy();
+                        self.first.with_file_name(format!("{stem}-{number}.avi"))
+                    }
+                };
+                self.open.insert(VideoWriter::create(&path, width, height, self.rate_hz)?)
+            }
+        };
+        video.add(jpeg)
+    }
+
+    /// Completes the last file.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn finish(self) -> io::Result<()> {
+        self.open.map_or(Ok(()), VideoWriter::finish)
+    }
+}
+
+/// Writes one file frame by frame.
+#[derive(Debug)]
+struct VideoWriter {
     file: BufWriter<File>,
     width: usize,
     height: usize,
@@ -37,15 +90,17 @@ impl VideoWriter {
         Ok(Self { file, width, height, rate_hz, index: Vec::new(), written: 0, largest: 0 })
     }
 
-    /// Adds a frame, coded as JPEG. Past two gigabytes further frames are left out: the PNG frames hold them.
+    /// Whether another frame leaves the file below a size. The first one always fits.
+    fn has_room(&self, jpeg: &[u8], max_bytes: u64) -> bool {
+        self.index.is_empty() || self.written + jpeg.len() as u64 <= max_bytes
+    }
+
+    /// Adds a frame, coded as JPEG.
     ///
     /// # Errors
     /// What the system says.
     pub fn add(&mut self, jpeg: &[u8]) -> io::Result<()> {
-        if self.written + jpeg.len() as u64 > LARGEST_BYTES {
-            return Ok(());
-        }
-        // Below two gigabytes by the test above.
+        // Below two gigabytes, as the caller sees to.
         let size = jpeg.len() as u32;
         self.index.push((4 + self.written as u32, size));
         self.file.write_all(b"00dc")?;
@@ -122,5 +177,36 @@ impl VideoWriter {
         words(&mut out, &[movi]);
         tag(&mut out, b"movi");
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_video_goes_on_in_the_next_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut video =
+            VideoFiles { max_bytes: 2_500, ..VideoFiles::new(folder.path().join("video.avi"), 30.0) };
+        let frames: Vec<Vec<u8>> = (0..7_u8).map(|number| vec![number; 1_000]).collect();
+        for frame in &frames {
+            video.add(8, 6, frame).unwrap();
+        }
+        video.finish().unwrap();
+        let mut found = Vec::new();
+        for name in ["video.avi", "video-2.avi", "video-3.avi", "video-4.avi"] {
+            let bytes = std::fs::read(folder.path().join(name)).unwrap();
+            let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+            assert_eq!((&bytes[..4], word(4) + 8), (&b"RIFF"[..], bytes.len()), "{name}");
+            let frames = word(48);
+            for frame in 0..frames {
+                let at = HEADER_BYTES + frame * 1_008;
+                assert_eq!((&bytes[at..at + 4], word(at + 4)), (&b"00dc"[..], 1_000), "{name}");
+                found.push(bytes[at + 8..at + 1_008].to_vec());
+            }
+        }
+        assert_eq!(found, frames);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
     }
 }

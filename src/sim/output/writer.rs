@@ -10,16 +10,15 @@ use std::sync::mpsc;
 use super::coded::CodedFrame;
 use super::error::{RunError, fault};
 use super::parts::{Pending, Sent, Summary, TRUTH_NAME, VIDEO_NAME};
-use super::video::VideoWriter;
+use super::video::VideoFiles;
 use crate::scene::Scene;
 
 /// Writes frames, video and truth.
 pub(super) struct Writer {
     folder: PathBuf,
-    rate_hz: f64,
     truth: BufWriter<File>,
     truth_path: PathBuf,
-    video: Option<VideoWriter>,
+    video: VideoFiles,
     video_path: PathBuf,
     summary: Summary,
 }
@@ -30,10 +29,9 @@ impl Writer {
         let truth = File::create(&truth_path).map_err(fault("write the truth", &truth_path))?;
         Ok(Self {
             folder: folder.to_path_buf(),
-            rate_hz: scene.file().frames.rate_hz,
             truth: BufWriter::new(truth),
             truth_path,
-            video: None,
+            video: VideoFiles::new(folder.join(VIDEO_NAME), scene.file().frames.rate_hz),
             video_path: folder.join(VIDEO_NAME),
             summary: Summary::default(),
         })
@@ -50,9 +48,7 @@ impl Writer {
         }
         result?;
         self.truth.flush().map_err(fault("write the truth", &self.truth_path))?;
-        if let Some(video) = self.video {
-            video.finish().map_err(fault("write the video", &self.video_path))?;
-        }
+        self.video.finish().map_err(fault("write the video", &self.video_path))?;
         Ok(self.summary)
     }
 
@@ -75,14 +71,8 @@ impl Writer {
         if let Some(image) = frame.image {
             let path = self.folder.join(format!("frame_{number:04}.png"));
             fs::write(&path, image.png).map_err(fault("write the frame", &path))?;
-            let video = match &mut self.video {
-                Some(video) => video,
-                None => {
-                    let made = VideoWriter::create(&self.video_path, image.width, image.height, self.rate_hz);
-                    self.video.insert(made.map_err(fault("write the video", &self.video_path))?)
-                }
-            };
-            video.add(&image.jpeg).map_err(fault("write the video", &self.video_path))?;
+            let added = self.video.add(image.width, image.height, &image.jpeg);
+            added.map_err(fault("write the video", &self.video_path))?;
         }
         for (name, bytes) in frame.extras {
             let path = self.folder.join(name);

@@ -9,6 +9,9 @@ use super::objects::ObjectSection;
 use crate::effect_name::EffectChoices;
 use domecast_design::sections::Why;
 
+/// Frames at most of a sequence.
+pub(super) const MAX_FRAMES: u32 = 1_000_000;
+
 /// What the sensor is made to feel, how it is lit and recorded, and how exact the frames shall be.
 ///
 /// Lengths are mm, angles degrees, forces N, torques N*mm, times s, pixels px, as the names say.
@@ -71,7 +74,7 @@ pub struct SceneFile {
 #[serde(deny_unknown_fields)]
 pub struct FramesSection {
     /// Number of frames.
-    #[schemars(range(min = 1, max = 1000000))]
+    #[schemars(range(min = 1, max = MAX_FRAMES))]
     pub count: u32,
     /// Frames a second; the first is at 0 s.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1e6))]

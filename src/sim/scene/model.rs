@@ -1,6 +1,6 @@
 //! A scene, resolved.
 
-use super::file::SceneFile;
+use super::file::{MAX_FRAMES, SceneFile};
 use super::motion::{Motion, State};
 use super::object::SceneObject;
 use crate::SimError;
@@ -50,13 +50,14 @@ impl Scene {
     /// Takes another number of frames or another seed than the file's.
     ///
     /// # Errors
-    /// No frame at all.
+    /// No frame at all, or more than a scene file may ask for.
     pub fn override_run(&mut self, frames: Option<u32>, seed: Option<u64>) -> Result<(), SimError> {
         if let Some(count) = frames {
-            if count == 0 {
-                return Err(
-                    DesignError::at("frames.count", 0, "there is no frame to draw", "at least 1").into()
-                );
+            if !(1..=MAX_FRAMES).contains(&count) {
+                let problem =
+                    if count == 0 { "there is no frame to draw" } else { "these are too many frames" };
+                let allowed = format!("1 to {MAX_FRAMES}");
+                return Err(DesignError::at("frames.count", count, problem, allowed).into());
             }
             self.file.frames.count = count;
             self.kept = OnceLock::new();

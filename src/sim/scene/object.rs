@@ -7,9 +7,12 @@ use glam::DVec3;
 use super::motion::interpolate;
 use super::objects::{ObjectSection, ShapeSection};
 use domecast_contact::{ContactError, ContactSolid, Indenter};
-use domecast_design::DesignError;
+use domecast_design::{DesignError, read_up_to};
 use domecast_mesh::read_stl;
 use domecast_optics::numeric::{Rigid, rotation_from_vector};
+
+/// A mesh of a million triangles has 50 MB; the contact needs far fewer.
+const MAX_MESH_BYTES: u64 = 1 << 28;
 
 /// An object that may touch the dome.
 #[derive(Debug, Clone)]
@@ -116,7 +119,8 @@ fn solid(shape: &ShapeSection, at: &str, folder: &Path) -> Result<ContactSolid, 
             let unreadable = |problem: String| {
                 DesignError::at(field.clone(), serde_json::json!(file), problem, "a closed STL file")
             };
-            let bytes = std::fs::read(&path)
+            let bytes = std::fs::File::open(&path)
+                .and_then(|file| read_up_to(file, MAX_MESH_BYTES))
                 .map_err(|error| unreadable(format!("{} cannot be read ({error})", path.display())))?;
             let mut mesh = read_stl(&bytes).map_err(|error| unreadable(format!("not an STL ({error})")))?;
             mesh.vertices_mm.iter_mut().for_each(|vertex| *vertex *= *scale);

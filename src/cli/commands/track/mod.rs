@@ -4,7 +4,6 @@ mod decode;
 mod source;
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -14,7 +13,7 @@ use serde_json::json;
 
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
-use domecast_files::StagedFile;
+use domecast_files::{OutputRules, StagedFile, StagedFolder};
 use domecast_optics::SensorOptics;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
@@ -145,9 +144,9 @@ enum Sink {
 }
 
 impl Sink {
-    fn new(out: Option<&Path>) -> Result<Self, Failure> {
+    fn new(out: Option<&Path>, rules: &OutputRules<'_>) -> Result<Self, Failure> {
         Ok(match out {
-            Some(path) => Self::File(StagedFile::new(path)?),
+            Some(path) => Self::File(StagedFile::new(path, "track", rules)?),
             None => Self::Standard(io::stdout()),
         })
     }
@@ -159,39 +158,39 @@ impl Sink {
         }
     }
 
-    fn end(self) -> Result<(), Failure> {
-        match self {
-            Self::File(file) => Ok(file.commit()?),
-            Self::Standard(_) => Ok(()),
+    fn end(self, output: &Output) -> Result<(), Failure> {
+        if let Self::File(file) = self {
+            output.kept(file.commit()?);
         }
+        Ok(())
     }
 }
 
-fn unwritable(path: &Path, error: &io::Error) -> Failure {
-    input_fault(path, format!("cannot be written ({error})"), "a place that can be written")
-}
-
 /// Folders that get a picture of each frame.
-struct Pictures<'a> {
-    overlay: Option<&'a Path>,
+struct Pictures {
+    overlay: Option<StagedFolder>,
     magnify: f64,
     rest: SensorOptics,
-    undistorted: Option<(&'a Path, Undistorted)>,
+    undistorted: Option<(StagedFolder, Undistorted)>,
     buffer: Vec<u8>,
 }
 
-impl<'a> Pictures<'a> {
-    fn new(arguments: &'a TrackArguments, constants: &Constants, tracker: &Tracker) -> Result<Self, Failure> {
+impl Pictures {
+    fn new(
+        arguments: &TrackArguments,
+        rules: &OutputRules<'_>,
+        constants: &Constants,
+        tracker: &Tracker,
+    ) -> Result<Self, Failure> {
+        let folder = |path: &PathBuf| StagedFolder::new(path, "track", rules);
         let undistorted = match &arguments.undistorted {
-            Some(folder) => {
-                Some((folder.as_path(), Undistorted::new(constants).map_err(|e| unfit(arguments, &e))?))
+            Some(path) => {
+                Some((folder(path)?, Undistorted::new(constants).map_err(|e| unfit(arguments, &e))?))
             }
             None => None,
         };
-        for folder in [&arguments.overlay, &arguments.undistorted].into_iter().flatten() {
-            fs::create_dir_all(folder).map_err(|e| unwritable(folder, &e))?;
-        }
-        let (overlay, rest) = (arguments.overlay.as_deref(), tracker.optics().clone());
+        let overlay = arguments.overlay.as_ref().map(folder).transpose()?;
+        let rest = tracker.optics().clone();
         Ok(Self { overlay, magnify: arguments.magnify, rest, undistorted, buffer: Vec::new() })
     }
 
@@ -202,19 +201,25 @@ impl<'a> Pictures<'a> {
         frame: &CameraFrame<'_>,
         tracked: &Tracked,
     ) -> Result<(), Failure> {
-        if let Some(folder) = self.overlay {
-            let path = folder.join(format!("overlay_{number:04}.png"));
+        if let Some(folder) = &self.overlay {
+            let name = format!("overlay_{number:04}.png");
             match overlay_png(frame, tracked, &self.rest, self.magnify) {
-                Ok(png) => fs::write(&path, png).map_err(|e| unwritable(&path, &e))?,
-                Err(error) => output.warn(&format!("{}: {error}", path.display())),
+                Ok(png) => folder.write(&name, &png)?,
+                Err(error) => output.warn(&format!("{name}: {error}")),
             }
         }
         if let Some((folder, map)) = &self.undistorted
             && let Some(bytes) = map.of(frame, &mut self.buffer)
         {
-            let path = folder.join(format!("undistorted_{number:04}.png"));
             let png = decode::png_of(frame.width(), frame.height(), frame.channels(), bytes);
-            fs::write(&path, png.map_err(Failure::Internal)?).map_err(|e| unwritable(&path, &e))?;
+            folder.write(&format!("undistorted_{number:04}.png"), &png.map_err(Failure::Internal)?)?;
+        }
+        Ok(())
+    }
+
+    fn end(self, output: &Output) -> Result<(), Failure> {
+        for folder in self.overlay.into_iter().chain(self.undistorted.map(|(folder, _)| folder)) {
+            output.kept(folder.commit()?);
         }
         Ok(())
     }
@@ -261,9 +266,12 @@ fn unfit(arguments: &TrackArguments, error: &domecast_runtime::track::TrackError
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     let constants = read_constants(&arguments.constants)?;
     let mut tracker = Tracker::new(&constants, arguments.options()).map_err(|e| unfit(arguments, &e))?;
-    let mut pictures = Pictures::new(arguments, &constants, &tracker)?;
+    let inputs: Vec<&Path> =
+        arguments.frames.iter().chain([&arguments.constants]).map(PathBuf::as_path).collect();
+    let rules = output.rules(&inputs);
+    let mut pictures = Pictures::new(arguments, &rules, &constants, &tracker)?;
+    let mut sink = Sink::new(arguments.out.as_deref(), &rules)?;
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
-    let mut sink = Sink::new(arguments.out.as_deref())?;
     let mut line = Vec::new();
     match arguments.format {
         Format::Jsonl => {}
@@ -283,7 +291,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         let tracked: &Tracked = match &picture {
             Ok(frame) => tracker.track(next.number, frame),
             Err(problem) => {
-                output.warn(&format!("frame {}: {problem}", next.number));
+                output.fault(&format!("frame {}: {problem}", next.number));
                 tracker.skip(next.number)
             }
         };
@@ -303,7 +311,10 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         }
     }
     output.steps_done();
-    sink.end()?;
+    if !tally.counts.is_empty() {
+        sink.end(output)?;
+        pictures.end(output)?;
+    }
     source.end()?;
     if tally.counts.is_empty() {
         let allowed = "PNG or JPEG frames, a video, or raw";

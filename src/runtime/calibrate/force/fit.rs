@@ -3,8 +3,9 @@
 use nalgebra::Matrix6;
 
 use super::choice::{choose, hysteresis, validate};
+use super::motion::{split_half_width, with_scatter};
 use super::robust::{RobustFit, dot, robust};
-use super::types::{AxisFit, ForceError, ForceFit, ForceModel, Pair};
+use super::types::{AxisFit, ForceError, ForceFit, ForceModel, MotionNoise, Pair};
 use crate::constants::{POSE_AXES, WRENCH_AXES, rows};
 
 /// Readings beyond so many standard deviations are called outliers.
@@ -70,11 +71,29 @@ fn axis_fit(
 /// Fits the wrench to the displacements.
 ///
 /// `nominal` is the 6x6 whose entries stay where the data refuse; `sizes` is how far a displacement axis must range
-/// (mm, rad) to count as moved at all: some times the noise of the pose.
+/// (mm, rad) to count as moved at all: some times the noise of the pose; `noise` says where the displacements' own
+/// noise comes from, which is taken out of the coefficients.
 ///
 /// # Errors
 /// [`ForceError`] where no axis can be fitted at all.
-pub fn fit(pairs: &[Pair], nominal: &Matrix6<f64>, sizes: &[f64; 6]) -> Result<ForceFit, ForceError> {
+pub fn fit(
+    pairs: &[Pair],
+    nominal: &Matrix6<f64>,
+    sizes: &[f64; 6],
+    noise: MotionNoise,
+) -> Result<ForceFit, ForceError> {
+    if noise == MotionNoise::Stated {
+        return fit_stated(pairs, nominal, sizes);
+    }
+    let exact = fit_stated(pairs, nominal, sizes)?;
+    let Some(noisy) = with_scatter(pairs, &exact) else { return Ok(exact) };
+    let mut found = fit_stated(&noisy, nominal, sizes)?;
+    split_half_width(&mut found, &exact);
+    Ok(found)
+}
+
+/// [`fit`] with the covariance that each pair states.
+fn fit_stated(pairs: &[Pair], nominal: &Matrix6<f64>, sizes: &[f64; 6]) -> Result<ForceFit, ForceError> {
     let moved = moved_axes(pairs, sizes);
     if moved.is_empty() {
         return Err(ForceError::NoMotion);
@@ -123,5 +142,9 @@ pub fn fit(pairs: &[Pair], nominal: &Matrix6<f64>, sizes: &[f64; 6]) -> Result<F
         by_compression: (model == ForceModel::Compressing).then(|| rows(&by_compression)),
         offset: (model >= ForceModel::Affine).then_some(offset),
         refused,
+        motion_sd: std::array::from_fn(|j| {
+            let sum: f64 = pairs.iter().map(|pair| pair.displacement_covariance[(j, j)]).sum();
+            (sum / pairs.len().max(1) as f64).max(0.0).sqrt()
+        }),
     })
 }

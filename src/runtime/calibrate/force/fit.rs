@@ -16,6 +16,11 @@ fn rows_of(pairs: &[Pair], axis: usize) -> Vec<usize> {
     (0..pairs.len()).filter(|row| pairs[*row].wrench[axis].is_some()).collect()
 }
 
+/// Whether any pair states noise of its displacement.
+fn is_noisy(pairs: &[Pair]) -> bool {
+    pairs.iter().any(|pair| pair.displacement_covariance != Matrix6::zeros())
+}
+
 /// Axes of the displacement that range farther than their size.
 fn moved_axes(pairs: &[Pair], sizes: &[f64; 6]) -> Vec<usize> {
     let range = |axis: usize| {
@@ -86,7 +91,7 @@ pub fn fit(
         return fit_stated(pairs, nominal, sizes);
     }
     let exact = fit_stated(pairs, nominal, sizes)?;
-    let Some(noisy) = with_scatter(pairs, &exact) else { return Ok(exact) };
+    let Some(noisy) = with_scatter(pairs, &exact, nominal) else { return Ok(exact) };
     let mut found = fit_stated(&noisy, nominal, sizes)?;
     split_half_width(&mut found, &exact);
     Ok(found)
@@ -111,7 +116,15 @@ fn fit_stated(pairs: &[Pair], nominal: &Matrix6<f64>, sizes: &[f64; 6]) -> Resul
     // One model for all axes: the errors of each axis count relative to its own best.
     let scores: Vec<_> =
         fitted.iter().map(|axis| validate(pairs, *axis, &rows_of(pairs, *axis), &moved)).collect();
-    let model = choose(&scores);
+    let mut model = choose(&scores);
+    let is_open = |axis: &usize| {
+        let solved = robust(pairs, *axis, &rows_of(pairs, *axis), model, &moved);
+        moved.contains(axis) && solved.half_widths[*axis].is_none()
+    };
+    // Products of noisy displacements are noise themselves: a model that they leave open is too rich.
+    if model == ForceModel::Compressing && is_noisy(pairs) && fitted.iter().any(is_open) {
+        model = ForceModel::Affine;
+    }
     let mut stiffness = *nominal;
     let mut by_compression = Matrix6::zeros();
     let mut offset = [0.0; 6];

@@ -8,27 +8,33 @@ use crate::constants::WRENCH_AXES;
 
 /// A reference whose noise is not stated holds to this part of the range of its readings.
 const REFERENCE_PART: f64 = 0.01;
+/// A fitted stiffness within this factor of the nominal one is taken as it is.
+const MAX_NEAR: f64 = 1.5;
 const ROUNDS: usize = 200;
 
 /// The pairs with the covariance of the displacements that explains the scatter about a fit; `None` where the reference's
-/// own noise explains it.
+/// own noise explains it. `nominal` stands in for a fitted stiffness that is far from it: terms that go together share
+/// what is one stiffness.
 ///
 /// Of axis i the readings scatter by `sum_j K_ij^2 s_j^2` beyond the reference: least squares for `s_j^2 >= 0`.
-pub(super) fn with_scatter(pairs: &[Pair], found: &ForceFit) -> Option<Vec<Pair>> {
+pub(super) fn with_scatter(pairs: &[Pair], found: &ForceFit, nominal: &Matrix6<f64>) -> Option<Vec<Pair>> {
     let (mut matrix, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for axis in &found.axes {
         let i = WRENCH_AXES.iter().position(|name| *name == axis.axis)?;
         let readings: Vec<f64> = pairs.iter().filter_map(|pair| pair.wrench[i]).collect();
         let own = REFERENCE_PART * spread(&readings);
         // In parts of what the axis's own displacement does, so that forces and moments count alike.
-        let stiffness = axis.coefficients[i];
+        let (fitted, expected) = (axis.coefficients[i], nominal[(i, i)]);
+        let is_near = (expected / MAX_NEAR..=expected * MAX_NEAR).contains(&fitted);
+        let stiffness = if is_near { fitted } else { expected };
         if axis.half_widths[i].is_none() || stiffness <= 0.0 {
             continue;
         }
         right[i] = (axis.sd * axis.sd - own * own).max(0.0) / (stiffness * stiffness);
         for j in 0..6 {
             if axis.half_widths[j].is_some() {
-                matrix[(i, j)] = (axis.coefficients[j] / stiffness).powi(2);
+                let across = if i == j { stiffness } else { axis.coefficients[j] };
+                matrix[(i, j)] = (across / stiffness).powi(2);
             }
         }
     }

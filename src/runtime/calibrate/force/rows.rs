@@ -20,6 +20,8 @@ const MIN_DRIFT: f64 = 0.03;
 const MAX_SHIFT: isize = 10;
 /// Residuals below this part of the readings' range say nothing of the order.
 const MIN_RESIDUAL: f64 = 1e-3;
+/// Rounds of reweighting.
+const ROUNDS: usize = 4;
 /// Rows that an order is judged by.
 const MAX_ROWS: usize = 2000;
 
@@ -40,11 +42,21 @@ fn residual(terms: &[Vec<f64>], readings: &[f64]) -> Option<(f64, DVector<f64>)>
     if design.iter().chain(target.iter()).any(|v| !v.is_finite()) {
         return None;
     }
-    let gram = design.transpose() * &design + DMatrix::identity(width, width) * 1e-10;
-    let found = gram.cholesky()?.solve(&(design.transpose() * &target));
-    let left: Vec<f64> = (&target - &design * &found).iter().map(|v| v.abs()).collect();
+    // Wild readings are let go in a few rounds of the biweight.
+    let mut weights = DVector::from_element(readings.len(), 1.0);
+    let mut fitted = None;
+    for _ in 0..ROUNDS {
+        let weighted = DMatrix::from_fn(readings.len(), width, |i, j| design[(i, j)] * weights[i]);
+        let gram = weighted.transpose() * &design + DMatrix::identity(width, width) * 1e-10;
+        let found = gram.cholesky()?.solve(&(weighted.transpose() * &target));
+        let left = (&target - &design * &found).map(f64::abs);
+        let median = quantile(&sorted(left.as_slice()), 0.5);
+        weights = left.map(|v| (1.0 - (v / (7.0 * median).max(1e-300)).powi(2)).max(0.0).powi(2));
+        fitted = Some((median, found));
+    }
+    let (median, found) = fitted?;
     let scaled = DVector::from_fn(width, |j, _| found[j] / size[j]);
-    Some((quantile(&sorted(&left), 0.5), scaled))
+    Some((median, scaled))
 }
 
 /// What an affine law is made of, with the row's number beside it.
@@ -141,8 +153,11 @@ pub(super) fn suspicious_rows(pairs: &[Pair], lines: &[usize]) -> Option<String>
         ));
     }
     let shifts: Vec<(usize, isize)> = (0..6).filter_map(|a| Some((a, shift_of(pairs, a)?.0))).collect();
+    let read = (0..6).filter(|axis| pairs.iter().any(|pair| pair.wrench[*axis].is_some())).count();
+    // Rows that are off are off on all axes.
     if let Some((_, by)) = shifts.first()
         && shifts.iter().all(|(_, other)| other == by)
+        && 2 * shifts.len() > read
     {
         let way = if *by > 0 { "later" } else { "earlier" };
         let names: Vec<&str> = shifts.iter().map(|(axis, _)| WRENCH_AXES[*axis]).collect();

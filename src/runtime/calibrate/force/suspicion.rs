@@ -7,12 +7,18 @@
 use super::reference::SpringReference;
 use super::rows::suspicious_rows;
 use super::statistics::{Following, spread};
-use super::transformations::{Mistake, mistakes, orders};
+use super::transformations::{Mistake, lever, mistakes, orders};
 use super::types::{ForceError, Pair};
 use crate::constants::{SpringConstants, WRENCH_AXES};
 
 /// A slope off the geometry's by more than this factor is not this sensor's.
 pub(super) const MAX_FACTOR: f64 = 2.5;
+/// After a mistake is taken back, slopes must be within this factor for it to be the cause.
+const MAX_NAMED_FACTOR: f64 = 1.8;
+/// An axis that uses this part of its capacity moves.
+const MIN_LOADED: f64 = 0.1;
+/// A shift of the moments' point is named from here on, mm.
+const MIN_LEVER_MM: f64 = 3.0;
 /// Scatter of the springs' stiffness about their geometry, as a logarithm: what wire, coil and material do.
 const GEOMETRY_SD: f64 = 0.4;
 /// What an axis that does not follow counts.
@@ -32,8 +38,12 @@ pub(super) struct AxisJudgement {
 }
 
 impl AxisJudgement {
+    fn is_within(&self, factor: f64) -> bool {
+        self.following.is_some_and(|f| f.is_clear() && f.slope > 0.0 && f.slope.ln().abs() <= factor.ln())
+    }
+
     fn is_good(&self) -> bool {
-        self.following.is_some_and(|f| f.is_clear() && f.slope > 0.0 && f.slope.ln().abs() <= MAX_FACTOR.ln())
+        self.is_within(MAX_FACTOR)
     }
 }
 
@@ -57,8 +67,15 @@ impl Judgement {
             let both = readings.iter().zip(&predictions).filter(|(reading, _)| reading.is_some());
             let predicted: Vec<f64> = both.map(|(_, p)| p[axis]).collect();
             let expected_range = spread(&predicted);
-            if predicted.len() < 8 || expected_range < reference.least_range(axis, sizes) {
+            if predicted.len() < 8 {
                 return None;
+            }
+            let least = reference.least_range(axis, sizes);
+            if expected_range < least {
+                // Loads without a motion that goes with them.
+                let read: Vec<f64> = readings.iter().flatten().copied().collect();
+                let is_loaded = spread(&read) > (MIN_LOADED * reference.capacity[axis]).max(5.0 * least);
+                return is_loaded.then_some(AxisJudgement { axis, following: None, expected_range });
             }
             let all: Vec<f64> = predictions.iter().map(|p| p[axis]).collect();
             Some(AxisJudgement { axis, following: Following::of(&readings, &all), expected_range })
@@ -78,8 +95,8 @@ impl Judgement {
         Self { axes, is_in_reach, score }
     }
 
-    fn is_good(&self) -> bool {
-        self.is_in_reach && !self.axes.is_empty() && self.axes.iter().all(AxisJudgement::is_good)
+    fn is_explained(&self) -> bool {
+        self.is_in_reach && !self.axes.is_empty() && self.axes.iter().all(|a| a.is_within(MAX_NAMED_FACTOR))
     }
 }
 
@@ -95,7 +112,7 @@ fn best_of<'a>(
     sizes: &[f64; 6],
     least_axes: usize,
     all: impl Iterator<Item = (&'a Mistake, Option<&'a Mistake>)>,
-) -> Option<String> {
+) -> Option<(f64, String)> {
     let judged = all.filter_map(|(first, second)| {
         let mut table = first.taken_back(pairs);
         if let Some(second) = second {
@@ -103,46 +120,60 @@ fn best_of<'a>(
         }
         let judgement = Judgement::of(&table, reference, sizes);
         // What shrinks a table until nothing can be judged explains nothing.
-        (judgement.is_good() && judgement.axes.len() >= least_axes).then_some((
+        (judgement.is_explained() && judgement.axes.len() >= least_axes).then_some((
             judgement.score,
             first,
             second,
         ))
     });
-    let (_, first, second) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(match second {
+    let (score, first, second) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let name = match second {
         Some(second) => format!("{}, and also {}", first.name, second.name),
         None => first.name.clone(),
-    })
+    };
+    Some((score, name))
+}
+
+/// How far the point of the moments is off in z, mm: least squares of Mx and My by their predictions and by Fy and Fx.
+fn lever_mm(pairs: &[Pair], reference: &SpringReference) -> Option<f64> {
+    let (mut pp, mut pf, mut ff, mut py, mut fy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for pair in pairs {
+        let predicted = reference.wrench(&pair.displacement);
+        for (moment, force, sign) in [(3, 1, -1.0), (4, 0, 1.0)] {
+            let (y, f) = (pair.wrench[moment]?, sign * pair.wrench[force]?);
+            let p = predicted[moment];
+            (pp, pf, ff, py, fy) = (pp + p * p, pf + p * f, ff + f * f, py + p * y, fy + f * y);
+        }
+    }
+    let height_mm = (pp * fy - pf * py) / (pp * ff - pf * pf);
+    (height_mm.is_finite() && height_mm.abs() > MIN_LEVER_MM).then_some(height_mm)
 }
 
 /// What a table that is not good looks like.
 fn named(pairs: &[Pair], reference: &SpringReference, sizes: &[f64; 6], now: &Judgement) -> Option<String> {
-    let mistakes = mistakes();
+    let mut mistakes = mistakes();
+    mistakes.extend(lever_mm(pairs, reference).map(lever));
     let few = some_of(pairs);
-    let least = now.axes.len().min((0..6).filter(|i| pairs.iter().any(|p| p.wrench[*i].is_some())).count());
-    let least = least.saturating_sub(1).max(1);
+    let least = now.axes.len().saturating_sub(1).max(1);
     let single = best_of(&few, reference, sizes, least, mistakes.iter().map(|m| (m, None)));
+    let mixed = mixed_units(pairs, reference, sizes, now, false);
+    if let (Some((score, _)), Some((other, name))) = (&single, &mixed)
+        && other < score
+    {
+        return Some(name.clone());
+    }
     let order = || {
         let orders = orders();
         best_of(pairs, reference, sizes, least, orders.iter().map(|m| (m, None)))
     };
     let double = || {
-        let units: Vec<&Mistake> = mistakes.iter().filter(|m| m.is_unit).collect();
-        let pair = |(index, unit): (usize, &&'_ Mistake)| -> Vec<usize> {
-            let after = mistakes.iter().enumerate();
-            let other = |(k, m): &(usize, &Mistake)| (!m.is_unit || *k > index) && m.name != unit.name;
-            after.filter(other).map(|(k, _)| k).collect()
-        };
-        let all: Vec<(&Mistake, Option<&Mistake>)> = units
-            .iter()
-            .enumerate()
-            .flat_map(|one| pair(one).into_iter().map(move |k| (*one.1, k)))
-            .map(|(unit, k)| (unit, mistakes.get(k)))
-            .collect();
-        best_of(&few, reference, sizes, least, all.into_iter())
+        let both = mistakes.iter().enumerate().flat_map(|(index, first)| {
+            let others = mistakes.iter().skip(index + 1).filter(move |other| first.goes_with(other));
+            others.filter(move |_| first.is_unit).map(move |other| (first, Some(other)))
+        });
+        best_of(&few, reference, sizes, least, both)
     };
-    single.or_else(order).or_else(double)
+    single.or(mixed).or_else(order).or_else(double).map(|(_, name)| name)
 }
 
 /// What the axes at fault show, where no mistake of the list explains them.
@@ -209,11 +240,11 @@ pub fn examine_pairs(
     if let Some(what) = reference.beyond(pairs, lines) {
         return suspect(what);
     }
-    if is_good {
-        return mixed_units(pairs, &reference, sizes, &now).map_or(Ok(()), suspect);
+    if !is_good {
+        return suspect(axes_at_fault(pairs, &now));
     }
-    let mixed = mixed_units(pairs, &reference, sizes, &now);
-    suspect(mixed.unwrap_or_else(|| axes_at_fault(pairs, &now)))
+    mixed_units(pairs, &reference, sizes, &now, true)
+        .map_or(Ok(()), |(_, name)| suspect(format!("looks like {name}")))
 }
 
 /// A unit that only some of the rows have, in words: taking it back row by row leaves much less.
@@ -222,7 +253,8 @@ fn mixed_units(
     reference: &SpringReference,
     sizes: &[f64; 6],
     now: &Judgement,
-) -> Option<String> {
+    is_good: bool,
+) -> Option<(f64, String)> {
     let scale = |axis: usize| now.axes.iter().find(|a| a.axis == axis).map(|a| a.expected_range);
     // How far a row is from its predictions, in parts of the ranges; wild readings count once.
     let miss = |pair: &Pair| {
@@ -235,19 +267,21 @@ fn mixed_units(
     let mut best: Option<(f64, String)> = None;
     for mistake in mistakes().iter().filter(|mistake| mistake.is_unit) {
         let cured = mistake.taken_back(pairs);
-        let better = |row: usize| miss(&cured[row]) < 0.5 * before[row] && before[row] > 0.05;
+        let better = |row: usize| miss(&cured[row]) < 0.5 * before[row] && before[row] > 0.1;
         let which: Vec<usize> = (0..pairs.len()).filter(|row| better(*row)).collect();
-        if 10 * which.len() < pairs.len() {
+        if 10 * which.len() < pairs.len() || 10 * which.len() > 9 * pairs.len() {
             continue;
         }
         let mut mixed = pairs.to_vec();
         which.iter().for_each(|row| mixed[*row] = cured[*row]);
         let after: f64 = mixed.iter().map(miss).sum();
         let judgement = Judgement::of(&mixed, reference, sizes);
-        if after < 0.4 * sum && judgement.is_good() && best.as_ref().is_none_or(|(least, _)| after < *least) {
+        let is_clear = !is_good || after < 0.4 * sum;
+        let is_best = best.as_ref().is_none_or(|(least, _)| judgement.score < *least);
+        if is_clear && judgement.is_explained() && is_best {
             let name = format!("{} of {} rows in another unit: {}", which.len(), pairs.len(), mistake.name);
-            best = Some((after, name));
+            best = Some((judgement.score, name));
         }
     }
-    best.map(|(_, name)| format!("looks like {name}"))
+    best
 }

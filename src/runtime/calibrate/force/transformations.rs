@@ -24,6 +24,8 @@ enum Cure {
     Turn(f64),
     /// Forces and moments change places.
     Blocks,
+    /// Moments are about a point so far off in z, mm.
+    Lever(f64),
     /// The wrench of the row so many further down belongs to the displacement.
     Shift(isize),
     /// The wrenches stand in the opposite order.
@@ -122,7 +124,10 @@ fn axes() -> Vec<Mistake> {
         }
     }
     for (a, b) in [(0, 1), (0, 2), (1, 2), (3, 4), (3, 5), (4, 5)] {
-        let name = format!("{} and {} swapped", POSE_AXES[a], POSE_AXES[b]);
+        let name = format!(
+            "{} and {} swapped (or {} and {})",
+            POSE_AXES[a], POSE_AXES[b], WRENCH_AXES[a], WRENCH_AXES[b]
+        );
         all.push(plain(name, Cure::Swap(true, a, b)));
     }
     all.push(plain("forces and moments swapped".into(), Cure::Blocks));
@@ -149,6 +154,15 @@ pub(super) fn orders() -> Vec<Mistake> {
     all
 }
 
+/// Moments about a point so far off in z.
+pub(super) fn lever(height_mm: f64) -> Mistake {
+    let name = format!(
+        "moments about another point than springs.at_mm, {:.1} mm off in z, by how Mx and My follow Fy and Fx",
+        height_mm.abs()
+    );
+    Mistake { name, cure: Cure::Lever(height_mm), is_unit: false }
+}
+
 /// All mistakes that keep the rows together, the likeliest first.
 pub(super) fn mistakes() -> Vec<Mistake> {
     let mut all = units();
@@ -158,6 +172,15 @@ pub(super) fn mistakes() -> Vec<Mistake> {
 }
 
 impl Mistake {
+    /// Whether two mistakes are of units that differ: no column has two units.
+    pub fn goes_with(&self, other: &Self) -> bool {
+        let changed = |mistake: &Self| match &mistake.cure {
+            Cure::Scale(moves, loads) => moves.iter().chain(loads).map(|v| *v != 1.0).collect(),
+            _ => Vec::new(),
+        };
+        self.name != other.name && !changed(self).iter().zip(changed(other)).any(|(a, b)| *a && b)
+    }
+
     /// The table without the mistake.
     pub fn taken_back(&self, pairs: &[Pair]) -> Vec<Pair> {
         let with = |change: &dyn Fn(&mut Pair)| {
@@ -186,6 +209,11 @@ impl Mistake {
                         pair.wrench[first + 1] = Some(sin * x + cos * y);
                     }
                 }
+            }),
+            Cure::Lever(height_mm) => with(&|pair| {
+                let [fx, fy, ..] = pair.wrench;
+                pair.wrench[3] = pair.wrench[3].zip(fy).map(|(m, f)| m + height_mm * f);
+                pair.wrench[4] = pair.wrench[4].zip(fx).map(|(m, f)| m - height_mm * f);
             }),
             Cure::Reverse => {
                 let wrenches: Vec<_> = pairs.iter().rev().map(|pair| pair.wrench).collect();

@@ -219,6 +219,12 @@ fn pairs_of(table: &Table, constants: &Constants, path: &Path) -> Result<Measure
         pairs.push(Pair { displacement, displacement_covariance, wrench });
         lines.push(table.lines[row]);
     }
+    has_enough(&pairs, &rejected, table, path)?;
+    Ok(Measured { pairs, lines, rejected, is_by_pixels: pixel_columns.is_some() && pose_columns.is_none() })
+}
+
+/// Whether enough of a table's rows have a pose.
+fn has_enough(pairs: &[Pair], rejected: &[String], table: &Table, path: &Path) -> Result<(), Failure> {
     if pairs.is_empty() {
         let first = rejected.first().cloned().unwrap_or_else(|| "the table has no rows".into());
         return Err(input_fault(path, format!("no usable pair; {first}"), "at least one row"));
@@ -232,5 +238,5 @@ fn pairs_of(table: &Table, constants: &Constants, path: &Path) -> Result<Measure
             "the markers' pixels in the order of their numbers, in raw frames",
         ));
     }
-    Ok(Measured { pairs, lines, rejected, is_by_pixels: pixel_columns.is_some() && pose_columns.is_none() })
+    Ok(())
 }

@@ -10,16 +10,16 @@
 mod choice;
 mod fit;
 mod motion;
+mod plausibility;
 mod reference;
 mod robust;
 mod rows;
 mod statistics;
 mod stiffness_check;
-mod suspicion;
 mod transformations;
 mod types;
 
 pub use fit::fit;
+pub use plausibility::examine_pairs;
 pub use stiffness_check::examine_fit;
-pub use suspicion::examine_pairs;
 pub use types::{AxisFit, ForceError, ForceFit, ForceModel, MotionNoise, Pair};

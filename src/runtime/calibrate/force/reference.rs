@@ -62,12 +62,12 @@ impl SpringReference {
     }
 
     /// Least range of the predicted readings of an axis that says anything of it: what displacements of these sizes do.
-    pub fn least_range(&self, axis: usize, sizes: &[f64; 6]) -> f64 {
+    pub fn min_range(&self, axis: usize, sizes: &[f64; 6]) -> f64 {
         2.0 * (0..6).map(|j| self.stiffness[(axis, j)].abs() * sizes[j]).sum::<f64>()
     }
 
     /// Whether nine of ten rows keep to what the springs can do.
-    pub fn holds_most(&self, pairs: &[Pair]) -> bool {
+    pub fn holds_nearly_all(&self, pairs: &[Pair]) -> bool {
         (0..6).all(|axis| {
             let ninth = |values: Vec<f64>| quantile(&sorted(&values), 0.9);
             let moves = ninth(pairs.iter().map(|pair| pair.displacement[axis].abs()).collect());
@@ -86,7 +86,7 @@ impl SpringReference {
 
     /// The first value that no springs of this kind can show, in words; `lines`: the rows' lines in their table.
     pub fn beyond(&self, pairs: &[Pair], lines: &[usize]) -> Option<String> {
-        let most = |axis: usize, values: &dyn Fn(&Pair) -> Option<f64>, limit: f64| {
+        let found_beyond = |axis: usize, values: &dyn Fn(&Pair) -> Option<f64>, limit: f64| {
             let beyond = |pair: &Pair| values(pair).is_some_and(|v| v.abs() > MAX_USE * limit);
             let count = pairs.iter().filter(|pair| beyond(pair)).count();
             let worst =
@@ -99,9 +99,11 @@ impl SpringReference {
             let (moves, loads) =
                 (|pair: &Pair| Some(pair.displacement[axis]), |pair: &Pair| pair.wrench[axis]);
             let at_travel =
-                most(axis, &moves, self.travel[axis]).map(|found| (POSE_AXES, found, self.travel));
-            let at_load =
-                || most(axis, &loads, self.capacity[axis]).map(|found| (WRENCH_AXES, found, self.capacity));
+                found_beyond(axis, &moves, self.travel[axis]).map(|found| (POSE_AXES, found, self.travel));
+            let at_load = || {
+                found_beyond(axis, &loads, self.capacity[axis])
+                    .map(|found| (WRENCH_AXES, found, self.capacity))
+            };
             let (names, (axis, row, value, count), limits) = at_travel.or_else(at_load)?;
             let line =
                 lines.get(row).map_or_else(|| format!("row {}", row + 1), |line| format!("line {line}"));

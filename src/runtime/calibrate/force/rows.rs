@@ -110,7 +110,7 @@ fn drift_of(pairs: &[Pair], axis: usize) -> Option<f64> {
 }
 
 /// What is wrong with the rows, in words; `lines`: the line of each in its file.
-pub(super) fn suspicious_rows(pairs: &[Pair], lines: &[usize]) -> Option<String> {
+pub(super) fn implausible_rows(pairs: &[Pair], lines: &[usize]) -> Option<String> {
     let mut known = HashSet::with_capacity(pairs.len());
     let mut first_repeat = None;
     for (row, pair) in pairs.iter().enumerate() {

@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Matrix6};
 
+use super::plausibility::MAX_FACTOR;
 use super::reference::SpringReference;
 use super::statistics::spread;
-use super::suspicion::MAX_FACTOR;
 use super::types::{ForceError, ForceFit, Pair};
 use crate::constants::{POSE_AXES, SpringConstants, WRENCH_AXES, matrix_of};
 
@@ -102,10 +102,10 @@ fn not_positive(stiffness: &Matrix6<f64>) -> Option<String> {
     if scaled.iter().any(|v| !v.is_finite()) {
         return Some("the stiffness is not finite".into());
     }
-    let least = scaled.symmetric_eigenvalues().min();
-    (least < MIN_EIGENVALUE).then(|| {
+    let smallest = scaled.symmetric_eigenvalues().min();
+    (smallest < MIN_EIGENVALUE).then(|| {
         format!(
-            "the stiffness is not positive definite (least eigenvalue {least:.3} of the 6x6 scaled to ones): the \
+            "the stiffness is not positive definite (least eigenvalue {smallest:.3} of the 6x6 scaled to ones): the \
              springs would push the platform further on its way"
         )
     })

@@ -4,8 +4,8 @@ use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
 use super::normal::{OwnBlock, Reduced};
+use super::plausibility::{examine_numbers, examine_observations, examine_residuals};
 use super::problem::Problem;
-use super::suspicion::{examine_numbers, examine_observations, examine_residuals};
 use super::types::{Kind, Observation, OpticsFit, OpticsFitError, Parameter};
 use crate::constants::{CalibrationPriors, Constants};
 use domecast_optics::SensorOptics;

@@ -17,9 +17,9 @@ enum CentroidCure<'a> {
     /// Where a centroid really is; `None` where it cannot be.
     Place(Box<dyn Fn(DVec2) -> Option<DVec2> + 'a>),
     /// Which white marker each one really is, by place in the list.
-    Whites(Vec<usize>),
+    WhiteOrder(Vec<usize>),
     /// By how much the dots' places in their list are off.
-    Blacks(isize),
+    BlackShift(isize),
 }
 
 impl CentroidMistake<'_> {
@@ -27,8 +27,8 @@ impl CentroidMistake<'_> {
     pub fn taken_back(&self, kind: Kind, index: usize, at_px: DVec2) -> Option<(usize, DVec2)> {
         match (&self.cure, kind) {
             (CentroidCure::Place(place), _) => Some((index, place(at_px)?)),
-            (CentroidCure::Whites(order), Kind::White) => Some((*order.get(index)?, at_px)),
-            (CentroidCure::Blacks(by), Kind::Black) => Some((index.checked_add_signed(*by)?, at_px)),
+            (CentroidCure::WhiteOrder(order), Kind::White) => Some((*order.get(index)?, at_px)),
+            (CentroidCure::BlackShift(by), Kind::Black) => Some((index.checked_add_signed(*by)?, at_px)),
             _ => Some((index, at_px)),
         }
     }
@@ -113,10 +113,12 @@ pub(super) fn centroid_mistakes<'a>(
     if ids.len() <= 5 {
         let named =
             orders(ids.len()).into_iter().filter_map(|order| Some((order_in_words(&order, &ids)?, order)));
-        all.extend(named.map(|(name, order)| CentroidMistake { name, cure: CentroidCure::Whites(order) }));
+        all.extend(
+            named.map(|(name, order)| CentroidMistake { name, cure: CentroidCure::WhiteOrder(order) }),
+        );
     }
     for (by, name) in [(-1, "black dots numbered one too high"), (1, "black dots numbered one too low")] {
-        all.push(CentroidMistake { name: name.into(), cure: CentroidCure::Blacks(by) });
+        all.push(CentroidMistake { name: name.into(), cure: CentroidCure::BlackShift(by) });
     }
     all
 }

@@ -12,8 +12,8 @@ mod fit;
 mod intrinsics;
 mod mistakes;
 mod normal;
+mod plausibility;
 mod problem;
-mod suspicion;
 mod types;
 
 pub use fit::fit;

@@ -5,7 +5,7 @@
 //! after which all axes follow is named. Two at a time are tried last.
 
 use super::reference::SpringReference;
-use super::rows::suspicious_rows;
+use super::rows::implausible_rows;
 use super::statistics::{Following, spread};
 use super::transformations::{Mistake, lever, mistakes, orders};
 use super::types::{ForceError, Pair};
@@ -70,18 +70,18 @@ impl Judgement {
             if predicted.len() < 8 {
                 return None;
             }
-            let least = reference.least_range(axis, sizes);
-            if expected_range < least {
+            let min_range = reference.min_range(axis, sizes);
+            if expected_range < min_range {
                 // Loads without a motion that goes with them.
                 let read: Vec<f64> = readings.iter().flatten().copied().collect();
-                let is_loaded = spread(&read) > (MIN_LOADED * reference.capacity[axis]).max(5.0 * least);
+                let is_loaded = spread(&read) > (MIN_LOADED * reference.capacity[axis]).max(5.0 * min_range);
                 return is_loaded.then_some(AxisJudgement { axis, following: None, expected_range });
             }
             let all: Vec<f64> = predictions.iter().map(|p| p[axis]).collect();
             Some(AxisJudgement { axis, following: Following::of(&readings, &all), expected_range })
         };
         let axes: Vec<AxisJudgement> = (0..6).filter_map(judge).collect();
-        let is_in_reach = reference.holds_most(pairs);
+        let is_in_reach = reference.holds_nearly_all(pairs);
         let part = |axis: &AxisJudgement| match axis.following {
             Some(f) if f.is_clear() && f.slope > 0.0 => {
                 ((f.slope.ln() / GEOMETRY_SD).powi(2) + (f.scatter / f.slope).powi(2)).min(MISS)
@@ -110,7 +110,7 @@ fn best_of<'a>(
     pairs: &[Pair],
     reference: &SpringReference,
     sizes: &[f64; 6],
-    least_axes: usize,
+    min_axes: usize,
     all: impl Iterator<Item = (&'a Mistake, Option<&'a Mistake>)>,
 ) -> Option<(f64, String)> {
     let judged = all.filter_map(|(first, second)| {
@@ -120,7 +120,7 @@ fn best_of<'a>(
         }
         let judgement = Judgement::of(&table, reference, sizes);
         // What shrinks a table until nothing can be judged explains nothing.
-        (judgement.is_explained() && judgement.axes.len() >= least_axes).then_some((
+        (judgement.is_explained() && judgement.axes.len() >= min_axes).then_some((
             judgement.score,
             first,
             second,
@@ -154,24 +154,24 @@ fn named(pairs: &[Pair], reference: &SpringReference, sizes: &[f64; 6], now: &Ju
     let mut mistakes = mistakes();
     mistakes.extend(lever_mm(pairs, reference).map(lever));
     let few = some_of(pairs);
-    let least = now.axes.len().saturating_sub(1).max(1);
-    let single = best_of(&few, reference, sizes, least, mistakes.iter().map(|m| (m, None)));
+    let min_axes = now.axes.len().saturating_sub(1).max(1);
+    let single = best_of(&few, reference, sizes, min_axes, mistakes.iter().map(|m| (m, None)));
     let mixed = mixed_units(pairs, reference, sizes, now, false);
     if let (Some((score, _)), Some((other, name))) = (&single, &mixed)
-        && other < score
+        && *other < 0.8 * score
     {
         return Some(name.clone());
     }
     let order = || {
         let orders = orders();
-        best_of(pairs, reference, sizes, least, orders.iter().map(|m| (m, None)))
+        best_of(pairs, reference, sizes, min_axes, orders.iter().map(|m| (m, None)))
     };
     let double = || {
         let both = mistakes.iter().enumerate().flat_map(|(index, first)| {
             let others = mistakes.iter().skip(index + 1).filter(move |other| first.goes_with(other));
             others.filter(move |_| first.is_unit).map(move |other| (first, Some(other)))
         });
-        best_of(&few, reference, sizes, least, both)
+        best_of(&few, reference, sizes, min_axes, both)
     };
     single.or(mixed).or_else(order).or_else(double).map(|(_, name)| name)
 }
@@ -229,7 +229,7 @@ pub fn examine_pairs(
 ) -> Result<(), ForceError> {
     let suspect = |what: String| Err(ForceError::Suspect(what));
     let reference = SpringReference::new(springs);
-    if let Some(what) = suspicious_rows(pairs, lines) {
+    if let Some(what) = implausible_rows(pairs, lines) {
         return suspect(what);
     }
     let now = Judgement::of(pairs, &reference, sizes);
@@ -277,7 +277,7 @@ fn mixed_units(
         let after: f64 = mixed.iter().map(miss).sum();
         let judgement = Judgement::of(&mixed, reference, sizes);
         let is_clear = !is_good || after < 0.4 * sum;
-        let is_best = best.as_ref().is_none_or(|(least, _)| judgement.score < *least);
+        let is_best = best.as_ref().is_none_or(|(lowest, _)| judgement.score < *lowest);
         if is_clear && judgement.is_explained() && is_best {
             let name = format!("{} of {} rows in another unit: {}", which.len(), pairs.len(), mistake.name);
             best = Some((judgement.score, name));

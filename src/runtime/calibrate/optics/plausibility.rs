@@ -166,23 +166,23 @@ fn swapped_later(
         return Ok(());
     }
     for (frame, seen) in problem.frames.iter().zip(&problem.seen).skip(problem.at_rest) {
-        let whites: Vec<&Seen> = seen.iter().filter(|s| s.observation.kind == Kind::White).collect();
+        let white_seen: Vec<&Seen> = seen.iter().filter(|s| s.observation.kind == Kind::White).collect();
         let rms_px = |order: &[usize]| {
             let sighting = |s: &&Seen| Sighting {
                 id: problem.white_markers[order[s.index]].id,
                 centroid_px: s.observation.centroid_px,
             };
-            let sightings: Vec<Sighting> = whites.iter().map(sighting).collect();
+            let sightings: Vec<Sighting> = white_seen.iter().map(sighting).collect();
             solver.solve(&sightings).map_or(f64::INFINITY, |found| found.rms_px)
         };
         let all = orders(ids.len());
         let own = all.first().map_or(0.0, |order| rms_px(order));
-        if own < FAR * problem.slack_px(priors) || whites.len() < ids.len() {
+        if own < FAR * problem.slack_px(priors) || white_seen.len() < ids.len() {
             continue;
         }
         let rated = all.iter().skip(1).map(|order| (rms_px(order), order));
-        if let Some((least, order)) = rated.min_by(|a, b| a.0.total_cmp(&b.0))
-            && least < problem.slack_px(priors)
+        if let Some((rms, order)) = rated.min_by(|a, b| a.0.total_cmp(&b.0))
+            && rms < problem.slack_px(priors)
             && let Some(words) = order_in_words(order, &ids)
         {
             return suspect(format!("looks like {words} in frame {frame}"));

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use glam::{DVec2, DVec3};
+use nalgebra::{Matrix6, Vector6};
 use serde_json::json;
 
 use super::input::{input_fault, measured_beside, read_constants};
@@ -11,7 +12,9 @@ use domecast_design::read_text;
 use domecast_files::StagedFile;
 use domecast_optics::pose::{PoseOptions, PoseSolver, Sighting};
 use domecast_runtime::calibrate::Table;
-use domecast_runtime::calibrate::force::{Pair, fit};
+use domecast_runtime::calibrate::force::{
+    ForceError, ForceFit, MotionNoise, Pair, examine_fit, examine_pairs, fit,
+};
 use domecast_runtime::constants::{Constants, POSE_AXES, StiffnessAt, WRENCH_AXES, matrix_of, rows};
 use domecast_springs::Displacement;
 
@@ -19,6 +22,29 @@ use domecast_springs::Displacement;
 const MOVED: [f64; 6] = [0.02, 0.02, 0.02, 0.002, 0.002, 0.002];
 /// Noise that a marker's centroid in a measured table may have, px.
 const CENTROID_NOISE_PX: f64 = 0.5;
+/// Standard deviation of a centroid where the constants do not say it, px.
+const CENTROID_SD_PX: f64 = 0.1;
+/// More of the rows than this without a pose are not this sensor's.
+const MAX_REJECTED: f64 = 0.5;
+/// What a table of this sensor holds.
+const ALLOWED: &str = "rows of one displacement (mm, rad) and the wrench (N, N*mm, about springs.at_mm) that holds the \
+                       platform there; nothing was written";
+
+/// What is known of the motions' noise: `MM,RAD` for shifts and turns, or six numbers for tx .. rz.
+pub fn motion_sd(text: &str) -> Result<[f64; 6], String> {
+    let allowed =
+        || format!("\"{text}\" is not two numbers (mm,rad) or six (tx .. rz), finite and not negative");
+    let numbers: Vec<f64> =
+        text.split(',').map(|v| v.trim().parse().map_err(|_| allowed())).collect::<Result<_, _>>()?;
+    if numbers.iter().any(|v: &f64| !(v.is_finite() && *v >= 0.0 && *v < 1e3)) {
+        return Err(allowed());
+    }
+    match numbers[..] {
+        [mm, rad] => Ok([mm, mm, mm, rad, rad, rad]),
+        [tx, ty, tz, rx, ry, rz] => Ok([tx, ty, tz, rx, ry, rz]),
+        _ => Err(allowed()),
+    }
+}
 
 /// Fits the springs to measured pairs and writes constants with `"source": "measured"`.
 pub fn run(
@@ -26,6 +52,7 @@ pub fn run(
     measured: &Path,
     constants_path: &Path,
     out: Option<&Path>,
+    motion_sd: Option<[f64; 6]>,
 ) -> Result<(), Failure> {
     let mut constants = read_constants(constants_path)?;
     if constants.springs.is_none() {
@@ -41,14 +68,27 @@ pub fn run(
     let table = Table::parse(&text)
         .map_err(|error| input_fault(measured, error.to_string(), "a table of displacements and wrenches"))?;
     output.step("reading the pairs");
-    let (pairs, rejected) = pairs_of(&table, &constants, measured)?;
+    let Measured { mut pairs, lines, rejected, is_by_pixels } = pairs_of(&table, &constants, measured)?;
+    if let Some(sd) = motion_sd {
+        let covariance = Matrix6::from_diagonal(&Vector6::from(sd.map(|v| v * v)));
+        pairs.iter_mut().for_each(|pair| pair.displacement_covariance = covariance);
+    }
+    let noise =
+        if motion_sd.is_some() || is_by_pixels { MotionNoise::Stated } else { MotionNoise::FromScatter };
     let Some(springs) = constants.springs.as_mut() else {
         return Err(input_fault(constants_path, "has no springs", "constants with springs"));
     };
     output.step("fitting the stiffness");
-    let found = fit(&pairs, &matrix_of(&springs.stiffness), &MOVED).map_err(|error| {
-        input_fault(measured, error.to_string(), "pairs that move on the axes to be fitted")
-    })?;
+    let fault = |error: ForceError| {
+        let allowed = match error {
+            ForceError::Suspect(_) => ALLOWED,
+            _ => "pairs that move on the axes to be fitted",
+        };
+        input_fault(measured, error.to_string(), allowed)
+    };
+    examine_pairs(&pairs, springs, &MOVED, &lines).map_err(fault)?;
+    let found = fit(&pairs, &matrix_of(&springs.stiffness), &MOVED, noise).map_err(fault)?;
+    examine_fit(&found, &pairs, springs).map_err(fault)?;
     springs.stiffness = found.stiffness;
     springs.source = "measured".into();
     springs.offset = found.offset;
@@ -68,7 +108,19 @@ pub fn run(
     file.write(constants.to_json().as_bytes())?;
     output.kept(file.commit()?);
     output.steps_done();
-    output.say(&format!("{} pairs, model {:?}", pairs.len(), found.model))?;
+    summary(output, &found, pairs.len())?;
+    for reason in found.refused.iter().chain(&rejected) {
+        output.warn(reason);
+    }
+    output.say(&format!("wrote {}", path.display()))?;
+    output.result(&json!({
+        "constants": path.display().to_string(), "pairs": pairs.len(), "fit": found, "rejected": rejected,
+    }))
+}
+
+/// The numbers for people.
+fn summary(output: &Output, found: &ForceFit, pairs: usize) -> Result<(), Failure> {
+    output.say(&format!("{} pairs, model {:?}", pairs, found.model))?;
     for axis in &found.axes {
         let hysteresis = axis.hysteresis.map_or("-".to_owned(), |h| format!("{:.2} %", 100.0 * h));
         output.say(&format!(
@@ -84,17 +136,26 @@ pub fn run(
             }
         }
     }
-    for reason in found.refused.iter().chain(&rejected) {
-        output.warn(reason);
+    if found.motion_sd.iter().any(|sd| *sd > 0.0) {
+        let sds: Vec<String> = found.motion_sd.iter().map(|sd| format!("{sd:.4}")).collect();
+        output.say(&format!("noise of the displacements taken out (mm, rad): {}", sds.join(", ")))?;
     }
-    output.say(&format!("wrote {}", path.display()))?;
-    output.result(&json!({
-        "constants": path.display().to_string(), "pairs": pairs.len(), "fit": found, "rejected": rejected,
-    }))
+    Ok(())
 }
 
-/// Pairs of a table with displacements or marker pixels; and the rows without a pose, by line.
-fn pairs_of(table: &Table, constants: &Constants, path: &Path) -> Result<(Vec<Pair>, Vec<String>), Failure> {
+/// What a table holds.
+struct Measured {
+    pairs: Vec<Pair>,
+    /// Line of each pair.
+    lines: Vec<usize>,
+    /// Rows without a pose, by line.
+    rejected: Vec<String>,
+    /// Whether the displacements come from the markers' pixels.
+    is_by_pixels: bool,
+}
+
+/// Pairs of a table with displacements or marker pixels.
+fn pairs_of(table: &Table, constants: &Constants, path: &Path) -> Result<Measured, Failure> {
     let fault = |error: domecast_runtime::calibrate::TableError| {
         input_fault(path, error.to_string(), "a finite number, or nothing where an axis is missing")
     };
@@ -126,8 +187,12 @@ fn pairs_of(table: &Table, constants: &Constants, path: &Path) -> Result<(Vec<Pa
         }
     };
     let at_mm = constants.springs.as_ref().map_or(DVec3::ZERO, |s| DVec3::from_array(s.at_mm));
-    let (mut pairs, mut rejected) = (Vec::new(), Vec::new());
+    let (mut pairs, mut lines, mut rejected) = (Vec::new(), Vec::new(), Vec::new());
+    // The solver's covariance is that of its own noise.
+    let centroid_px = constants.tolerances.map_or(CENTROID_SD_PX, |t| t.white_centroid_px);
+    let variance_factor = (centroid_px / CENTROID_NOISE_PX).powi(2);
     for row in 0..table.rows.len() {
+        let mut displacement_covariance = Matrix6::zeros();
         let displacement = if let (Some(solver), Some(columns)) = (&solver, &pixel_columns) {
             let mut sightings = Vec::new();
             for (marker, [u, v]) in markers.iter().zip(columns) {
@@ -138,7 +203,10 @@ fn pairs_of(table: &Table, constants: &Constants, path: &Path) -> Result<(Vec<Pa
                 }
             }
             match solver.solve(&sightings) {
-                Ok(found) => Displacement::of_pose(&found.pose, at_mm).to_array(),
+                Ok(found) => {
+                    displacement_covariance = found.displacement_covariance(at_mm) * variance_factor;
+                    Displacement::of_pose(&found.pose, at_mm).to_array()
+                }
                 Err(error) => {
                     rejected.push(format!("line {}: {error}", table.lines[row]));
                     continue;
@@ -157,11 +225,27 @@ fn pairs_of(table: &Table, constants: &Constants, path: &Path) -> Result<(Vec<Pa
                 *value = table.number(row, column).map_err(fault)?;
             }
         }
-        pairs.push(Pair { displacement, wrench });
+        pairs.push(Pair { displacement, displacement_covariance, wrench });
+        lines.push(table.lines[row]);
     }
+    has_enough(&pairs, &rejected, table, path)?;
+    Ok(Measured { pairs, lines, rejected, is_by_pixels: pixel_columns.is_some() && pose_columns.is_none() })
+}
+
+/// Whether enough of a table's rows have a pose.
+fn has_enough(pairs: &[Pair], rejected: &[String], table: &Table, path: &Path) -> Result<(), Failure> {
     if pairs.is_empty() {
         let first = rejected.first().cloned().unwrap_or_else(|| "the table has no rows".into());
         return Err(input_fault(path, format!("no usable pair; {first}"), "at least one row"));
     }
-    Ok((pairs, rejected))
+    if rejected.len() as f64 > MAX_REJECTED * table.rows.len() as f64 {
+        let (count, rows) = (rejected.len(), table.rows.len());
+        let problem = format!("{count} of {rows} rows show no pose of this sensor; {}", rejected[0]);
+        return Err(input_fault(
+            path,
+            problem,
+            "the markers' pixels in the order of their numbers, in raw frames",
+        ));
+    }
+    Ok(())
 }

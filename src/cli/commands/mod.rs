@@ -147,6 +147,10 @@ enum Command {
         /// Where to write [default: constants.measured.json beside the constants].
         #[arg(long)]
         out: Option<PathBuf>,
+        /// Standard deviation of the noise of the displacements: `MM,RAD`, or six for tx .. rz [default: of pixels by the
+        /// constants' noise; else from what the readings scatter beyond a hundredth of their range].
+        #[arg(long, value_parser = calibrate_force::motion_sd)]
+        motion_sd: Option<[f64; 6]>,
     },
     /// Fit pupil, sheet, indices, markers and dots to what the built sensor sees.
     CalibrateOptics {
@@ -255,8 +259,8 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::Check { dir } => check::run(output, dir),
         Command::Trace { design, pixels, pose } => points::trace(output, design, pixels, pose.as_deref()),
         Command::Project { design, points, pose } => points::project(output, design, points, pose.as_deref()),
-        Command::CalibrateForce { measured, constants, out } => {
-            calibrate_force::run(output, measured, constants, out.as_deref())
+        Command::CalibrateForce { measured, constants, out, motion_sd } => {
+            calibrate_force::run(output, measured, constants, out.as_deref(), *motion_sd)
         }
         Command::CalibrateOptics { seen, constants, out, rest_frames, centroids } => {
             let files = calibrate_optics::Files { out: out.as_deref(), centroids: centroids.as_deref() };

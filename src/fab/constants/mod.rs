@@ -74,6 +74,7 @@ pub fn with_springs(
             height: spec.height,
             matrix: spec.matrix,
             distortion: spec.distortion.clone(),
+            intrinsics_covariance: Vec::new(),
             pupil_shift_mm: spec.pupil_shift_mm.clone(),
             undistorted_matrix,
             max_field_angle_rad: optics.lens().max_field_angle_rad(),

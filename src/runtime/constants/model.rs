@@ -82,6 +82,10 @@ pub struct CameraConstants {
     pub matrix: [[f64; 3]; 3],
     /// k1, k2, p1, p2, k3 (then k4, k5, k6), or k1..k4, or none.
     pub distortion: Vec<f64>,
+    /// Covariance of fx, fy, cx, cy (px) and then of each of `distortion`, as a calibration of the camera gave it;
+    /// `calibrate-optics` fits them too where it stands here.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub intrinsics_covariance: Vec<Vec<f64>>,
     /// Shift of the entrance pupil along the axis as a series in the field angle, mm; left out for a central lens.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pupil_shift_mm: Vec<f64>,

@@ -73,6 +73,7 @@ pub use error::TrackError;
 pub use frame::{CameraFrame, FrameFault, Undistorted};
 pub use identities::MAX_FALSE_DOTS;
 pub use marks::MarkState;
+pub(crate) use marks::marker_in_still;
 pub use options::{
     Channel, FollowMethod, MIN_MARKER_RISE_LEVELS, Reference, Steps, Thresholds, TrackOptions,
 };

@@ -1,7 +1,7 @@
 //! The sensor's marks in its frames: from pictures to the observations that [`super::optics`] fits.
 //!
 //! Blobs are matched to where the constants say that the marks are: white markers first, by the pose that fits them
-//! best; then black dots, at that pose, with the affine rest that a sensor that is off its nominal numbers leaves.
+//! best, then each as the disc that `track` fits, so that calibration and runtime see one place; then black dots, at that pose, with the affine rest that a sensor that is off its nominal numbers leaves.
 
 mod matching;
 
@@ -12,6 +12,7 @@ use matching::{Blobs, affine, area_of, combinations, with_spacing};
 use super::optics::{Kind, Observation};
 use crate::constants::Constants;
 use crate::frames::{BlobSide, Gray};
+use crate::track::{CameraFrame, marker_in_still};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 use domecast_optics::pose::{PoseOptions, PoseSolver, Sighting, outline_centroid_offset};
@@ -55,6 +56,11 @@ pub enum DetectError {
         /// Its number.
         id: usize,
     },
+    /// Where a white marker should be is something bright that is no disc on the sheet.
+    NoDisc {
+        /// Its number.
+        id: usize,
+    },
     /// Blobs are there, but no choice of them fits the white markers.
     WhiteMarkersDoNotFit,
 }
@@ -68,6 +74,9 @@ impl std::fmt::Display for DetectError {
             }
             Self::NoWhiteMarker { id } => {
                 write!(f, "shows nothing like white marker {id} near its place at rest")
+            }
+            Self::NoDisc { id } => {
+                write!(f, "shows white marker {id} as no clean disc: glare, dirt or a cover")
             }
             Self::WhiteMarkersDoNotFit => {
                 write!(f, "shows bright blobs, but no four of them fit the white markers")
@@ -110,7 +119,8 @@ impl<'a> Detector<'a> {
             return Err(DetectError::Size { frame: [frame.width(), frame.height()], camera });
         }
         let smooth = frame.blurred(SMOOTHING_PX);
-        let (white_markers, pose) = self.white_markers(frame, &smooth)?;
+        let (blobs, pose) = self.white_markers(frame, &smooth)?;
+        let white_markers = self.discs(frame, blobs, &pose)?;
         let mut observations: Vec<Observation> = white_markers
             .into_iter()
             .map(|(id, centroid_px)| Observation { frame: number, kind: Kind::White, id, centroid_px })
@@ -170,6 +180,26 @@ impl<'a> Detector<'a> {
         }
         let (_, choice, pose) = best.ok_or(DetectError::WhiteMarkersDoNotFit)?;
         Ok((wanted.iter().map(|one| one.id).zip(choice).collect(), pose))
+    }
+
+    /// The white markers as discs beside the dome: a blob's centroid takes some of the bright rim in.
+    fn discs(
+        &self,
+        frame: &Gray,
+        blobs: Vec<(usize, DVec2)>,
+        pose: &Rigid,
+    ) -> Result<Vec<(usize, DVec2)>, DetectError> {
+        let size = || DetectError::Size { frame: [frame.width(), frame.height()], camera: [0, 0] };
+        let optics = self.optics.at_pose(pose).map_err(|_| DetectError::WhiteMarkersDoNotFit)?;
+        let bytes: Vec<u8> =
+            frame.values().iter().map(|v| (255.0 * v).round().clamp(0.0, 255.0) as u8).collect();
+        let camera = CameraFrame::new(frame.width(), frame.height(), 1, &bytes).map_err(|_| size())?;
+        let disc = |(id, start): (usize, DVec2)| {
+            let marker = self.solver.markers().iter().find(|marker| marker.id as usize == id);
+            let at = marker.and_then(|marker| marker_in_still(&optics, marker, &camera, start));
+            at.map(|at| (id, at)).ok_or(DetectError::NoDisc { id })
+        };
+        blobs.into_iter().map(disc).collect()
     }
 
     /// The black dots that are found at a pose.

@@ -3,8 +3,9 @@
 use nalgebra::Matrix6;
 
 use super::choice::{choose, hysteresis, validate};
+use super::motion::{split_half_width, with_scatter};
 use super::robust::{RobustFit, dot, robust};
-use super::types::{AxisFit, ForceError, ForceFit, ForceModel, Pair};
+use super::types::{AxisFit, ForceError, ForceFit, ForceModel, MotionNoise, Pair};
 use crate::constants::{POSE_AXES, WRENCH_AXES, rows};
 
 /// Readings beyond so many standard deviations are called outliers.
@@ -13,6 +14,11 @@ const OUTLIER_SDS: f64 = 4.0;
 /// The rows with a reading on one axis of the wrench.
 fn rows_of(pairs: &[Pair], axis: usize) -> Vec<usize> {
     (0..pairs.len()).filter(|row| pairs[*row].wrench[axis].is_some()).collect()
+}
+
+/// Whether any pair states noise of its displacement.
+fn is_noisy(pairs: &[Pair]) -> bool {
+    pairs.iter().any(|pair| pair.displacement_covariance != Matrix6::zeros())
 }
 
 /// Axes of the displacement that range farther than their size.
@@ -70,11 +76,29 @@ fn axis_fit(
 /// Fits the wrench to the displacements.
 ///
 /// `nominal` is the 6x6 whose entries stay where the data refuse; `sizes` is how far a displacement axis must range
-/// (mm, rad) to count as moved at all: some times the noise of the pose.
+/// (mm, rad) to count as moved at all: some times the noise of the pose; `noise` says where the displacements' own
+/// noise comes from, which is taken out of the coefficients.
 ///
 /// # Errors
 /// [`ForceError`] where no axis can be fitted at all.
-pub fn fit(pairs: &[Pair], nominal: &Matrix6<f64>, sizes: &[f64; 6]) -> Result<ForceFit, ForceError> {
+pub fn fit(
+    pairs: &[Pair],
+    nominal: &Matrix6<f64>,
+    sizes: &[f64; 6],
+    noise: MotionNoise,
+) -> Result<ForceFit, ForceError> {
+    if noise == MotionNoise::Stated {
+        return fit_stated(pairs, nominal, sizes);
+    }
+    let exact = fit_stated(pairs, nominal, sizes)?;
+    let Some(noisy) = with_scatter(pairs, &exact, nominal) else { return Ok(exact) };
+    let mut found = fit_stated(&noisy, nominal, sizes)?;
+    split_half_width(&mut found, &exact);
+    Ok(found)
+}
+
+/// [`fit`] with the covariance that each pair states.
+fn fit_stated(pairs: &[Pair], nominal: &Matrix6<f64>, sizes: &[f64; 6]) -> Result<ForceFit, ForceError> {
     let moved = moved_axes(pairs, sizes);
     if moved.is_empty() {
         return Err(ForceError::NoMotion);
@@ -92,7 +116,15 @@ pub fn fit(pairs: &[Pair], nominal: &Matrix6<f64>, sizes: &[f64; 6]) -> Result<F
     // One model for all axes: the errors of each axis count relative to its own best.
     let scores: Vec<_> =
         fitted.iter().map(|axis| validate(pairs, *axis, &rows_of(pairs, *axis), &moved)).collect();
-    let model = choose(&scores);
+    let mut model = choose(&scores);
+    let is_open = |axis: &usize| {
+        let solved = robust(pairs, *axis, &rows_of(pairs, *axis), model, &moved);
+        moved.contains(axis) && solved.half_widths[*axis].is_none()
+    };
+    // Products of noisy displacements are noise themselves: a model that they leave open is too rich.
+    if model == ForceModel::Compressing && is_noisy(pairs) && fitted.iter().any(is_open) {
+        model = ForceModel::Affine;
+    }
     let mut stiffness = *nominal;
     let mut by_compression = Matrix6::zeros();
     let mut offset = [0.0; 6];
@@ -123,5 +155,9 @@ pub fn fit(pairs: &[Pair], nominal: &Matrix6<f64>, sizes: &[f64; 6]) -> Result<F
         by_compression: (model == ForceModel::Compressing).then(|| rows(&by_compression)),
         offset: (model >= ForceModel::Affine).then_some(offset),
         refused,
+        motion_sd: std::array::from_fn(|j| {
+            let sum: f64 = pairs.iter().map(|pair| pair.displacement_covariance[(j, j)]).sum();
+            (sum / pairs.len().max(1) as f64).max(0.0).sqrt()
+        }),
     })
 }

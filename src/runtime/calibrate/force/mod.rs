@@ -2,12 +2,24 @@
 //!
 //! Each axis of the wrench is fitted by itself (its own readings may be missing) with Tukey's biweight, so that a
 //! twentieth of wild readings does not bend it; the model (linear, with an offset, or with a stiffness that grows
-//! with compression) is the simplest within one standard error of the best in five-fold cross-validation.
+//! with compression) is the simplest within one standard error of the best in five-fold cross-validation. Noise of the
+//! displacements is taken out of the coefficients.
+//!
+//! [`examine_pairs`] and [`examine_fit`] ask whether table and fit can be this sensor's, and name the mistake if not.
 
 mod choice;
 mod fit;
+mod motion;
+mod plausibility;
+mod reference;
 mod robust;
+mod rows;
+mod statistics;
+mod stiffness_check;
+mod transformations;
 mod types;
 
 pub use fit::fit;
-pub use types::{AxisFit, ForceError, ForceFit, ForceModel, Pair};
+pub use plausibility::examine_pairs;
+pub use stiffness_check::examine_fit;
+pub use types::{AxisFit, ForceError, ForceFit, ForceModel, MotionNoise, Pair};

@@ -1,4 +1,10 @@
-//! One axis of the wrench by Tukey's biweight, with confidence intervals.
+//! One axis of the wrench by Tukey's biweight, with confidence intervals, and with the noise of the displacements
+//! taken out.
+//!
+//! Noise in what a regression multiplies pulls its coefficients towards zero, by the noise's part of the variance. With a
+//! known covariance `S` of the noise of the terms the normal equations lose what it adds, `X^T W X - c sum(w S)`
+//! (W. A. Fuller, *Measurement Error Models*, 1987, section 2.2); `c` keeps the biweight consistent, because a reading
+//! that is off weighs less.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,6 +17,10 @@ const MAD_TO_SD: f64 = 1.4826;
 const MAX_ROUNDS: usize = 60;
 /// A coefficient whose term varies by less than this part of the others, once scaled, is not determined.
 const MIN_SINGULAR: f64 = 1e-3;
+/// `E[w(u) u^2] / E[w(u)]` of the biweight for normal noise: `(1 - 6/k^2 + 15/k^4) / (1 - 2/k^2 + 3/k^4)`.
+const NOISE_SHARE: f64 = 0.8284;
+/// A direction of the terms must vary by more than this many times its noise to be determined.
+const MIN_VARIANCE_IN_NOISE: f64 = 1.0;
 
 /// The fit of one axis.
 pub(super) struct RobustFit {
@@ -36,6 +46,8 @@ struct Terms {
     scale: Vec<f64>,
     design: DMatrix<f64>,
     target: DVector<f64>,
+    /// Covariance of each row's noise, scaled as the design; empty where the displacements are exact.
+    noise: Vec<DMatrix<f64>>,
 }
 
 impl Terms {
@@ -56,12 +68,59 @@ impl Terms {
         let scale: Vec<f64> = used.iter().map(rms).collect();
         let design = DMatrix::from_fn(rows.len(), used.len(), |i, j| all[i][used[j]] / scale[j]);
         let target = DVector::from_fn(rows.len(), |i, _| pairs[rows[i]].wrench[axis].unwrap_or(0.0));
-        Self { count, used, scale, design, target }
+        let noise_of = |row: &usize| {
+            let pair = &pairs[*row];
+            let slopes = model.slopes(&pair.displacement);
+            let whole = &slopes * pair.displacement_covariance * slopes.transpose();
+            DMatrix::from_fn(used.len(), used.len(), |i, j| whole[(used[i], used[j])] / (scale[i] * scale[j]))
+        };
+        let is_exact =
+            rows.iter().all(|row| pairs[*row].displacement_covariance == nalgebra::Matrix6::zeros());
+        let noise = if is_exact { Vec::new() } else { rows.iter().map(noise_of).collect() };
+        Self { count, used, scale, design, target, noise }
+    }
+
+    /// What noise adds to the normal matrix under these weights.
+    fn noise_sum(&self, weight: impl Fn(usize) -> f64) -> DMatrix<f64> {
+        let width = self.used.len();
+        let add = |sum, (row, noise): (usize, &DMatrix<f64>)| sum + noise * weight(row);
+        self.noise.iter().enumerate().fold(DMatrix::zeros(width, width), add)
+    }
+
+    /// [`Self::solve`] with the noise of the displacements taken out of the normal matrix. Directions that vary by
+    /// little more than their noise are left out too.
+    fn solve_noisy(&self, weights: &DVector<f64>) -> Option<(DVector<f64>, Vec<bool>)> {
+        let width = self.used.len();
+        let weighted = DMatrix::from_fn(self.design.nrows(), width, |i, j| self.design[(i, j)] * weights[i]);
+        let noise = self.noise_sum(|row| NOISE_SHARE * weights[row]);
+        let normal = weighted.transpose() * &self.design - &noise;
+        if normal.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        let eigen = normal.symmetric_eigen();
+        let largest = eigen.eigenvalues.max();
+        let mut inverse = DMatrix::zeros(width, width);
+        let mut determined = vec![true; width];
+        for (k, value) in eigen.eigenvalues.iter().enumerate() {
+            let direction = eigen.eigenvectors.column(k).into_owned();
+            let own_noise = direction.dot(&(&noise * &direction));
+            if *value > (MIN_SINGULAR * MIN_SINGULAR * largest).max(MIN_VARIANCE_IN_NOISE * own_noise) {
+                inverse += &direction * direction.transpose() / *value;
+            } else {
+                for (flag, part) in determined.iter_mut().zip(direction.iter()) {
+                    *flag &= part.abs() < 0.05;
+                }
+            }
+        }
+        Some((&inverse * (weighted.transpose() * &self.target), determined))
     }
 
     /// Weighted least squares, and which coefficients the data determine. Directions that the data do not show are
     /// left out, and so is every coefficient that they reach.
     fn solve(&self, weights: &DVector<f64>) -> Option<(DVector<f64>, Vec<bool>)> {
+        if !self.noise.is_empty() {
+            return self.solve_noisy(weights);
+        }
         let root = weights.map(f64::sqrt);
         let (height, width) = self.design.shape();
         let weighted = DMatrix::from_fn(height, width, |i, j| self.design[(i, j)] * root[i]);
@@ -100,8 +159,18 @@ impl Terms {
         let freedom = (n - width as f64).max(1.0);
         let variance = (psi2 / freedom) / (slope / n).max(0.05).powi(2);
         let gram = self.design.transpose() * &self.design;
-        let covariance = gram.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(width, width));
-        covariance.diagonal().map(|c| variance * c)
+        let inverse = |matrix: DMatrix<f64>| {
+            matrix.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(width, width))
+        };
+        if self.noise.is_empty() {
+            return inverse(gram).diagonal().map(|c| variance * c);
+        }
+        // Fuller (1987), theorem 2.2.1: residuals and noise of the terms go together, which widens the middle.
+        let noise = self.noise_sum(|_| 1.0);
+        let pull = &noise * found / n.max(1.0);
+        let middle = &gram + &pull * pull.transpose() * (n / (sd * sd).max(f64::MIN_POSITIVE));
+        let outer = inverse(gram - noise);
+        (&outer * middle * &outer).diagonal().map(|c| variance * c)
     }
 }
 

@@ -1,5 +1,6 @@
 //! What goes into the fit and what comes out of it.
 
+use nalgebra::{DMatrix, Matrix6};
 use serde::Serialize;
 
 /// A displacement (mm, rad) and the reference wrench (N, N*mm; missing axes are `None`).
@@ -7,8 +8,20 @@ use serde::Serialize;
 pub struct Pair {
     /// (tx, ty, tz, rx, ry, rz).
     pub displacement: [f64; 6],
+    /// Covariance of the displacement's own noise (mm, rad, squared); zero where it is exact.
+    pub displacement_covariance: Matrix6<f64>,
     /// (Fx, Fy, Fz, Mx, My, Mz).
     pub wrench: [Option<f64>; 6],
+}
+
+/// Where the noise of the displacements comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MotionNoise {
+    /// Each pair states its own covariance.
+    Stated,
+    /// Nobody stated it: the reference is taken to hold to a hundredth of its range, and what the readings scatter
+    /// beyond that is the motions'.
+    FromScatter,
 }
 
 /// How the wrench depends on the displacement d.
@@ -36,6 +49,19 @@ impl ForceModel {
             terms.extend(d.iter().map(|v| -d[2] * v));
         }
         terms
+    }
+
+    /// Derivative of [`ForceModel::terms`] by the displacement, a row for each term.
+    pub(super) fn slopes(self, d: &[f64; 6]) -> DMatrix<f64> {
+        let mut slopes = DMatrix::zeros(self.terms(d).len(), 6);
+        for j in 0..6 {
+            slopes[(j, j)] = 1.0;
+            if self == Self::Compressing {
+                slopes[(7 + j, j)] -= d[2];
+                slopes[(7 + j, 2)] -= d[j];
+            }
+        }
+        slopes
     }
 }
 
@@ -75,6 +101,8 @@ pub struct ForceFit {
     pub offset: Option<[f64; 6]>,
     /// Axes that the data do not determine, and why: they keep the nominal numbers.
     pub refused: Vec<String>,
+    /// Standard deviation of the noise of each displacement axis that the fit took out (mm, rad).
+    pub motion_sd: [f64; 6],
 }
 
 /// Why nothing can be fitted.
@@ -89,6 +117,8 @@ pub enum ForceError {
     },
     /// No displacement axis varies.
     NoMotion,
+    /// The table cannot be this sensor's: what it looks like, in words.
+    Suspect(String),
 }
 
 impl std::fmt::Display for ForceError {
@@ -98,6 +128,7 @@ impl std::fmt::Display for ForceError {
                 write!(f, "at most {readings} readings on an axis; a fit needs {needed}")
             }
             Self::NoMotion => write!(f, "no axis of the displacement varies"),
+            Self::Suspect(what) => f.write_str(what),
         }
     }
 }

@@ -1,15 +1,16 @@
 //! The fit: starts, damped steps, covariance, and the constants that come out.
 
 use glam::DVec3;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::normal::{OwnBlock, Reduced};
-use super::problem::{Problem, camera_numbers};
+use super::plausibility::{examine_numbers, examine_observations, examine_residuals};
+use super::problem::Problem;
 use super::types::{Kind, Observation, OpticsFit, OpticsFitError, Parameter};
 use crate::constants::{CalibrationPriors, Constants};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::{Rigid, rotation_from_vector};
-use domecast_optics::pose::{PoseOptions, PoseSolver, Sighting};
+use domecast_optics::pose::Sighting;
 
 const MAX_STEPS: u32 = 60;
 
@@ -24,6 +25,7 @@ pub fn fit(
     at_rest: usize,
 ) -> Result<OpticsFit, OpticsFitError> {
     let problem = Problem::new(constants, observations, priors, at_rest)?;
+    examine_observations(&problem, constants, priors)?;
     let start = Solution {
         x: vec![0.0; problem.numbers()],
         poses: start_poses(&problem, priors)?,
@@ -32,24 +34,47 @@ pub fn fit(
     };
     let (solution, last) = solve(&problem, priors, start, observations)?;
     let x = &solution.x;
-    let covariance = last.matrix.clone().cholesky().map(|c| c.inverse());
-    let sd = |k: usize| covariance.as_ref().map_or(problem.priors[k], |c| c[(k, k)].max(0.0).sqrt());
-    let named = camera_numbers(problem.flat) + 2 * problem.white_markers.len();
-    let parameters = (0..named)
-        .map(|k| {
-            let (name, nominal) = problem.name(k, constants);
-            let (prior_sd, sd) = (problem.priors[k], sd(k));
-            Parameter { name, nominal, value: nominal + x[k], prior_sd, sd, observed: sd < 0.9 * prior_sd }
-        })
-        .collect();
+    let open = || {
+        OpticsFitError::Suspect(
+            "the equations are not positive definite: the marks leave a number open".into(),
+        )
+    };
+    let covariance = last.matrix.clone().cholesky().ok_or_else(open)?.inverse();
+    examine_residuals(&problem, priors, x, &solution.poses)?;
+    let parameters = parameters_of(&problem, constants, x, &covariance);
+    examine_numbers(&problem, x, &parameters)?;
     Ok(OpticsFit {
-        constants: measured(constants, &problem, x)?,
+        constants: measured(constants, &problem, x, &covariance)?,
         parameters,
         rms_px: solution.rms_px,
         iterations: solution.iterations,
         poses: problem.frames.iter().copied().zip(solution.poses).collect(),
         outliers: last.outliers,
     })
+}
+
+/// Every number but the dots', with its deviation before and after.
+fn parameters_of(
+    problem: &Problem,
+    constants: &Constants,
+    x: &[f64],
+    covariance: &DMatrix<f64>,
+) -> Vec<Parameter> {
+    let (first, count) = (problem.body_numbers(), problem.intrinsics.count());
+    let steps = problem.intrinsics.steps(&x[first..first + count]);
+    let after = problem.intrinsics.covariance(&covariance.view((first, first), (count, count)).into_owned());
+    let before = problem.intrinsics.covariance(&DMatrix::identity(count, count));
+    let named = problem.camera_numbers() + 2 * problem.white_markers.len();
+    let parameter = |k: usize| {
+        let (name, nominal) = problem.name(k, constants);
+        let (step, prior, own) = match k.checked_sub(first).filter(|own| *own < count) {
+            Some(own) => (steps[own], before[(own, own)], after[(own, own)]),
+            None => (x[k], problem.priors[k].powi(2), covariance[(k, k)]),
+        };
+        let (prior_sd, sd) = (prior.max(0.0).sqrt(), own.max(0.0).sqrt());
+        Parameter { name, nominal, value: nominal + step, prior_sd, sd, observed: sd < 0.9 * prior_sd }
+    };
+    (0..named).map(parameter).collect()
 }
 
 /// Numbers and poses, and how they were found.
@@ -154,16 +179,7 @@ fn first_hidden(problem: &Problem, x: &[f64], poses: &[Rigid]) -> Option<OpticsF
 /// Each frame's pose with nominal numbers; the first is rest.
 fn start_poses(problem: &Problem, priors: &CalibrationPriors) -> Result<Vec<Rigid>, OpticsFitError> {
     let optics = SensorOptics::new(&problem.nominal).map_err(|e| OpticsFitError::Constants(e.to_string()))?;
-    let fault =
-        |e: domecast_optics::pose::PoseError| OpticsFitError::Constants(format!("white markers: {e}"));
-    // What the tolerances move a marker's image by, roughly: its place over its distance, in focal lengths.
-    let away = (problem.nominal.sensor_from_camera.translation_mm.z).abs().max(1.0);
-    let focal = problem.nominal.lens.matrix[0][0].abs();
-    let slack =
-        focal * (priors.white_marker_mm + priors.pupil_mm.iter().fold(0.0_f64, |m, v| m.max(*v))) / away;
-    let noise_px = priors.white_centroid_px.hypot(3.0 * slack);
-    let solver = PoseSolver::new(&optics, &problem.white_markers, PoseOptions::new(noise_px, 10.0 * away))
-        .map_err(fault)?;
+    let solver = problem.pose_solver(&optics, priors)?;
     let mut poses = vec![Rigid::identity(); problem.at_rest.min(problem.frames.len())];
     for (frame, seen) in problem.frames.iter().zip(&problem.seen).skip(problem.at_rest) {
         let sightings: Vec<Sighting> = seen
@@ -184,10 +200,25 @@ fn start_poses(problem: &Problem, priors: &CalibrationPriors) -> Result<Vec<Rigi
 }
 
 /// The constants with what was fitted.
-fn measured(constants: &Constants, problem: &Problem, x: &[f64]) -> Result<Constants, OpticsFitError> {
+fn measured(
+    constants: &Constants,
+    problem: &Problem,
+    x: &[f64],
+    covariance: &DMatrix<f64>,
+) -> Result<Constants, OpticsFitError> {
     let spec = problem.spec(x);
     let optics = SensorOptics::new(&spec).map_err(|e| OpticsFitError::Constants(e.to_string()))?;
     let mut made = constants.clone();
+    let (first, count) = (problem.body_numbers(), problem.intrinsics.count());
+    if count > 0 {
+        made.camera.matrix = spec.lens.matrix;
+        made.camera.distortion.clone_from(&spec.lens.distortion);
+        made.camera.max_field_angle_rad = optics.lens().max_field_angle_rad();
+        let left =
+            problem.intrinsics.covariance(&covariance.view((first, first), (count, count)).into_owned());
+        let row = |i: usize| (0..count).map(|j| 0.5 * (left[(i, j)] + left[(j, i)])).collect();
+        made.camera.intrinsics_covariance = (0..count).map(row).collect();
+    }
     made.camera.camera_from_sensor = spec.sensor_from_camera.inverse().to_rows_4x4();
     let first_is_air = made.optics.layers.first().is_some_and(|l| l.name == "air");
     if first_is_air && let Some(air) = made.optics.layers.first_mut() {

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
-use super::problem::{Problem, Seen, camera_numbers};
+use super::problem::{Problem, Seen};
 use super::types::Kind;
 use crate::constants::CalibrationPriors;
 use domecast_optics::SensorOptics;
@@ -65,7 +65,7 @@ struct Shifted {
 
 impl Shifted {
     fn new(problem: &Problem<'_>, x: &[f64]) -> Option<Self> {
-        let camera = camera_numbers(problem.flat);
+        let camera = problem.camera_numbers();
         // Steps a hundredth of a tolerance wide: rounding and curvature are both far below.
         let steps: Vec<f64> = problem.priors[..camera].iter().map(|sd| 0.01 * sd.max(1e-4)).collect();
         let mut optics = Vec::with_capacity(camera);
@@ -206,7 +206,7 @@ impl Problem<'_> {
             DVec2::new(row(0), row(1))
         };
         let (first, axes) = match mark.observation.kind {
-            Kind::White => (camera_numbers(self.flat) + 2 * mark.index, [DVec3::X, DVec3::Y]),
+            Kind::White => (self.camera_numbers() + 2 * mark.index, [DVec3::X, DVec3::Y]),
             Kind::Black => {
                 let dot = &self.black_dots[mark.index];
                 (self.black_number(mark.index), [dot.east, dot.north])

@@ -2,14 +2,16 @@
 
 use glam::{DVec2, DVec3};
 
+use super::intrinsics::Intrinsics;
 use super::types::{Kind, Observation, OpticsFitError};
 use crate::constants::{CalibrationPriors, Constants};
 use domecast_optics::numeric::rotation_from_vector;
-use domecast_optics::pose::{Marker, outline_centroid_offset};
+use domecast_optics::pose::{Marker, PoseOptions, PoseSolver, outline_centroid_offset};
 use domecast_optics::{DomeShape, OpticsSpec, SensorOptics};
 
 /// What is fitted, apart from the poses. Numbers: pupil (3), camera rotation (3), thickness of each flat layer, index
-/// of each layer, x and y of each white marker, two steps along the dome of each dot; as departures from nominal.
+/// of each layer, the camera's own numbers where their covariance is known, x and y of each white marker, two steps along
+/// the dome of each dot; as departures from nominal.
 pub(super) struct Problem<'a> {
     pub nominal: OpticsSpec,
     pub white_markers: Vec<Marker>,
@@ -18,6 +20,7 @@ pub(super) struct Problem<'a> {
     pub frames: Vec<usize>,
     pub seen: Vec<Vec<Seen<'a>>>,
     pub flat: usize,
+    pub intrinsics: Intrinsics,
     /// How many of the frames, from the first, are at rest.
     pub at_rest: usize,
 }
@@ -42,11 +45,6 @@ impl Black {
     }
 }
 
-/// Camera and layers take the first numbers.
-pub(super) fn camera_numbers(flat: usize) -> usize {
-    6 + flat + flat + 1
-}
-
 impl<'a> Problem<'a> {
     pub fn new(
         constants: &Constants,
@@ -56,6 +54,7 @@ impl<'a> Problem<'a> {
     ) -> Result<Self, OpticsFitError> {
         let nominal = constants.optics_spec().map_err(OpticsFitError::Constants)?;
         let flat = nominal.layers.len().saturating_sub(1);
+        let intrinsics = Intrinsics::new(&constants.camera).map_err(OpticsFitError::Constants)?;
         let white_markers = constants.markers();
         let black = |dot: &crate::constants::BlackDot| {
             let at_mm = DVec3::from_array(dot.surface_mm);
@@ -69,6 +68,7 @@ impl<'a> Problem<'a> {
         sds.extend(priors.camera_rotation_rad);
         sds.extend(vec![priors.layer_thickness_mm; flat]);
         sds.extend(vec![priors.index; flat + 1]);
+        sds.extend(vec![1.0; intrinsics.count()]);
         sds.extend(vec![priors.white_marker_mm; 2 * white_markers.len()]);
         sds.extend(vec![priors.black_dot_mm; 2 * black_dots.len()]);
         // A tolerance of zero holds a number to where it is.
@@ -92,7 +92,18 @@ impl<'a> Problem<'a> {
                 seen[frame].push(Seen { observation, index });
             }
         }
-        Ok(Self { nominal, white_markers, black_dots, priors, frames, seen, flat, at_rest: at_rest.max(1) })
+        let at_rest = at_rest.max(1);
+        Ok(Self { nominal, white_markers, black_dots, priors, frames, seen, flat, intrinsics, at_rest })
+    }
+
+    /// Pupil, camera rotation and layers take the first numbers.
+    pub fn body_numbers(&self) -> usize {
+        6 + 2 * self.flat + 1
+    }
+
+    /// Then the camera's own.
+    pub fn camera_numbers(&self) -> usize {
+        self.body_numbers() + self.intrinsics.count()
     }
 
     pub fn numbers(&self) -> usize {
@@ -113,18 +124,19 @@ impl<'a> Problem<'a> {
                 *index = (*index + x[6 + flat + k]).max(1.0);
             }
         }
+        self.intrinsics.apply(&x[self.body_numbers()..self.camera_numbers()], &mut spec.lens);
         spec
     }
 
     pub fn white(&self, x: &[f64], index: usize) -> Marker {
-        let at = camera_numbers(self.flat) + 2 * index;
+        let at = self.camera_numbers() + 2 * index;
         let mut marker = self.white_markers[index];
         marker.position_mm += DVec3::new(x[at], x[at + 1], 0.0);
         marker
     }
 
     pub fn black_number(&self, index: usize) -> usize {
-        camera_numbers(self.flat) + 2 * self.white_markers.len() + 2 * index
+        self.camera_numbers() + 2 * self.white_markers.len() + 2 * index
     }
 
     pub fn black(&self, x: &[f64], index: usize) -> DVec3 {
@@ -155,6 +167,36 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Distance of the camera from the sheet, mm, at least one.
+    fn away_mm(&self) -> f64 {
+        self.nominal.sensor_from_camera.translation_mm.z.abs().max(1.0)
+    }
+
+    /// What tolerances move a mark's image by, roughly: its place and the pupil's over its distance, and the camera's
+    /// rotation, in focal lengths, px.
+    pub fn slack_px(&self, priors: &CalibrationPriors) -> f64 {
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(*v));
+        let place_mm = priors.white_marker_mm.max(priors.black_dot_mm) + largest(&priors.pupil_mm);
+        let focal = self.nominal.lens.matrix[0][0].abs();
+        let intrinsics_px: f64 = self.intrinsics.focal_and_center_sd_px();
+        focal * (place_mm / self.away_mm() + largest(&priors.camera_rotation_rad)) + intrinsics_px + 0.5
+    }
+
+    /// A solver of poses that bears what tolerances do to the markers' images.
+    pub fn pose_solver(
+        &self,
+        optics: &SensorOptics,
+        priors: &CalibrationPriors,
+    ) -> Result<PoseSolver, OpticsFitError> {
+        let away = self.away_mm();
+        let focal = self.nominal.lens.matrix[0][0].abs();
+        let slack =
+            focal * (priors.white_marker_mm + priors.pupil_mm.iter().fold(0.0_f64, |m, v| m.max(*v))) / away;
+        let noise_px = priors.white_centroid_px.hypot(3.0 * slack);
+        PoseSolver::new(optics, &self.white_markers, PoseOptions::new(noise_px, 10.0 * away))
+            .map_err(|error| OpticsFitError::Constants(format!("white markers: {error}")))
+    }
+
     pub fn noise(&self, priors: &CalibrationPriors, kind: Kind) -> f64 {
         match kind {
             Kind::White => priors.white_centroid_px,
@@ -173,12 +215,15 @@ impl<'a> Problem<'a> {
                 let layer = &self.nominal.layers[n - 6];
                 (format!("{}.thickness", layer.name), layer.thickness_mm.unwrap_or(0.0))
             }
-            n if n < camera_numbers(flat) => {
+            n if n < self.body_numbers() => {
                 let layer = &self.nominal.layers[n - 6 - flat];
                 (format!("{}.index", layer.name), layer.index[1])
             }
+            n if n < self.camera_numbers() => {
+                self.intrinsics.name(n - self.body_numbers(), &self.nominal.lens)
+            }
             n => {
-                let k = n - camera_numbers(flat);
+                let k = n - self.camera_numbers();
                 let id = constants.white_markers.get(k / 2).map_or(0, |m| m.id);
                 let nominal = self.white_markers.get(k / 2).map_or(0.0, |m| m.position_mm[k % 2]);
                 (format!("white_markers[{id}].{}", axis[k % 2]), nominal)

@@ -88,6 +88,8 @@ pub enum OpticsFitError {
         /// Its number.
         id: usize,
     },
+    /// The marks cannot be this sensor's: what they look like, in words.
+    Suspect(String),
     /// The fit did not converge in the allowed steps.
     NotConverged {
         /// What was left, px.
@@ -99,7 +101,7 @@ impl std::fmt::Display for OpticsFitError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let word = |kind: &Kind| if *kind == Kind::White { "white marker" } else { "black dot" };
         match self {
-            Self::Constants(what) => f.write_str(what),
+            Self::Constants(what) | Self::Suspect(what) => f.write_str(what),
             Self::UnknownMark { kind, id } => write!(f, "the constants have no {} {id}", word(kind)),
             Self::Empty => write!(f, "there are no observations"),
             Self::FewMarkers { frame } => {

@@ -7,9 +7,11 @@ mod candidates;
 mod equations;
 mod fit;
 mod shading;
+mod still;
 mod view;
 
 pub(in crate::track) use candidates::Candidate;
 pub(in crate::track) use fit::{FIT_REACH_PX, FittedDisc};
 pub(in crate::track) use shading::ShadingSlope;
+pub(crate) use still::marker_in_still;
 pub(in crate::track) use view::MarkerView;

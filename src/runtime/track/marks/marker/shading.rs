@@ -19,6 +19,11 @@ const PRIOR_FRAMES: f64 = 1.0;
 /// Steeper than this in a px, a disc is lit by something else than a lens's or a lamp's fall-off.
 const MAX_SLOPE: f64 = 0.05;
 
+/// A slope that a lens or a lamp makes; `None` of a steeper one.
+pub(super) fn usable_slope(slope: Option<DVec2>) -> Option<DVec2> {
+    slope.filter(|slope| slope.length() < MAX_SLOPE)
+}
+
 impl ShadingSlope {
     /// The best estimate so far, parts of the disc's level a px.
     pub fn estimate(&self) -> DVec2 {
@@ -27,7 +32,7 @@ impl ShadingSlope {
 
     /// Takes in the slope that one frame shows.
     pub fn add(&mut self, slope: Option<DVec2>) {
-        if let Some(slope) = slope.filter(|slope| slope.length() < MAX_SLOPE) {
+        if let Some(slope) = usable_slope(slope) {
             self.frames = (self.frames + 1.0).min(AVERAGED_FRAMES);
             self.mean += (slope - self.mean) / self.frames;
         }

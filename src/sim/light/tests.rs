@@ -1,4 +1,5 @@
 mod mitsuba;
+mod photons;
 mod tables;
 
 use std::f64::consts::{PI, TAU};
@@ -27,6 +28,11 @@ const WIDE: DVec2 = DVec2::splat(1e6);
 
 /// A sensor with a sheet of the given indices, 1 mm of each, and a dome of radius 10 mm.
 fn sensor(sheet: &[f64], dome: f64) -> SensorOptics {
+    sensor_of(sheet, dome, 10.0)
+}
+
+/// The same with a dome of another radius, mm.
+fn sensor_of(sheet: &[f64], dome: f64, dome_radius_mm: f64) -> SensorOptics {
     let mut layers: Vec<FlatLayer> = sheet
         .iter()
         .map(|&n| FlatLayer { name: "sheet".into(), index: [n; 3], thickness_mm: Some(1.0) })
@@ -42,7 +48,7 @@ fn sensor(sheet: &[f64], dome: f64) -> SensorOptics {
         pupil_shift_mm: Vec::new(),
     };
     let sensor_from_camera = Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0));
-    SensorOptics::new(&OpticsSpec { lens, sensor_from_camera, layers, dome_radius_mm: 10.0 }).unwrap()
+    SensorOptics::new(&OpticsSpec { lens, sensor_from_camera, layers, dome_radius_mm }).unwrap()
 }
 
 /// A square emitter at a place, facing a direction.

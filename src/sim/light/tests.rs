@@ -8,6 +8,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3A};
 
 use super::LightUse;
 use super::bounds;
+use super::bounds::CoarseLight;
 use super::cavity::Cavities;
 use super::direct::{DirectLight, Emitter, EmitterRule};
 use super::dome_map::{DomeGrid, bicubic, direction_from_disc, disc_from_direction};

@@ -14,8 +14,8 @@ use crate::scene::SceneFile;
 use crate::*;
 
 /// Sizes below which an effect is not told from none: a code, and a tenth of what a good tracker reads.
-const LEAST_GREY: f64 = 1.0;
-const LEAST_PX: f64 = 0.005;
+const MIN_GREY: f64 = 1.0;
+const MIN_PX: f64 = 0.005;
 
 /// Bounds over true sizes, by effect.
 type Ratios = BTreeMap<&'static str, Vec<f64>>;
@@ -104,10 +104,10 @@ fn measure(name: &str, scene: &Scene, numbers: &[u32], ratios: &mut Ratios) -> V
         };
         let with = if random { &with } else { &bare };
         let (px, grey) = difference(scene, random, with, &frames(scene, &without, numbers, &touches));
-        let by_px = bound.px / px.max(LEAST_PX);
+        let by_px = bound.px / px.max(MIN_PX);
         let whole = (bound.grey + grey_of_shift(scene, bound.px).unwrap()).min(255.0);
-        let by_grey = whole / grey.max(LEAST_GREY);
-        let ratio = if !scene.draws() || (bound.grey == 0.0 && px > LEAST_PX) { by_px } else { by_grey };
+        let by_grey = whole / grey.max(MIN_GREY);
+        let ratio = if !scene.draws() || (bound.grey == 0.0 && px > MIN_PX) { by_px } else { by_grey };
         let line = format!(
             "{name} {}: {px:.4} of {:.4} px, {grey} of {whole:.2} grey, {ratio:.2} times",
             entry.effect, bound.px

@@ -119,7 +119,7 @@ fn tell(output: &Output, scene: &Scene, plan: &Plan, summary: &Summary) -> Resul
 const PROBE_S: f64 = 0.01;
 
 /// Time of a unit of counted work on this machine now, on one core, s: the shortest of short runs of the simulator's probe. It is
-/// told, and nothing is chosen by it.
+/// printed, and nothing is chosen by it.
 fn unit_s(scene: &Scene) -> f64 {
     let began = Instant::now();
     let mut shortest = f64::INFINITY;

@@ -6,6 +6,7 @@ use super::geometry_bound::poses;
 use crate::SimError;
 use crate::bound::Bound;
 use crate::effect_name::{EffectChoice, EffectName};
+use crate::electronics::hot_pixels::DarkCurrent;
 use crate::light::bounds::{CoarseLight, grey_of_change_from, grey_of_level};
 use crate::light::{LightUse, is_lit_by_leds};
 use crate::scene::Scene;
@@ -104,12 +105,21 @@ pub fn inked_grey(scene: &Scene, covered: f64) -> Result<f64, SimError> {
     Ok(grey_of_change_from(file.electronics.gamma, darkest, change))
 }
 
+/// No value that the sensor reads is above this, full scales: the brightest level, and what the hottest pixel adds to it.
+///
+/// # Errors
+/// Lights that do not fit the design.
+pub fn brightest_value(scene: &Scene) -> Result<f64, SimError> {
+    let hot = scene.file().electronics.hot_pixels.as_ref();
+    Ok(brightest_level(scene)? + hot.map_or(0.0, |hot| DarkCurrent::of(scene, hot).largest()))
+}
+
 /// The largest step between two codes of the picture, grey levels.
 ///
 /// # Errors
 /// Lights that do not fit the design.
 pub fn contrast_grey(scene: &Scene) -> Result<f64, SimError> {
-    Ok(grey_of_level(scene.file().electronics.gamma, brightest_level(scene)?))
+    Ok(grey_of_level(scene.file().electronics.gamma, brightest_value(scene)?))
 }
 
 /// The most that a loss by field angle takes of any pixel, grey levels; `left` tells what it leaves, `edge_rad` where the

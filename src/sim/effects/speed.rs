@@ -37,14 +37,14 @@ const BETWEEN: f64 = 1.3;
 /// # Errors
 /// A frame whose load has no balance.
 pub fn farthest_px(scene: &Scene, within_s: f64) -> Result<f64, SimError> {
-    let at_most = within_s * fastest_px_per_s(scene).unwrap_or(0.0);
+    let max_px = within_s * fastest_px_per_s(scene).unwrap_or(0.0);
     if !scene.objects().is_empty() {
         // Between two frames all goes evenly.
         let per_frame = px_per_touched_frame(scene)?;
-        return Ok(per_frame.map_or(at_most, |px| at_most.min(px * within_s * scene.file().frames.rate_hz)));
+        return Ok(per_frame.map_or(max_px, |px| max_px.min(px * within_s * scene.file().frames.rate_hz)));
     }
     if scene.frame_count() > MAX_FRAMES {
-        return Ok(at_most);
+        return Ok(max_px);
     }
     let pixels = |time_s: f64| -> Option<Vec<Option<DVec2>>> {
         let state = scene.motion().at(scene.suspension(), time_s).ok()?;
@@ -56,9 +56,9 @@ pub fn farthest_px(scene: &Scene, within_s: f64) -> Result<f64, SimError> {
     let mut farthest = 0.0_f64;
     for frame in 0..scene.frame_count() {
         let time_s = scene.time_s(frame);
-        let Some(now) = pixels(time_s) else { return Ok(at_most) };
+        let Some(now) = pixels(time_s) else { return Ok(max_px) };
         for part in [-1.0, -0.5, 0.5, 1.0] {
-            let Some(then) = pixels(time_s + part * within_s) else { return Ok(at_most) };
+            let Some(then) = pixels(time_s + part * within_s) else { return Ok(max_px) };
             for pair in now.iter().zip(&then) {
                 if let (Some(a), Some(b)) = pair {
                     farthest = farthest.max(a.distance(*b));
@@ -66,7 +66,7 @@ pub fn farthest_px(scene: &Scene, within_s: f64) -> Result<f64, SimError> {
             }
         }
     }
-    Ok(at_most.min(BETWEEN * farthest))
+    Ok(max_px.min(BETWEEN * farthest))
 }
 
 fn platform_mm_per_s(scene: &Scene) -> f64 {

@@ -13,7 +13,7 @@ use crate::output::render::{Drawn, Scratch};
 use crate::scene::SceneFile;
 use crate::*;
 
-/// Sizes below which an effect is not told from none: a code, and a tenth of what a good tracker reads.
+/// Sizes below which an effect is not distinguished from none: a code, and a tenth of what a good tracker reads.
 const MIN_GREY: f64 = 1.0;
 const MIN_PX: f64 = 0.005;
 
@@ -64,7 +64,7 @@ fn difference(scene: &Scene, random: bool, a: &[Drawn], b: &[Drawn]) -> (f64, f6
     (px, grey)
 }
 
-/// Measures every effect of a scene that a plan may leave out, in some frames; what it is worth is told line by line.
+/// Measures every effect of a scene that a plan may leave out, in some frames; what it is worth is printed line by line.
 fn measure(name: &str, scene: &Scene, numbers: &[u32], ratios: &mut Ratios) -> Vec<String> {
     let plan = Plan::exact(scene).unwrap();
     let touches = touches(scene, &plan);
@@ -80,7 +80,8 @@ fn measure(name: &str, scene: &Scene, numbers: &[u32], ratios: &mut Ratios) -> V
         }
         plan
     };
-    let bare = frames(scene, &quiet(&plan, EffectName::Dots), numbers, &touches);
+    let bare_plan = quiet(&plan, EffectName::Dots);
+    let bare = frames(scene, &bare_plan, numbers, &touches);
     let mut below = Vec::new();
     for entry in plan.entries.iter().filter(|entry| entry.used) {
         let bound = entry.bound.unwrap();
@@ -88,21 +89,16 @@ fn measure(name: &str, scene: &Scene, numbers: &[u32], ratios: &mut Ratios) -> V
             continue;
         }
         let random = entry.effect == EffectName::Noise;
-        let mut without = if random { plan.clone() } else { quiet(&plan, EffectName::Dots) };
+        let with_it = quiet(&plan, entry.effect);
+        let mut without = with_it.clone();
         without.entries.iter_mut().filter(|other| other.effect == entry.effect).for_each(|e| e.used = false);
-        if random {
-            without
-                .entries
-                .iter_mut()
-                .filter(|e| e.effect == EffectName::Compression)
-                .for_each(|e| e.used = false);
-        }
-        let with = if random {
-            frames(scene, &quiet(&plan, EffectName::Noise), numbers, &touches)
+        let own;
+        let with = if with_it == bare_plan {
+            &bare
         } else {
-            Vec::new()
+            own = frames(scene, &with_it, numbers, &touches);
+            &own
         };
-        let with = if random { &with } else { &bare };
         let (px, grey) = difference(scene, random, with, &frames(scene, &without, numbers, &touches));
         let by_px = bound.px / px.max(MIN_PX);
         let whole = (bound.grey + grey_of_shift(scene, bound.px).unwrap()).min(255.0);

@@ -82,6 +82,30 @@ fn markers_are_tracked_as_well_as_the_lit_frame_says() {
     }
 }
 
+/// The tracker follows the dim scene, and says of every frame of one with less than half of its light that it does not.
+#[test]
+fn the_dim_scene_is_tracked_and_the_one_that_is_too_dim_is_named() {
+    let design = Design::load(&designs().join("thumb24.json")).unwrap();
+    let constants = domecast::constants::of(&design, &design.layout().unwrap()).unwrap();
+    for (name, is_tracked) in [("dim", true), ("too-dim", false)] {
+        let scene = Scene::load(&designs().join(format!("scenes/{name}.json"))).unwrap();
+        let renderer = Renderer::new(&scene, &Plan::of(&scene).unwrap()).unwrap();
+        let mut tracker = Tracker::new(&constants, TrackOptions::default()).unwrap();
+        let mut scratch = Scratch::default();
+        for number in 0..8 {
+            let drawn = renderer.frame_around(number, None, &mut scratch).unwrap();
+            let image = drawn.image.unwrap();
+            let frame = CameraFrame::new(image.width, image.height, image.channels, &image.bytes).unwrap();
+            let tracked = tracker.track(number.into(), &frame);
+            assert_eq!(tracked.status() == "ok", is_tracked, "{name} {number}: {}", tracked.status());
+            if is_tracked {
+                let off_n = tracked.wrench.unwrap().force_n.z - drawn.truth.wrench[2];
+                assert!(off_n.abs() < 0.3, "{name} {number}: {off_n} N");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_sensor_without_light_is_refused_with_the_field() {
     let dark = checked(&[("/leds/list", json!([]))]).unwrap_err();

@@ -112,3 +112,42 @@ fn a_contact_that_its_level_does_not_cover_is_named() {
     assert_eq!((&fault["status"], &fault["first"]), (&json!("not_applicable"), &json!(1)), "{told}");
     assert_eq!(fault["frames"], json!(1), "{told}");
 }
+
+#[test]
+fn costs_are_told_in_seconds_and_decide_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), &scene(|scene| scene["electronics"] = json!({ "vignetting_exponent": 0.001 })));
+    let told = || -> Value {
+        let output = domecast(&["simulate", "scene.json", "--explain", "--json"], folder.path());
+        serde_json::from_slice(&output.stdout).expect("JSON")
+    };
+    let (one, other) = (told(), told());
+    assert_eq!(one["plan"], other["plan"], "the plan knows no clock");
+    assert!(one["seconds"]["refraction"].as_f64().is_some_and(|s| s > 0.0 && s < 10.0), "{one}");
+    assert!(!one["plan"].to_string().contains("seconds"), "{one}");
+    let text = domecast(&["simulate", "scene.json", "--explain"], folder.path()).stdout;
+    let text = String::from_utf8(text).expect("UTF-8");
+    assert!(text.contains(" ms ") && !text.contains("work"), "{text}");
+    for out in ["a", "b"] {
+        let output = domecast(&["simulate", "scene.json", "--out", out], folder.path());
+        assert_eq!(output.status.code(), Some(0));
+    }
+    for name in domecast::build::list_files(&folder.path().join("a")).expect("listed") {
+        let read = |out: &str| fs::read(folder.path().join(out).join(&name)).expect("read");
+        assert_eq!(read("a"), read("b"), "{name}");
+    }
+}
+
+#[test]
+fn what_a_lossy_code_does_is_measured_and_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), &scene(|scene| scene["electronics"] = json!({ "jpeg_quality": 60 })));
+    let output = domecast(&["simulate", "scene.json", "--out", "out", "--json"], folder.path());
+    let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let coded = |name: &str| told["coding"][name].as_f64().expect("a number");
+    assert!(coded("max_grey") >= coded("p999_grey") && coded("p999_grey") >= 2.0, "{told}");
+    assert!(coded("rms_grey") > 0.1 && coded("rms_grey") < coded("p999_grey"), "{told}");
+    let output = domecast(&["simulate", "scene.json", "--out", "out"], folder.path());
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    assert!(text.contains("the tolerance holds before it") && text.contains("JPEG changes"), "{text}");
+}

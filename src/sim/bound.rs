@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-/// How large an effect can be in a scene: what its absence can do to a frame in which any of the others take part
-/// or not. It may be too large, never too small.
+/// How large an effect can be in a scene: what its absence can do to a frame in which the scene's other effects take part. It
+/// may be too large, never too small. What several geometric effects or effects of the light do together is bounded by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Bound {
     /// Shift of any dot's or marker's centroid in any colour, px.

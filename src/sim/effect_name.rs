@@ -93,8 +93,12 @@ effect_names! {
     RollingShutter = rolling_shutter,
     /// Each pixel sees one colour.
     Bayer = bayer,
+    /// Some pixels fill in the dark.
+    HotPixels = hot_pixels,
     /// Shot, read and quantisation noise.
     Noise = noise,
+    /// The camera sharpens what it has read.
+    Sharpening = sharpening,
     /// The camera's lossy code.
     Compression = compression,
 }
@@ -112,6 +116,10 @@ impl EffectName {
         Self::SheetMotion,
         Self::GapChange,
     ];
+
+    /// The effects of the design's lights, but for the lights themselves.
+    pub const OF_LIGHT: [Self; 5] =
+        [Self::Falloff, Self::Diffuser, Self::Fresnel, Self::PlatformShadow, Self::Interreflection];
 
     /// The effect of that name.
     pub fn parse(name: &str) -> Option<Self> {

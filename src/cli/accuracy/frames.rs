@@ -13,6 +13,8 @@ use domecast_sim::{Around, Drawn, Plan, Renderer, Scratch, SimError, Work};
 /// Tolerances of the sweep, in parts of the scene's own.
 const PARTS: [f64; 5] = [64.0, 16.0, 4.0, 1.0, 0.25];
 const QUICK_PARTS: [f64; 2] = [16.0, 1.0];
+/// Grey tolerances of the pair that stands side by side, levels; the tolerance in px is the scene's own.
+const PAIR: [f64; 2] = [1.0, 20.0];
 /// Frames that are drawn, spread over the scene.
 const FRAMES: u32 = 6;
 const QUICK_FRAMES: u32 = 2;
@@ -21,6 +23,12 @@ const SHARE: f64 = 0.999;
 
 /// The scene with few frames over its whole time, and its tolerances times a factor.
 fn changed(scene: &Scene, factor: f64, frames: u32) -> Result<Scene, SimError> {
+    let own = scene.file().tolerance;
+    with_tolerance(scene, own.px * factor, own.grey * factor, frames)
+}
+
+/// The scene with few frames over its whole time, and other tolerances.
+fn with_tolerance(scene: &Scene, px: f64, grey: f64, frames: u32) -> Result<Scene, SimError> {
     let mut file: SceneFile = scene.file().clone();
     let whole = file.frames.count.max(1);
     let count = frames.min(whole);
@@ -28,8 +36,8 @@ fn changed(scene: &Scene, factor: f64, frames: u32) -> Result<Scene, SimError> {
         file.frames.rate_hz *= f64::from(count - 1) / f64::from((whole - 1).max(1));
     }
     file.frames.count = count;
-    file.tolerance.px = (file.tolerance.px * factor).min(1e6);
-    file.tolerance.grey = (file.tolerance.grey * factor).min(255.0);
+    file.tolerance.px = px.min(1e6);
+    file.tolerance.grey = grey.min(255.0);
     let design: Design = scene.design().clone();
     Scene::new(file, scene.folder(), design)
 }
@@ -136,6 +144,13 @@ pub fn sweep(scene: &Scene, quick: bool) -> Result<(Sweep, Sequence), SimError> 
         let plan = Plan::of(&scene)?;
         let sequence = draw(&scene, &Renderer::new(&scene, &plan)?, &mut scratch)?;
         samples.push(sample(label, tolerance.grey, &plan, &sequence));
+    }
+    for grey in PAIR {
+        let scene = with_tolerance(scene, scene.file().tolerance.px, grey, frames)?;
+        let plan = Plan::of(&scene)?;
+        let sequence = draw(&scene, &Renderer::new(&scene, &plan)?, &mut scratch)?;
+        let label = format!("the same at {grey} grey levels");
+        samples.push(SweepSample { method: "pair", ..sample(label, grey, &plan, &sequence) });
     }
     // The reference itself, with what it took.
     samples.push(sample("every effect".into(), 0.0, &everything, &truth));

@@ -8,8 +8,9 @@ use serde_json::json;
 use super::output::{Failure, Output};
 use domecast_design::DesignError;
 use domecast_files::StagedFolder;
+use domecast_sim::electronics::deviation::{CodingDeviation, CodingFigures};
 use domecast_sim::run;
-use domecast_sim::run::{ContactFault, RunError};
+use domecast_sim::run::{ContactFault, RunError, Summary};
 use domecast_sim::{Plan, Scene, SimError};
 
 /// Options besides the scene.
@@ -59,8 +60,11 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
         if options.everything { Plan::everything(&scene) } else { Plan::of(&scene) }.map_err(in_file)?;
     let Some(staged) = staged else {
         output.steps_done();
-        explain(output, &scene, &plan)?;
-        return output.result(&json!({ "ok": true, "scene": scene.name(), "plan": plan }));
+        let unit_s = unit_s(&scene);
+        explain(output, &scene, &plan, unit_s)?;
+        let seconds = seconds(&scene, &plan, unit_s);
+        return output
+            .result(&json!({ "ok": true, "scene": scene.name(), "plan": plan, "seconds": seconds }));
     };
     let count = scene.frame_count();
     let draw = || {
@@ -81,15 +85,7 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
         RunError::Write(error) => Failure::Write(error),
     })?;
     output.kept(staged.commit()?);
-    for (frame, note) in &summary.notes {
-        output.warn(&format!("frame {frame}: {note}"));
-    }
-    for fault in &summary.contact {
-        let ContactFault { status, frames, first, note } = fault;
-        output
-            .warn(&format!("contact {status} in {frames} of {count} frames, first in frame {first}: {note}"));
-    }
-    explain(output, &scene, &plan)?;
+    tell(output, &scene, &plan, &summary)?;
     let seconds = began.elapsed().as_secs_f64();
     output.say(&format!("{}: {} frames in {seconds:.2} s", out.display(), summary.frames))?;
     output.result(&json!({
@@ -98,9 +94,55 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
         "frames": summary.frames,
         "notes": summary.notes,
         "contact": summary.contact,
+        "coding": summary.coding.as_ref().map(CodingDeviation::figures),
         "work": summary.work.total(),
         "plan": plan,
     }))
+}
+
+/// Prints what is not as asked, the plan, and what a lossy code did.
+fn tell(output: &Output, scene: &Scene, plan: &Plan, summary: &Summary) -> Result<(), Failure> {
+    let count = scene.frame_count();
+    for (frame, note) in &summary.notes {
+        output.warn(&format!("frame {frame}: {note}"));
+    }
+    for fault in &summary.contact {
+        let ContactFault { status, frames, first, note } = fault;
+        output
+            .warn(&format!("contact {status} in {frames} of {count} frames, first in frame {first}: {note}"));
+    }
+    explain(output, scene, plan, unit_s(scene))?;
+    let coding = summary.coding.as_ref().map(CodingDeviation::figures);
+    if let Some(CodingFigures { max_grey, p999_grey, rms_grey }) = coding {
+        output.say(&format!(
+            "  the camera's JPEG changes 999 of 1000 values by at most {p999_grey} grey levels, any by at most {max_grey}, \
+             {rms_grey:.1} rms; the tolerance holds before it"
+        ))?;
+    }
+    Ok(())
+}
+
+/// How long the probe is run, s.
+const PROBE_S: f64 = 0.01;
+
+/// Time of a unit of counted work on this machine now, on one core, s: the shortest of short runs of the simulator's probe. It is
+/// printed, and nothing is chosen by it.
+fn unit_s(scene: &Scene) -> f64 {
+    let began = Instant::now();
+    let mut shortest = f64::INFINITY;
+    while began.elapsed().as_secs_f64() < PROBE_S {
+        let start = Instant::now();
+        let units = domecast_sim::probe(scene);
+        shortest = shortest.min(start.elapsed().as_secs_f64() / units as f64);
+    }
+    shortest
+}
+
+/// About what each effect that the scene calls for takes on one core of this machine, s.
+fn seconds(scene: &Scene, plan: &Plan, unit_s: f64) -> serde_json::Map<String, serde_json::Value> {
+    let frames = u64::from(scene.frame_count());
+    let costs = plan.entries.iter().filter_map(|entry| Some((entry.effect, entry.cost?.total(frames))));
+    costs.map(|(effect, cost)| (effect.as_str().to_owned(), json!(cost as f64 * unit_s))).collect()
 }
 
 fn bar(done: u32, count: u32) -> String {
@@ -109,8 +151,18 @@ fn bar(done: u32, count: u32) -> String {
     format!("[{}{}]", "=".repeat(full.min(WIDTH)), " ".repeat(WIDTH.saturating_sub(full)))
 }
 
+/// A time for people.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s >= 10.0 => format!("{s:.0} s"),
+        s if s >= 0.1 => format!("{s:.1} s"),
+        s if s >= 1e-3 => format!("{:.0} ms", 1e3 * s),
+        s => format!("{:.2} ms", 1e3 * s),
+    }
+}
+
 /// The plan as a table for people.
-fn explain(output: &Output, scene: &Scene, plan: &Plan) -> Result<(), Failure> {
+fn explain(output: &Output, scene: &Scene, plan: &Plan, unit_s: f64) -> Result<(), Failure> {
     let frames = u64::from(scene.frame_count());
     for entry in &plan.entries {
         let (Some(bound), Some(cost)) = (entry.bound, entry.cost) else { continue };
@@ -121,11 +173,11 @@ fn explain(output: &Output, scene: &Scene, plan: &Plan) -> Result<(), Failure> {
         };
         let mark = if entry.used { "used" } else { "left out" };
         output.say(&format!(
-            "  {:<9} {:<16} {:<32} work {:>9.2e}  {}",
+            "  {:<9} {:<16} {:<32} {:>9}  {}",
             mark,
             entry.effect.as_str(),
             size,
-            cost.total(frames) as f64,
+            duration(cost.total(frames) as f64 * unit_s),
             entry.why
         ))?;
     }

@@ -3,6 +3,7 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
+use crate::effects::light_bound;
 use crate::electronics::bayer::{DEMOSAIC_UNITS, Demosaic, FILTER_UNITS, Filter};
 use crate::{Pipeline, Scene, SimError};
 
@@ -19,10 +20,10 @@ impl Effect for Bayer {
         Some(format!("one colour a pixel, {pattern:?}"))
     }
 
-    fn bound(&self, _scene: &Scene) -> Result<Bound, SimError> {
-        // At an edge a pixel may get its neighbours' value, full scale away; a colour that is sampled at every
+    fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
+        // At an edge a pixel may get its neighbours' value, the whole contrast away; a colour that is sampled at every
         // other pixel places a dot to within that spacing.
-        Ok(Bound { px: 1.0, grey: 255.0 })
+        Ok(Bound { px: 1.0, grey: light_bound::contrast_grey(scene)? })
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

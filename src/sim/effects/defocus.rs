@@ -3,9 +3,9 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
+use crate::effects::light_bound;
 use crate::electronics::defocus::{Blur, PIXELS_PER_UNIT, Widths, steps_for};
 use crate::light::bounds;
-use crate::light::bounds::LightBounds;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -28,12 +28,7 @@ impl Effect for Defocus {
         let steps = steps_for(largest);
         // What a pixel keeps of itself after all steps, along both axes; the rest comes from others.
         let keeps = (1.0 - largest / steps as f64).powi(2 * steps as i32);
-        let light = &scene.file().light;
-        let brightest = match light.leds {
-            Some(_) => LightBounds::of(scene)?.brightest.max(1.0),
-            None => light.brightest_level(),
-        };
-        let change = (1.0 - keeps) * brightest;
+        let change = (1.0 - keeps) * light_bound::brightest_level(scene)?;
         // A spot whose blur widens to one side is pulled there by the slope of the variance.
         let pull = widths.steepest();
         let grey = bounds::grey_of_change(scene.file().electronics.gamma, change);

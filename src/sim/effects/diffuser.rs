@@ -3,8 +3,7 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
-use crate::light::bounds;
-use crate::light::bounds::LightBounds;
+use crate::effects::light_bound;
 use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
@@ -25,7 +24,7 @@ impl Effect for DiffuserEffect {
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        Ok(bounds::grey(scene, LightBounds::of(scene)?.diffuser))
+        light_bound::change(scene, &|name| name == EffectName::Diffuser)
     }
 
     fn cost(&self, _scene: &Scene) -> Cost {

@@ -4,8 +4,7 @@ use super::direct_light::SAMPLES;
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
-use crate::light::bounds;
-use crate::light::bounds::LightBounds;
+use crate::effects::light_bound;
 use crate::light::{is_lit_by_leds, shade};
 use crate::{Pipeline, Scene, SimError};
 
@@ -27,7 +26,7 @@ impl Effect for Fresnel {
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        Ok(bounds::grey(scene, LightBounds::of(scene)?.fresnel))
+        light_bound::change(scene, &|name| name == EffectName::Fresnel)
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

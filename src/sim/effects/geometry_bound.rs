@@ -15,9 +15,13 @@ use crate::scene::Scene;
 use crate::scene::file::LevelName;
 use crate::work::Work;
 use domecast_contact::Level;
+use domecast_optics::numeric::Rigid;
 
 /// Frames at which shifts are looked at; a longer sequence is sampled.
 const MAX_FRAMES: u32 = 17;
+
+/// Poses in which the light's way to the camera is looked at.
+const MAX_POSES: usize = 5;
 
 /// All geometric effects that the scene calls for.
 pub fn called_for(scene: &Scene) -> Geometry {
@@ -45,6 +49,53 @@ fn frames(scene: &Scene) -> Vec<u32> {
     }
     let last = u64::from(count - 1);
     (0..MAX_FRAMES).map(|k| (u64::from(k) * last / u64::from(MAX_FRAMES - 1)) as u32).collect()
+}
+
+/// Poses in which the platform stands over the frames, some of them, and at rest.
+///
+/// # Errors
+/// A frame whose load has no balance.
+pub(super) fn poses(scene: &Scene) -> Result<Vec<Rigid>, SimError> {
+    let mut out = vec![Rigid::identity()];
+    if called_for(scene).sheet_motion {
+        let frames = frames(scene);
+        let solved = scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames))?;
+        let all: Vec<Rigid> = solved.touches().map(|(_, touch)| touch.state.pose).collect();
+        let step = all.len().div_ceil(MAX_POSES).max(1);
+        out.extend(all.iter().step_by(step).chain(all.last()).copied());
+    }
+    Ok(out)
+}
+
+/// The most that any dot or marker moves in the image from one frame to the next where objects press, px; `None` where not
+/// every frame is looked at.
+///
+/// # Errors
+/// A frame whose load has no balance.
+pub(super) fn px_per_touched_frame(scene: &Scene) -> Result<Option<f64>, SimError> {
+    let frames = frames(scene);
+    if (frames.len() as u32) < scene.frame_count() {
+        return Ok(None);
+    }
+    let mut uncounted = Work::default();
+    let geometry = called_for(scene);
+    let eye = Projector::new(scene, geometry)?;
+    let points = Points::new(scene, (geometry, Ink::default()), &eye, 0.1, &mut uncounted);
+    let solved = scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames))?;
+    let (mut last, mut fastest): (Vec<Option<DVec2>>, f64) = (Vec::new(), 0.0);
+    for (frame, touch) in solved.touches() {
+        let shape = SkinShape { touch: Some(Between::at_frame(touch.clone())), ..SkinShape::default() };
+        let time_s = scene.time_s(frame);
+        let state = SensorState::new(&eye, geometry, time_s, touch.state.clone(), shape, &mut uncounted)?;
+        let now = points.centers(&state, eye.reference());
+        for (before, now) in last.iter().zip(&now) {
+            if let (Some(before), Some(now)) = (before, now) {
+                fastest = fastest.max(before.distance(*now));
+            }
+        }
+        last = now;
+    }
+    Ok(Some(UNDER_OBJECT * fastest))
 }
 
 /// A level of contact that answers at once: the geometric one. Under a body with edges its forces have steps, on which a

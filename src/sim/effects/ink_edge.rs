@@ -4,6 +4,7 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
+use crate::effects::light_bound;
 use crate::raster::sensor_state::units;
 use crate::{Pipeline, Scene, SimError};
 
@@ -14,7 +15,7 @@ pub struct InkEdge;
 const MORE_RINGS: u64 = 5;
 /// Corners of an outline, predicted.
 const CORNERS: u64 = 50;
-/// The image of a dot may be this much wider than at rest.
+/// The image of a dot may be this much wider than at rest where anything moves.
 const WIDER: f64 = 1.5;
 
 impl Effect for InkEdge {
@@ -30,10 +31,11 @@ impl Effect for InkEdge {
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
         let ink = &scene.file().ink;
-        let light = &scene.file().light;
+        let moves = scene.motion().moves() || !scene.objects().is_empty();
+        let wider = if moves { WIDER } else { 1.0 };
         let edge = |dot: &domecast_design::layout::Dot| {
             let share = ink.edge_mm / dot.diameter_mm;
-            let radius_px = WIDER * 0.5 * dot.image_outline.widths().1;
+            let radius_px = wider * 0.5 * dot.image_outline.widths().1;
             // Half of the ramp's width, px, and what the nested outlines' unlike areas do to the centroid: its
             // distance from the centre times two thirds of the square of the share. A whole dot's lies near its
             // centre, but that of one that is broken, or ends at the picture's edge, may lie at its rim.
@@ -41,12 +43,11 @@ impl Effect for InkEdge {
         };
         let edges = scene.layout().dots.iter().map(edge);
         let (width_px, shift_px) = edges.fold((0.0_f64, 0.0_f64), |(w, s), (a, b)| (w.max(a), s.max(b)));
-        // A ramp of half width w about an edge changes what a pixel is covered by at most w / 2 on one side of it
-        // (a triangle of height 1/2 and base w), over a length of sqrt(2); never by more than half.
-        let covered = (0.5 * std::f64::consts::SQRT_2 * width_px).min(0.5);
-        let brightest = light.brightest_level();
-        let slope = scene.file().electronics.steepest_code(light.membrane_level * ink.reflectance);
-        Ok(Bound { px: shift_px, grey: 255.0 * slope * covered * brightest * (1.0 - ink.reflectance) })
+        // A ramp of half width w about an edge is the mean over edges up to w to either side. Where an edge lies on that of a
+        // pixel, half of them cover w / 2 of it in the mean. An aslant edge is up to sqrt(2) long in a pixel, but only where it
+        // lies well inside. Never does it cover more than half.
+        let covered = (0.25 * width_px * (1.0 + width_px).min(std::f64::consts::SQRT_2)).min(0.5);
+        Ok(Bound { px: shift_px, grey: light_bound::inked_grey(scene, covered)? })
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

@@ -13,9 +13,11 @@ mod falloff;
 mod fresnel;
 mod gap_change;
 pub(crate) mod geometry_bound;
+mod hot_pixels;
 mod ink_edge;
 mod interreflection;
 mod lens_distortion;
+pub(crate) mod light_bound;
 mod motion_blur;
 mod noise;
 pub mod pipeline;
@@ -23,6 +25,7 @@ mod platform_shadow;
 mod pupil_shift;
 mod refraction;
 mod rolling_shutter;
+mod sharpening;
 mod sheet_motion;
 pub mod speed;
 #[cfg(test)]
@@ -54,7 +57,9 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &motion_blur::MotionBlur,
         &rolling_shutter::RollingShutter,
         &bayer::Bayer,
+        &hot_pixels::HotPixels,
         &noise::Noise,
+        &sharpening::Sharpening,
         &compression::Compression,
     ]
 }

@@ -3,7 +3,7 @@
 //! The picture is the mean of pictures at the middles of equal parts of the exposure, as many as keep the step from
 //! one to the next below half a pixel.
 
-use super::speed::fastest_px_per_s;
+use super::speed::{farthest_px, fastest_px_per_s};
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
@@ -35,8 +35,8 @@ impl Effect for MotionBlur {
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        // No averaged picture is further from the one in the middle than half of the motion.
-        Ok(Bound::px(0.5 * smear_px(scene)))
+        // The averaged pictures lie up to so far from the one in the middle, and by half of that in the mean.
+        Ok(Bound::px(0.5 * farthest_px(scene, 0.5 * exposure_s(scene).unwrap_or(0.0))?))
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

@@ -3,12 +3,16 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
+use crate::effects::light_bound;
 use crate::electronics::noise::{SensorNoise, VALUE_UNITS, steps};
 use crate::light::bounds;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct Noise;
+
+/// Levels from dark to the brightest at which the noise is looked at.
+const LEVELS: u32 = 64;
 
 impl Effect for Noise {
     fn name(&self) -> EffectName {
@@ -29,9 +33,15 @@ impl Effect for Noise {
         // The 99.9th percentile of a Gaussian's size is 3.29 deviations; Poisson's law reaches further by less than
         // (z^2 - 1) / 6 + 1 electrons. The converter is off by half a step. The steepest place of the code takes it.
         let full = noise.full_scale_electrons;
-        let deviation = (full + noise.read_electrons.powi(2)).sqrt();
-        let change = (3.29 * deviation + 3.0) / full + 0.5 / steps(noise);
-        Ok(Bound::grey(bounds::grey_of_change(electronics.gamma, change)))
+        let brightest = light_bound::brightest_value(scene)?.min(1.0);
+        let at = |level: f64| {
+            let deviation = (full * level + noise.read_electrons.powi(2)).sqrt();
+            let change = (3.29 * deviation + 3.0) / full + 0.5 / steps(noise);
+            // Downwards the code of a gamma above 1 is steeper.
+            bounds::grey_of_change_from(electronics.gamma, (level - change).max(0.0), change)
+        };
+        let levels = (0..=LEVELS).map(|k| brightest * f64::from(k) / f64::from(LEVELS));
+        Ok(Bound::grey(levels.map(at).fold(0.0, f64::max)))
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

@@ -5,7 +5,7 @@
 //! middle row. There are as many slices as keep the motion within one below 0.1 px and below half of the scene's
 //! tolerance, [`MAX_SLICES`] at most.
 
-use super::speed::fastest_px_per_s;
+use super::speed::{farthest_px, fastest_px_per_s};
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
@@ -38,7 +38,7 @@ impl Effect for RollingShutter {
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
         // The first and the last row are half of the readout away from the frame's time.
-        Ok(Bound::px(0.5 * roll_px(scene)))
+        Ok(Bound::px(farthest_px(scene, 0.5 * readout_s(scene).unwrap_or(0.0))?))
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

@@ -1,7 +1,9 @@
 //! How fast anything moves in the image, at most: for the effects of a camera that takes its time.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
+use crate::SimError;
+use crate::effects::geometry_bound::px_per_touched_frame;
 use crate::scene::Scene;
 use crate::scene::file::{MotionSection, PoseKey, WrenchKey};
 use domecast_springs::{Displacement, Wrench};
@@ -20,6 +22,51 @@ const NEARER: f64 = 1.6;
 pub fn fastest_px_per_s(scene: &Scene) -> Option<f64> {
     let speed = platform_mm_per_s(scene).max(objects_mm_per_s(scene));
     (speed > 0.0).then(|| speed * largest_px_per_mm(scene))
+}
+
+/// Frames about which a motion is looked at; of a longer sequence the bound on the speed is taken.
+const MAX_FRAMES: u32 = 128;
+/// Every so many dots are looked at, and all markers.
+const DOTS_APART: usize = 5;
+/// What no point that is looked at shows, others may pass it by.
+const BETWEEN: f64 = 1.3;
+
+/// A bound on how far the image of any dot or marker lies, within some time before and after a frame's, from where it is
+/// at that frame's time, px.
+///
+/// # Errors
+/// A frame whose load has no balance.
+pub fn farthest_px(scene: &Scene, within_s: f64) -> Result<f64, SimError> {
+    let max_px = within_s * fastest_px_per_s(scene).unwrap_or(0.0);
+    if !scene.objects().is_empty() {
+        // Between two frames all goes evenly.
+        let per_frame = px_per_touched_frame(scene)?;
+        return Ok(per_frame.map_or(max_px, |px| max_px.min(px * within_s * scene.file().frames.rate_hz)));
+    }
+    if scene.frame_count() > MAX_FRAMES {
+        return Ok(max_px);
+    }
+    let pixels = |time_s: f64| -> Option<Vec<Option<DVec2>>> {
+        let state = scene.motion().at(scene.suspension(), time_s).ok()?;
+        let optics = scene.optics().at_pose(&state.pose).ok()?;
+        let dots = scene.dots().iter().step_by(DOTS_APART).map(|dot| dot.center_mm);
+        let points = dots.chain(scene.markers().iter().map(|marker| marker.position_mm));
+        Some(points.map(|point| optics.project(point).ok()).collect())
+    };
+    let mut farthest = 0.0_f64;
+    for frame in 0..scene.frame_count() {
+        let time_s = scene.time_s(frame);
+        let Some(now) = pixels(time_s) else { return Ok(max_px) };
+        for part in [-1.0, -0.5, 0.5, 1.0] {
+            let Some(then) = pixels(time_s + part * within_s) else { return Ok(max_px) };
+            for pair in now.iter().zip(&then) {
+                if let (Some(a), Some(b)) = pair {
+                    farthest = farthest.max(a.distance(*b));
+                }
+            }
+        }
+    }
+    Ok(max_px.min(BETWEEN * farthest))
 }
 
 fn platform_mm_per_s(scene: &Scene) -> f64 {
@@ -107,7 +154,6 @@ fn largest_px_per_mm(scene: &Scene) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec2;
 
     fn scene(name: &str) -> Scene {
         let folder =

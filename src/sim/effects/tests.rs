@@ -96,7 +96,12 @@ fn one_effect_of_the_electronics_alone_runs_alone() {
             EffectName::Defocus,
         ),
         (r#", "electronics": { "bayer": "grbg" }"#, EffectName::Bayer),
+        (
+            r#", "electronics": { "hot_pixels": { "share": 0.001, "level_per_s": 20 } }"#,
+            EffectName::HotPixels,
+        ),
         (r#", "electronics": { "noise": { "full_scale_electrons": 5000 } }"#, EffectName::Noise),
+        (r#", "electronics": { "sharpening": { "amount": 0.5, "radius_px": 1.2 } }"#, EffectName::Sharpening),
         (r#", "electronics": { "jpeg_quality": 80 }"#, EffectName::Compression),
     ] {
         let text = format!(

@@ -3,6 +3,7 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
+use crate::effects::light_bound;
 use crate::electronics::vignetting::{Darkening, FACTOR_UNITS, PIXELS_PER_UNIT, fall};
 use crate::{Pipeline, Scene, SimError};
 
@@ -26,11 +27,10 @@ impl Effect for Vignetting {
     }
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        // A level is at most full scale when it counts, and (a level darkened by the factor f) the code x^(1/gamma)
-        // falls by 1 - f^(1/gamma) of itself.
-        let electronics = &scene.file().electronics;
-        let edge = fall(scene.optics().lens().max_field_angle_rad(), electronics.vignetting_exponent);
-        Ok(Bound::grey(255.0 * (1.0 - edge.powf(1.0 / electronics.gamma))))
+        // Of a level darkened by the factor f the code x^(1/gamma) falls by 1 - f^(1/gamma) of itself.
+        let power = scene.file().electronics.vignetting_exponent;
+        let edge_rad = scene.optics().lens().max_field_angle_rad();
+        Ok(Bound::grey(light_bound::darkening_grey(scene, edge_rad, |angle| fall(angle, power))?))
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

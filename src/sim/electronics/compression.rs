@@ -51,6 +51,10 @@ impl CodedPass for Jpeg {
         EffectName::Compression
     }
 
+    fn is_lossy(&self) -> bool {
+        true
+    }
+
     fn run(&self, image: &mut Image8, _context: &PassContext, work: &mut Work) {
         if let Some(bytes) = self.through(image) {
             image.bytes = bytes;

@@ -5,6 +5,9 @@
 pub(crate) mod bayer;
 pub(crate) mod compression;
 pub(crate) mod defocus;
+pub mod deviation;
+pub(crate) mod hot_pixels;
 pub(crate) mod noise;
 pub mod pass;
+pub(crate) mod sharpening;
 pub(crate) mod vignetting;

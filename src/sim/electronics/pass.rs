@@ -1,6 +1,7 @@
 //! Passes over the picture, between light and bytes.
 
 use crate::effect_name::EffectName;
+use crate::electronics::deviation::CodingDeviation;
 use crate::raster::frame::{Frame, Image8};
 use crate::work::Work;
 
@@ -42,6 +43,24 @@ pub trait Pass: Send + Sync {
 pub trait CodedPass: Send + Sync {
     /// The effect that installed it.
     fn effect(&self) -> EffectName;
+    /// Whether it is a code that loses something, after which no tolerance holds.
+    fn is_lossy(&self) -> bool;
     /// Changes the picture.
     fn run(&self, image: &mut Image8, context: &PassContext, work: &mut Work);
+}
+
+/// Runs the passes over the coded picture, and tells what a lossy code among them makes of it; `None` without one.
+pub fn run_coded(
+    passes: &[Box<dyn CodedPass>],
+    image: &mut Image8,
+    context: &PassContext,
+    work: &mut Work,
+) -> Option<CodingDeviation> {
+    let mut found = None;
+    for pass in passes {
+        let before = pass.is_lossy().then(|| image.bytes.clone());
+        pass.run(image, context, work);
+        found = before.map(|before| CodingDeviation::between(&before, &image.bytes)).or(found);
+    }
+    found
 }

@@ -1,34 +1,26 @@
-//! How much light there can be, and how much of it each effect can be: bounds that hold before anything is drawn.
+//! How much light there can be, and how much of it each effect is: bounds that hold before anything is drawn.
 //!
-//! Light straight from the lights is smooth over the dome where nothing throws a shadow. So it is sampled there, with
-//! and without the tape and with and without the faces' losses, and taken somewhat larger than found. What the platform can hide
-//! and what the membrane can give itself follow from that in closed form: with the reflectance `a`, and `k` of the
-//! membrane's light coming back to it, the membrane's own light is at most `a k / (1 - a k)` of the lights', and what
-//! changes the lights' light changes all of it by at most `1 / (1 - a k)` of that.
+//! A coarse picture of the same physics: the light at 200 patches of the dome, what faces each light, the pole and the white
+//! markers, from lights of four places each, with and without the tape, the faces' losses and the platform's shadow; and the dome
+//! as a room of those patches. Only what the camera sees in some frame counts. So any set of effects can be left out and the
+//! change of every place be looked up, which is then taken somewhat larger than found, for what lies between the places.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::direct::EmitterRule;
+use super::bound_samples::{RINGS, Sample, Samples, View, samples, views};
 use super::parts::LightUse;
 use super::setup::{self, Channels};
 use super::shade::leaves;
 use super::shelf::Shelf;
-use super::tables::{SHELLS, Ways};
+use crate::SimError;
 use crate::scene::Scene;
-use crate::{Bound, SimError};
 use domecast_optics::SensorOptics;
+use domecast_optics::numeric::Rigid;
 
 /// What stands between two samples may pass them by this factor.
 const MARGIN: f64 = 1.3;
-
-/// Heights of the rings of samples, parts of the radius: close where the lights are near.
-const RINGS: [f64; 9] = [0.0, 0.04, 0.1, 0.18, 0.28, 0.4, 0.55, 0.72, 0.88];
-
-/// Samples of a ring, beside those that face a light.
-const AROUND: usize = 36;
 
 /// The largest change of a code, in grey levels of 8 bits, that a change of light by `change` (full scales) makes,
 /// wherever on the scale: for gamma of 1 and more the code `x^(1/gamma)` is concave and changes most from dark, for
@@ -37,223 +29,213 @@ const AROUND: usize = 36;
 /// It ends at 255, whatever the change: a picture holds no code outside its scale, so where both pictures are bright enough
 /// to saturate they differ by less, and by no more than the whole scale anywhere.
 pub fn grey_of_change(gamma: f64, change: f64) -> f64 {
-    let clear = change.clamp(0.0, 1.0);
+    grey_of_change_from(gamma, 0.0, change)
+}
+
+/// [`grey_of_change`] where the light is at least `darkest`, full scales.
+pub fn grey_of_change_from(gamma: f64, darkest: f64, change: f64) -> f64 {
+    let (low, clear) = (darkest.clamp(0.0, 1.0), change.clamp(0.0, 1.0));
     let power = 1.0 / gamma;
-    let code = if power <= 1.0 { clear.powf(power) } else { (power * clear).min(1.0) };
-    255.0 * code
+    let code =
+        if power <= 1.0 { (low + clear).powf(power) - low.powf(power) } else { (power * clear).min(1.0) };
+    255.0 * code.clamp(0.0, 1.0)
 }
 
-/// Bounds on levels of membrane and white markers under the design's lights, parts of full scale. Each holds whichever
-/// other effects take part.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LightBounds {
-    /// No level is above this.
-    pub brightest: f64,
-    /// What falloff and slant can change.
-    pub falloff: f64,
-    /// What the tape can change.
-    pub diffuser: f64,
-    /// What the sheet's faces can change.
-    pub fresnel: f64,
-    /// What the platform can hide.
-    pub platform_shadow: f64,
-    /// What the membrane can give itself.
-    pub interreflection: f64,
+/// The code of a level, grey levels of 8 bits.
+pub fn grey_of_level(gamma: f64, level: f64) -> f64 {
+    255.0 * level.clamp(0.0, 1.0).powf(1.0 / gamma)
 }
 
-impl LightBounds {
-    /// The bounds of a scene.
+/// Light at a place, by one channel.
+#[derive(Debug, Clone, Copy, Default)]
+struct Light {
+    still: f64,
+    /// `None` where the normal does not count.
+    vector: Option<DVec3>,
+    own: f64,
+}
+
+/// The light of a scene, coarsely.
+#[derive(Debug)]
+pub struct CoarseLight {
+    samples: Arc<Samples>,
+    views: Vec<Option<View>>,
+    optics: [SensorOptics; 3],
+    seen_mw: Vec<Channels>,
+    /// Level for each mW/mm^2, of membrane and markers.
+    gains: [Channels; 2],
+    albedo: Channels,
+    stray: f64,
+    gamma: f64,
+}
+
+impl CoarseLight {
+    /// The light of a scene whose platform stands in some poses; `None` without lights. It is kept for the next question.
     ///
     /// # Errors
     /// Lights that do not fit the design.
-    pub fn of(scene: &Scene) -> Result<Self, SimError> {
-        let Some(light) = &scene.file().light.leds else { return Ok(Self::default()) };
-        let ways = ways(scene, false, false)?;
-        let moved = !scene.file().objects.is_empty();
-        let key = format!("bounds {moved} {}", scene.design().text());
-        static SHELF: Shelf<OnceLock<Samples>> = Shelf::new();
-        let kept = SHELF.get(&key);
-        let samples = match kept.get() {
-            Some(samples) => samples,
-            None => {
-                let made = Samples::new(scene, moved)?;
-                kept.get_or_init(|| made)
-            }
-        };
+    pub fn of(scene: &Scene, poses: &[Rigid]) -> Result<Option<Arc<Self>>, SimError> {
+        if scene.file().light.leds.is_none() {
+            return Ok(None);
+        }
+        // numbers, strings and lists only: nothing here can fail to be written
+        let file = serde_json::to_string(scene.file()).unwrap_or_default();
+        static SHELF: Shelf<OnceLock<Arc<CoarseLight>>> = Shelf::new();
+        let kept = SHELF.get(&format!("{file} {}", scene.design().text()));
+        if let Some(found) = kept.get() {
+            return Ok(Some(Arc::clone(found)));
+        }
+        let made = Arc::new(Self::new(scene, poses)?);
+        Ok(Some(Arc::clone(kept.get_or_init(|| made))))
+    }
+
+    fn new(scene: &Scene, poses: &[Rigid]) -> Result<Self, SimError> {
+        let samples = samples(scene)?;
+        let ways =
+            setup::ways(scene, &LightUse { diffuser: false, platform_shadow: false, ..LightUse::ALL })?;
+        let optics = ways.optics.clone();
+        let light = scene.file().light.leds.as_ref();
+        let (per_mw, stray) = light.map_or((0.0, 0.0), |light| (light.level_per_mw_mm2, light.stray_level));
         let sections = scene.design().sections();
-        let shaded = sections.leds.through_platform < 1.0;
-        // What the platform's window shows may tilt against the camera; only at rest is its loss known.
-        let still = scene.file().motion.is_none() && !moved;
-        let mut out = Self::default();
-        // What the pole sees of the dome, beside its base: no point sees more. Half for a hemisphere.
-        let dome = scene.optics().dome();
-        let rim2 = dome.rim_radius_mm() * dome.rim_radius_mm();
-        let straight = 1.0 - rim2 / (rim2 + dome.height_mm() * dome.height_mm());
-        for c in 0..3 {
-            let seen: Vec<f64> = ways.sources.iter().map(|source| source.seen_mw[c]).collect();
-            let albedo = sections.elastomer.membrane_reflectance.to_array()[c];
-            let found = samples.channel(c, &seen, still);
-            // A part of the membrane's light meets the dome again; the rest meets the underside, which may send it back.
-            let comes_back = if has_faces(&ways.optics[c]) { albedo } else { straight * albedo };
-            let more = 1.0 / (1.0 - comes_back);
-            let own = comes_back * more * found.membrane.max;
-            let index = |beside: bool| setup::index_at(&ways.optics[c], beside).powi(2);
-            let white = sections.white_markers.reflectance / index(true);
-            for (part, gain, own_share) in
-                [(found.membrane, albedo / index(false), more), (found.markers, white, 1.0)]
-            {
-                let level = |irradiance: f64| light.level_per_mw_mm2 * gain * irradiance;
-                // A marker's light from the membrane changes as the membrane's does.
-                let with_own = |change: f64, of_membrane: f64| {
-                    level(change * own_share).max(level(change + comes_back * more * of_membrane))
-                };
-                let hidden = 1.0 - sections.leds.through_platform.clamp(0.0, 1.0);
-                // Where the platform throws shadows, the tape moves their edges.
-                let by_tape = |part: Part| if shaded && part.tape > 0.0 { part.max } else { part.tape };
-                raise(&mut out.brightest, with_own(part.max, found.membrane.max) + light.stray_level);
-                raise(&mut out.falloff, with_own(part.max, found.membrane.max));
-                raise(&mut out.diffuser, with_own(by_tape(part), by_tape(found.membrane)));
-                raise(&mut out.platform_shadow, with_own(hidden * part.max, hidden * found.membrane.max));
-                raise(&mut out.interreflection, level(own));
-                // Without the faces there is more light, and less of it comes back.
-                raise(
-                    &mut out.fresnel,
-                    if has_faces(&ways.optics[c]) { level(part.faces + own) } else { 0.0 },
-                );
+        let reflectance = sections.elastomer.membrane_reflectance.to_array();
+        let squared = |c: usize, beside: bool| setup::index_at(&optics[c], beside).powi(2);
+        let gains = [
+            std::array::from_fn(|c| per_mw * reflectance[c] / squared(c, false)),
+            std::array::from_fn(|c| per_mw * sections.white_markers.reflectance / squared(c, true)),
+        ];
+        Ok(Self {
+            views: views(scene, &samples, poses),
+            seen_mw: ways.sources.iter().map(|source| source.seen_mw).collect(),
+            samples,
+            optics,
+            gains,
+            albedo: setup::mean_reflectance(scene),
+            stray,
+            gamma: scene.file().electronics.gamma,
+        })
+    }
+
+    /// Light of every place, by channel.
+    fn light(&self, used: &LightUse) -> Vec<[Light; 3]> {
+        let case = usize::from(used.diffuser) * 4
+            + usize::from(used.fresnel) * 2
+            + usize::from(used.platform_shadow);
+        let direct = |sample: &Sample| -> [Light; 3] {
+            std::array::from_fn(|c| {
+                let mut light = Light::default();
+                let mut vector = DVec3::ZERO;
+                for (flux, seen) in sample.flux.iter().zip(&self.seen_mw) {
+                    let along = sample.normal.map_or(flux[case].length(), |normal| flux[case].dot(normal));
+                    light.still += seen[c] * along.max(0.0);
+                    vector += seen[c] * flux[case];
+                }
+                light.vector = sample.normal.is_none().then_some(vector);
+                light
+            })
+        };
+        let mut all: Vec<[Light; 3]> = self.samples.list.iter().map(direct).collect();
+        if !used.falloff {
+            let pole = all.get(RINGS.count()).copied().unwrap_or_default().map(|light| light.still);
+            for (light, sample) in all.iter_mut().zip(&self.samples.list) {
+                if sample.beside.is_none() {
+                    *light = pole.map(|still| Light { still, vector: None, own: 0.0 });
+                }
             }
         }
-        Ok(out)
-    }
-}
-
-/// What a change of light by some full scales can do to a pixel.
-pub fn grey(scene: &Scene, change: f64) -> Bound {
-    Bound::grey(grey_of_change(scene.file().electronics.gamma, change))
-}
-
-fn raise(bound: &mut f64, value: f64) {
-    *bound = bound.max(value);
-}
-
-fn has_faces(optics: &SensorOptics) -> bool {
-    let index = |i: usize| optics.layers().get(i).map(|layer| layer.index_for(optics.channel()));
-    (1..optics.layers().len()).any(|i| index(i) != index(0))
-}
-
-fn ways(scene: &Scene, diffuser: bool, fresnel: bool) -> Result<Ways, SimError> {
-    let used = LightUse {
-        direct: true,
-        falloff: true,
-        diffuser,
-        fresnel,
-        platform_shadow: false,
-        interreflection: false,
-    };
-    setup::ways(scene, &used)
-}
-
-/// Light of every source at one place, for a flux of one: bare, bare through the faces, behind the tape, and behind
-/// tape and faces.
-#[derive(Debug)]
-struct Sample {
-    /// The normal that counts: a marker's and a resting membrane's; `None` where it may be any.
-    normal: Option<DVec3>,
-    /// What leaves towards the camera at rest, by channel.
-    leaving: Channels,
-    flux: Vec<[DVec3; 4]>,
-}
-
-/// Places of the membrane, and the white markers.
-#[derive(Debug)]
-struct Samples {
-    membrane: Vec<Sample>,
-    markers: Vec<Sample>,
-}
-
-/// Largest light, and changes of it, of one channel, 1/mm^2 times mW.
-#[derive(Debug, Clone, Copy, Default)]
-struct Part {
-    max: f64,
-    tape: f64,
-    faces: f64,
-}
-
-struct Found {
-    membrane: Part,
-    markers: Part,
-}
-
-impl Samples {
-    fn new(scene: &Scene, moved: bool) -> Result<Self, SimError> {
-        let [bare, taped] = [ways(scene, false, false)?, ways(scene, true, false)?];
-        let through = |ways: &Ways| Ways { fresnel: true, ..ways.clone() };
-        let cases = [bare.clone(), through(&bare), taped.clone(), through(&taped)];
-        let optics = &cases[0].optics;
-        let rule = EmitterRule::default();
-        let sample = |place: DVec3, normal: Option<DVec3>, beside: bool| Sample {
-            normal,
-            leaving: std::array::from_fn(|c| {
-                leaves(&optics[c], setup::momentum_to_camera(&optics[c], place), beside)
-            }),
-            flux: (0..cases[0].sources.len())
-                .map(|i| std::array::from_fn(|k| cases[k].flux(&cases[k].sources[i], place, &rule)))
-                .collect(),
-        };
-        let shells: &[f64] = if moved { &SHELLS } else { &SHELLS[..1] };
-        let mut places = Vec::new();
-        for direction in directions(&cases[0]) {
-            // The rim is bonded: a point moves by less than it stands above the sheet.
-            let lowest = 1.0 - direction.z;
-            places.extend(shells.iter().map(|p| (cases[0].point(direction, p.max(lowest)), direction)));
+        if used.interreflection {
+            for c in 0..3 {
+                let Some(room) = self.samples.rooms[usize::from(used.fresnel)].get(c) else { continue };
+                let patches: Vec<f64> = all.iter().take(RINGS.count()).map(|light| light[c].still).collect();
+                let balance = room.solve(&patches, self.albedo[c]);
+                let mean = balance.exitance.iter().sum::<f64>() / RINGS.count() as f64;
+                for (light, sample) in all.iter_mut().zip(&self.samples.list) {
+                    light[c].own = match sample.beside {
+                        Some(beside) => {
+                            if used.fresnel {
+                                beside[c] * mean
+                            } else {
+                                0.0
+                            }
+                        }
+                        None => balance.indirect.get(sample.patch).copied().unwrap_or(0.0),
+                    };
+                }
+            }
         }
-        let membrane = places
-            .into_par_iter()
-            .map(|(place, direction)| {
-                sample(place, (!moved).then_some(cases[0].face().normal(direction)), false)
-            })
-            .collect();
-        let markers = scene.markers().iter().map(|m| sample(m.position_mm, Some(DVec3::Z), true)).collect();
-        Ok(Self { membrane, markers })
+        all
     }
 
-    fn channel(&self, c: usize, seen: &[f64], still: bool) -> Found {
-        let largest = |samples: &[Sample]| {
-            samples.iter().map(|sample| sample.part(c, seen, still)).fold(Part::default(), |a, b| Part {
-                max: a.max.max(b.max),
-                tape: a.tape.max(b.tape),
-                faces: a.faces.max(b.faces),
-            })
-        };
-        Found { membrane: largest(&self.membrane), markers: largest(&self.markers) }
+    /// Places that are seen: their light, the level of it, and the share that leaves towards the camera at either end.
+    fn seen(&self) -> impl Iterator<Item = (usize, &Sample, View)> {
+        let all = self.samples.list.iter().zip(&self.views).enumerate();
+        all.filter_map(|(i, (sample, view))| view.map(|view| (i, sample, view)))
     }
-}
 
-impl Sample {
-    fn part(&self, c: usize, seen: &[f64], still: bool) -> Part {
-        let sum = |k: usize| self.flux.iter().zip(seen).map(|(flux, seen)| flux[k] * *seen).sum::<DVec3>();
-        let light = [sum(0), sum(1), sum(2), sum(3)];
-        let size = |v: DVec3| MARGIN * self.normal.map_or(v.length(), |normal| v.dot(normal).abs());
-        let leaving = if still { self.leaving[c] } else { 0.0 };
-        Part {
-            max: light.iter().map(|v| size(*v)).fold(0.0, f64::max),
-            tape: size(light[2] - light[0]).max(size(light[3] - light[1])),
-            faces: size(light[0] - light[1] * leaving).max(size(light[2] - light[3] * leaving)),
+    fn gain(&self, sample: &Sample, c: usize) -> f64 {
+        self.gains[usize::from(sample.beside.is_some())][c]
+    }
+
+    fn passed(&self, used: &LightUse, sample: &Sample, c: usize, momentum: f64) -> f64 {
+        if used.fresnel { leaves(&self.optics[c], momentum, sample.beside.is_some()) } else { 1.0 }
+    }
+
+    /// A bound on the change of any pixel, grey levels, between two sets of effects of the light.
+    pub fn change_grey(&self, with: &LightUse, without: &LightUse) -> f64 {
+        let (a_light, b_light) = (self.light(with), self.light(without));
+        let mut largest = 0.0_f64;
+        for (i, sample, view) in self.seen() {
+            for c in 0..3 {
+                let (a, b) = (a_light[i][c], b_light[i][c]);
+                let gain = self.gain(sample, c);
+                for momentum in view.momentum {
+                    let [pa, pb] = [with, without].map(|used| self.passed(used, sample, c, momentum));
+                    let by_code = if sample.normal.is_some() {
+                        let code = |light: Light, passed: f64| {
+                            (gain * (light.still + light.own) * passed + self.stray).powf(1.0 / self.gamma)
+                        };
+                        255.0 * (code(a, pa) - code(b, pb)).abs()
+                    } else {
+                        let direct = match (a.vector, b.vector) {
+                            (Some(a), Some(b)) => (a * pa - b * pb).length(),
+                            (Some(v), None) => (v.length() * pa).max(b.still * pb),
+                            (None, Some(v)) => (v.length() * pb).max(a.still * pa),
+                            (None, None) => (a.still * pa - b.still * pb).abs(),
+                        };
+                        let change = gain * (direct + (a.own * pa - b.own * pb).abs());
+                        grey_of_change_from(self.gamma, self.stray, change)
+                    };
+                    largest = largest.max(by_code);
+                }
+            }
         }
+        (MARGIN * largest).min(255.0)
     }
-}
 
-/// Rings, the pole, and what faces each light on every ring.
-fn directions(ways: &Ways) -> Vec<DVec3> {
-    let mut out = vec![DVec3::Z];
-    let lights = ways.sources.iter().map(|source| {
-        let at = source.emitter.platform_from_emitter.translation;
-        at.y.atan2(at.x)
-    });
-    let around = (0..AROUND).map(|k| std::f64::consts::TAU * k as f64 / AROUND as f64);
-    let azimuths: Vec<f64> = around.chain(lights).collect();
-    let face = ways.face();
-    for z in RINGS.map(|share| face.level(share)) {
-        out.extend(azimuths.iter().map(|azimuth| face.place(*azimuth, z)));
+    /// No level is above this, full scales.
+    pub fn brightest(&self, used: &LightUse) -> f64 {
+        let light = self.light(used);
+        let level = |(i, sample, view): (usize, &Sample, View)| {
+            let of = |c: usize| {
+                let passed = view.momentum.map(|momentum| self.passed(used, sample, c, momentum));
+                self.gain(sample, c) * (light[i][c].still + light[i][c].own) * passed[0].max(passed[1])
+            };
+            of(0).max(of(1)).max(of(2))
+        };
+        MARGIN * self.seen().map(level).fold(0.0, f64::max) + self.stray
     }
-    out
+
+    /// The most that a loss by field angle takes of any pixel, grey levels: `left` tells what it leaves of the light.
+    pub fn darkening_grey(&self, used: &LightUse, left: impl Fn(f64) -> f64) -> f64 {
+        let light = self.light(used);
+        let mut largest = 0.0_f64;
+        for (i, sample, view) in self.seen() {
+            for (c, light) in light[i].iter().enumerate() {
+                let passed = self.passed(used, sample, c, view.momentum[0]);
+                let level = MARGIN * self.gain(sample, c) * (light.still + light.own) * passed;
+                let lost = 1.0 - left(view.field_rad).powf(1.0 / self.gamma);
+                largest = largest.max(grey_of_level(self.gamma, level + self.stray) * lost);
+            }
+        }
+        largest
+    }
 }

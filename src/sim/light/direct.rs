@@ -105,8 +105,8 @@ struct Share {
     flux: DVec3,
     /// From the place to where its ray meets the sheet's underside, mm.
     way_mm: DVec3,
-    /// Where its ray comes up through the sheet's top, mm.
-    foot_mm: DVec3,
+    /// Where its ray to a point of the dome crosses the sheet's top; the origin for a point of the top itself.
+    top_mm: DVec3,
 }
 
 impl DirectLight<'_> {
@@ -138,33 +138,31 @@ impl DirectLight<'_> {
         }
         let open = if self.cavities.is_some() { self.through_platform } else { 1.0 };
         let mut sum = DVec3::ZERO;
-        if open > 0.0 {
+        let mut gather = |part: f64, is_free: &dyn Fn(DVec3, DVec3) -> bool| {
             for (line, &(u, across)) in shares.chunks_exact(count).zip(rule.nodes()) {
-                for (share, &(v, up)) in line.iter().zip(rule.nodes()) {
-                    if self.enters(place(u, v) + share.way_mm) && self.meets_dome(point_mm, share.foot_mm) {
-                        sum += share.flux * (across * up * open);
+                let along = |of: &dyn Fn(&Share) -> DVec3, v: f64| rule.interpolate(line.iter().map(of), v);
+                let is_free = |v: f64| {
+                    let source = place(u, v);
+                    let end = source + along(&|share| share.way_mm, v);
+                    self.enters(end)
+                        && self.is_in_foot(along(&|share| share.top_mm, v))
+                        && is_free(source, end)
+                };
+                for (low, high) in pieces_in_sight(is_free) {
+                    for (v, up) in rule.rule.over(low, high) {
+                        sum += along(&|share| share.flux, v) * (across * up * part);
                     }
                 }
             }
+        };
+        if open > 0.0 {
+            gather(open, &|_, _| true);
         }
         if let Some(cavities) = self.cavities.filter(|_| open < 1.0) {
             // The emitter's corners lie a little beyond the rule's places.
             let beyond = DVec3::splat(emitter.half_side_mm);
             let hollows = cavities.near(low - beyond, high + beyond);
-            for (line, &(u, across)) in shares.chunks_exact(count).zip(rule.nodes()) {
-                let is_free = |v: f64| {
-                    let source = place(u, v);
-                    let end = source + rule.interpolate(line.iter().map(|share| share.way_mm), v);
-                    let foot = || rule.interpolate(line.iter().map(|share| share.foot_mm), v);
-                    self.enters(end) && self.meets_dome(point_mm, foot()) && hollows.is_free(source, end)
-                };
-                for (low, high) in pieces_in_sight(is_free) {
-                    for (v, up) in rule.rule.over(low, high) {
-                        let flux = rule.interpolate(line.iter().map(|share| share.flux), v);
-                        sum += flux * (across * up * (1.0 - open));
-                    }
-                }
-            }
+            gather(1.0 - open, &|source, end| hollows.is_free(source, end));
         }
         sum * emitter.flux_mw
     }
@@ -182,11 +180,9 @@ impl DirectLight<'_> {
         underside_mm.truncate().abs().cmple(self.sheet_half_mm).all()
     }
 
-    /// Whether a ray to a point of the dome comes up within its foot. A light under a cap may stand outside it; the
-    /// lights under a hemisphere stand within its foot and are taken as they are.
-    fn meets_dome(&self, point_mm: DVec3, foot_mm: DVec3) -> bool {
-        let dome = self.optics.dome();
-        dome.is_hemisphere() || point_mm.z <= 0.0 || foot_mm.truncate().length() <= dome.rim_radius_mm()
+    /// Whether a place of the plane of the sheet's top lies under the dome: only there light goes on into the silicone.
+    fn is_in_foot(&self, top_mm: DVec3) -> bool {
+        top_mm.truncate().length() <= self.optics.dome().rim_radius_mm()
     }
 
     /// What a place of the emitter sends to a point; `None` where no ray leads there. `near` is a neighbour's tangent.
@@ -203,8 +199,12 @@ impl DirectLight<'_> {
         let per_sr = emitter.lobe.per_sr(tube.leaving.dot(emitter.platform_from_emitter.matrix3.z_axis));
         let passed = if self.fresnel { fresnel::through(indices, tube.snell_invariant) } else { 1.0 };
         let flux = tube.arriving * (per_sr * passed * tube.sr_per_mm2);
-        let foot_mm = point_mm - tube.arriving * (point_mm.z / tube.arriving.z);
-        Some(Share { flux, way_mm: tube.underside_mm - source, foot_mm })
+        let top_mm = if point_mm.z > 0.0 {
+            point_mm - tube.arriving * (point_mm.z / tube.arriving.z)
+        } else {
+            DVec3::ZERO
+        };
+        Some(Share { flux, way_mm: tube.underside_mm - source, top_mm })
     }
 }
 

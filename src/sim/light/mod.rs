@@ -6,6 +6,7 @@
 //!     ─> the dome lighting itself (radiosity) ─> levels in the picture (shade)
 //! ```
 
+mod bound_samples;
 pub mod bounds;
 pub mod cavity;
 pub mod direct;

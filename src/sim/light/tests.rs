@@ -1,5 +1,6 @@
 mod domes;
 mod mitsuba;
+mod photons;
 mod tables;
 
 use std::f64::consts::{PI, TAU};
@@ -8,6 +9,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3A};
 
 use super::LightUse;
 use super::bounds;
+use super::bounds::CoarseLight;
 use super::cavity::Cavities;
 use super::direct::{DirectLight, Emitter, EmitterRule};
 use super::dome_map::{DomeFace, DomeGrid, bicubic};
@@ -28,6 +30,11 @@ const WIDE: DVec2 = DVec2::splat(1e6);
 
 /// A sensor with a sheet of the given indices, 1 mm of each, and a dome of radius 10 mm.
 fn sensor(sheet: &[f64], dome: f64) -> SensorOptics {
+    sensor_of(sheet, dome, 10.0)
+}
+
+/// The same with a dome of another radius, mm.
+fn sensor_of(sheet: &[f64], dome: f64, dome_radius_mm: f64) -> SensorOptics {
     let mut layers: Vec<FlatLayer> = sheet
         .iter()
         .map(|&n| FlatLayer { name: "sheet".into(), index: [n; 3], thickness_mm: Some(1.0) })
@@ -47,7 +54,7 @@ fn sensor(sheet: &[f64], dome: f64) -> SensorOptics {
         lens,
         sensor_from_camera,
         layers,
-        dome: domecast_optics::DomeShape::hemisphere(10.0),
+        dome: domecast_optics::DomeShape::hemisphere(dome_radius_mm),
     })
     .unwrap()
 }

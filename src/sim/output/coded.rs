@@ -4,6 +4,7 @@ use std::io;
 
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 
+use crate::electronics::deviation::CodingDeviation;
 use crate::output::render::Drawn;
 use crate::output::truth::FrameTruth;
 use crate::raster::frame::Image8;
@@ -30,6 +31,7 @@ pub(super) struct CodedFrame {
     /// The truth's line.
     pub line: String,
     pub truth: FrameTruth,
+    pub coding: Option<CodingDeviation>,
     pub work: Work,
 }
 
@@ -47,7 +49,8 @@ impl CodedFrame {
         };
         let extras = extras(scene, &drawn).map_err(|error| error.to_string())?;
         let line = drawn.truth.to_line();
-        Ok((Self { image, extras, line, truth: drawn.truth, work: drawn.work }, drawn.image))
+        let Drawn { image: picture, truth, coding, work, .. } = drawn;
+        Ok((Self { image, extras, line, truth, coding, work }, picture))
     }
 }
 

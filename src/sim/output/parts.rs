@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32};
 use serde::Serialize;
 
 use crate::contact::record::ContactTruth;
+use crate::electronics::deviation::CodingDeviation;
 use crate::error::SimError;
 use crate::output::coded::CodedFrame;
 use crate::output::truth::FrameTruth;
@@ -26,6 +27,8 @@ pub struct Summary {
     pub notes: Vec<(u32, String)>,
     /// Frames whose contact is not what the level asks for, by its status in the truth.
     pub contact: Vec<ContactFault>,
+    /// What the camera's lossy code made of all pictures; `None` without one.
+    pub coding: Option<CodingDeviation>,
     /// What it took in all.
     pub work: Work,
 }
@@ -44,6 +47,15 @@ pub struct ContactFault {
 }
 
 impl Summary {
+    /// Takes what a lossy code made of a frame.
+    pub(super) fn add_coding(&mut self, coding: Option<CodingDeviation>) {
+        match (&mut self.coding, coding) {
+            (Some(sum), Some(coding)) => sum.merge(&coding),
+            (sum @ None, coding) => *sum = coding,
+            (Some(_), None) => {}
+        }
+    }
+
     /// Takes what a frame's truth says that is not as asked.
     pub(super) fn note(&mut self, truth: FrameTruth) {
         if let Some(note) = truth.note {

@@ -11,7 +11,8 @@ use crate::contact::stepper::Stepper;
 use crate::effect_name::EffectName;
 use crate::effects;
 use crate::effects::pipeline::Pipeline;
-use crate::electronics::pass::{PassContext, Stage};
+use crate::electronics::deviation::CodingDeviation;
+use crate::electronics::pass::{PassContext, Stage, run_coded};
 use crate::output::timing::{exposure_s, rows_s};
 use crate::output::truth::{EffectTruth, FrameTruth, Seen, dot_truth, effects_of, marker_truth};
 use crate::plan::Plan;
@@ -67,6 +68,8 @@ pub struct Drawn {
     pub truth: FrameTruth,
     /// What touches the dome.
     pub contact: Option<Arc<ContactState>>,
+    /// What the camera's lossy code made of the picture; `None` without one.
+    pub coding: Option<CodingDeviation>,
     /// What it took.
     pub work: Work,
 }
@@ -202,17 +205,20 @@ impl<'a> Renderer<'a> {
         let now = self.instant(number, around, &mut work)?;
         self.count(&mut work);
         let spots = self.points.see(self.scene, &now);
+        let mut coding = None;
         let (image, parts) = match &self.field {
             Some(field) => {
-                let (image, parts) =
+                let (mut image, parts) =
                     self.picture(field, number, (&now, &spots), around, scratch, &mut work)?;
+                let context = PassContext { frame: number, seed: self.scene.file().seed };
+                coding = run_coded(&self.pipeline.coded_passes, &mut image, &context, &mut work);
                 (Some(image), parts)
             }
             None => (None, Vec::new()),
         };
         let truth = self.truth(number, &now, &spots, &parts, around);
         let contact = around.and_then(|around| around.now.contact.clone());
-        Ok(Drawn { image, truth, contact, work })
+        Ok(Drawn { image, truth, contact, coding, work })
     }
 
     fn count(&self, work: &mut Work) {
@@ -292,10 +298,7 @@ impl<'a> Renderer<'a> {
         }
         self.run_passes(&mut frame, &context, work, |stage| stage > Stage::Focus);
         let bytes = std::mem::take(&mut scratch.bytes);
-        let mut image = frame.encode_into(scene.file().electronics.gamma, bytes);
-        for pass in &self.pipeline.coded_passes {
-            pass.run(&mut image, &context, work);
-        }
+        let image = frame.encode_into(scene.file().electronics.gamma, bytes);
         scratch.frame = Some(frame);
         Ok((image, parts_seen))
     }

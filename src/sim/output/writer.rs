@@ -80,6 +80,7 @@ impl Writer {
         }
         writeln!(self.truth, "{}", frame.line).map_err(fault("write the truth", &self.truth_path))?;
         self.summary.note(frame.truth);
+        self.summary.add_coding(frame.coding);
         self.summary.work.merge(&frame.work);
         self.summary.frames += 1;
         Ok(())

@@ -2,35 +2,15 @@
 
 use domecast_optics::numeric::SeededRandom;
 use std::path::Path;
-use std::str::FromStr;
 
 use serde_json::{Value, json};
 
+use super::random_scenes::{apart, camera_of, lit_designs, lit_scene, log_between, shipped, small_design};
 use crate::scene::SceneFile;
 use crate::*;
 use domecast_design::Design;
 
-/// From a seed: even in the logarithm between two bounds.
-fn log_between(random: &mut SeededRandom, low: f64, high: f64) -> f64 {
-    random.between(low.ln(), high.ln()).exp()
-}
-
-/// thumb24 through a quarter of its pixels, changed by a closure.
-fn small_design(change: &dyn Fn(&mut Value)) -> Design {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/thumb24.json");
-    let mut value = domecast_design::parse_json(&domecast_design::read_text(&path).unwrap()).unwrap();
-    let camera = &mut value["camera"];
-    camera["width"] = json!(160);
-    camera["height"] = json!(120);
-    camera["matrix"] = json!([[57.295, 0, 79.5], [0, 57.295, 59.5], [0, 0, 1]]);
-    value["runtime"]["mask_radius_px"] = json!(60);
-    value["pattern"]["pitch_px"] = json!(10);
-    value["pattern"]["dot_diameter_px"] = json!(4);
-    change(&mut value);
-    Design::from_str(&value.to_string()).unwrap_or_else(|error| panic!("{error}"))
-}
-
-/// Designs that call for more or less: lenses, a moving pupil, colours, nearly equal inrandoms.
+/// Designs that call for more or less: lenses, a moving pupil, colours, nearly equal indices.
 fn designs() -> Vec<Design> {
     let base = |_: &mut Value| {};
     let grey = |value: &mut Value| {
@@ -45,34 +25,6 @@ fn designs() -> Vec<Design> {
         value["camera"]["pupil_shift_mm"] = json!([0.0005]);
     };
     vec![small_design(&base), small_design(&grey), small_design(&pupil), small_design(&weak)]
-}
-
-/// Each part of a real camera now and then, from hardly any to a lot of it.
-fn camera_of(random: &mut SeededRandom, scene: &mut Value) {
-    let colour = scene["frames"]["colour"] == json!(true);
-    let electronics = &mut scene["electronics"];
-    if random.uniform() < 0.25 {
-        electronics["vignetting_exponent"] = json!(log_between(random, 1e-4, 3.0));
-    }
-    if random.uniform() < 0.2 {
-        let focus = json!({ "pupil_diameter_mm": log_between(random, 0.003, 0.3), "distance_mm": random.between(10.0, 20.0) });
-        electronics["focus"] = focus;
-    }
-    if random.uniform() < 0.25 {
-        let readout = if random.uniform() < 0.5 { log_between(random, 1e-5, 0.02) } else { 0.0 };
-        electronics["shutter"] =
-            json!({ "exposure_s": log_between(random, 1e-5, 0.02), "readout_s": readout });
-    }
-    if colour && random.uniform() < 0.2 {
-        electronics["bayer"] = json!("grbg");
-    }
-    if random.uniform() < 0.2 {
-        let noise = json!({ "full_scale_electrons": log_between(random, 1e3, 1e7), "read_electrons": log_between(random, 0.1, 20.0) });
-        electronics["noise"] = noise;
-    }
-    if random.uniform() < 0.15 {
-        electronics["jpeg_quality"] = json!(50 + (random.uniform() * 50.0) as u32);
-    }
 }
 
 /// A ball that is pressed into the dome, at one of the levels; now and then under lights.
@@ -139,12 +91,15 @@ fn random_scene(random: &mut SeededRandom) -> Value {
 
 /// What a comparison found: the worst shift and change, and how many effects were left out.
 fn compare(scene: &Scene) -> (f64, f64, usize) {
-    let plan = Plan::of(scene).unwrap();
-    let whole = Plan::everything(scene).unwrap();
+    // A lossy code can make anything of the smallest change: the tolerance holds before it.
+    let uncoded = |mut plan: Plan| {
+        plan.entries.iter_mut().filter(|e| e.effect == EffectName::Compression).for_each(|e| e.used = false);
+        plan
+    };
+    let plan = uncoded(Plan::of(scene).unwrap());
+    let whole = uncoded(Plan::everything(scene).unwrap());
     let left_out = whole.entries.iter().filter(|e| e.used && !plan.uses(e.effect)).count();
-    // A lossy code can make anything of the smallest change: before it, filled pictures are compared with filled ones.
-    let lossy = scene.file().electronics.jpeg_quality.is_some();
-    let reference = if lossy { whole.clone() } else { Plan::exact(scene).unwrap() };
+    let reference = uncoded(Plan::exact(scene).unwrap());
     let (by_plan, exact) = (Renderer::new(scene, &plan).unwrap(), Renderer::new(scene, &reference).unwrap());
     let filled = Renderer::new(scene, &whole).unwrap();
     let (mut spent, mut all) = (*by_plan.setup(), *filled.setup());
@@ -182,22 +137,17 @@ fn compare(scene: &Scene) -> (f64, f64, usize) {
     (px, grey, left_out)
 }
 
-fn apart(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> f64 {
-    match (a, b) {
-        (Some(a), Some(b)) => (a[0] - b[0]).hypot(a[1] - b[1]),
-        (None, None) => 0.0,
-        _ => f64::INFINITY,
-    }
+fn honest(first: u64, count: u64) {
+    honest_scenes(&designs(), random_scene, first, count);
 }
 
-fn honest(first: u64, count: u64) {
-    let designs = designs();
+fn honest_scenes(designs: &[Design], scene_of: fn(&mut SeededRandom) -> Value, first: u64, count: u64) {
     let (mut out, mut tightest): (usize, f64) = (0, 0.0);
     let mut compared = 0;
     for seed in first..first + count {
         let mut random = SeededRandom::new(seed);
         let design = designs[(random.uniform() * designs.len() as f64) as usize].clone();
-        let value = random_scene(&mut random);
+        let value = scene_of(&mut random);
         let file: SceneFile =
             domecast_design::from_value(&value).unwrap_or_else(|error| panic!("{error}: {value}"));
         let scene = match Scene::new(file, Path::new(""), design) {
@@ -225,6 +175,42 @@ fn honest(first: u64, count: u64) {
 #[test]
 fn plans_keep_their_word() {
     honest(1, 24);
+}
+
+/// The same under other lights, where the effects of the light are left out.
+#[test]
+fn long_plans_under_lights_keep_their_word() {
+    honest_scenes(&lit_designs(), lit_scene, 7000, 100);
+}
+
+/// The shipped scenes, in some of their frames.
+#[test]
+fn long_shipped_scenes_keep_their_tolerance() {
+    let mut sparing = Vec::new();
+    for path in shipped() {
+        let whole = Scene::load(&path).unwrap();
+        let mut file = whole.file().clone();
+        let count = file.frames.count.min(4);
+        if count > 1 {
+            file.frames.rate_hz *= f64::from(count - 1) / f64::from(file.frames.count - 1);
+        }
+        file.frames.count = count;
+        let scene = Scene::new(file, whole.folder(), whole.design().clone()).unwrap();
+        let (px, grey, left_out) = compare(&scene);
+        let tolerance = scene.file().tolerance;
+        println!("{}: {px:.4} of {} px, {grey} of {} grey", whole.name(), tolerance.px, tolerance.grey);
+        assert!(px <= tolerance.px && grey <= tolerance.grey, "{}: {px} px, {grey} grey", whole.name());
+        let in_full = Plan::of(&whole).unwrap();
+        let by_plan = in_full
+            .entries
+            .iter()
+            .any(|e| e.called_for && !e.used && whole.choice(e.effect) == EffectChoice::Plan);
+        if by_plan || left_out > 0 {
+            sparing.push(whole.name().to_owned());
+        }
+    }
+    println!("something is left out in {sparing:?}");
+    assert!(sparing.len() >= 6, "{sparing:?}");
 }
 
 #[test]

@@ -1,8 +1,16 @@
 //! Which effects are used, and what leaving the others out can cost.
 
+mod entry;
 pub(crate) mod fill;
 #[cfg(test)]
 mod honesty;
+#[cfg(test)]
+mod random_scenes;
+mod search;
+#[cfg(test)]
+mod sizes;
+
+pub use entry::Entry;
 
 use serde::Serialize;
 
@@ -10,33 +18,14 @@ use crate::bound::Bound;
 use crate::contact::level::level_named;
 use crate::effect_name::{EffectChoice, EffectName};
 use crate::effects;
-use crate::effects::effect::{Cost, Effect};
 use crate::effects::geometry_bound::shift_px;
-use crate::plan::fill::{fill_grey, fill_tolerance};
+use crate::effects::light_bound;
+use crate::plan::fill::{fill_grey, fill_tolerance, grey_before_sharpening};
+use crate::plan::search::{Candidate, best_set, closed, drop_orphans, effect_of};
 use crate::raster::settings::Geometry;
 use crate::scene::Scene;
 use crate::scene::file::{LevelName, ToleranceSection};
 use crate::{Pipeline, SimError, Work, light};
-
-/// What the plan says of one effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Entry {
-    /// Which effect.
-    #[serde(rename = "id")]
-    pub effect: EffectName,
-    /// Whether it is used.
-    pub used: bool,
-    /// Whether the scene calls for it.
-    pub called_for: bool,
-    /// Why the scene calls for it and why it is used or left out, in words.
-    pub why: String,
-    /// How large it can be; `None` where the scene does not call for it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bound: Option<Bound>,
-    /// What it costs; `None` where the scene does not call for it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cost: Option<Cost>,
-}
 
 /// The effects of a scene: used, or left out within its tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -53,14 +42,6 @@ pub struct Plan {
     /// The level of contact where it is coarser than the scene's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact_level: Option<LevelName>,
-}
-
-/// An effect that the plan may leave out.
-struct Candidate {
-    index: usize,
-    px: f64,
-    grey: f64,
-    cost: u64,
 }
 
 impl Plan {
@@ -130,8 +111,8 @@ impl Plan {
     }
 
     /// What leaving out a set can do to a pixel of the coded picture, grey levels: the sum of the bounds, and what
-    /// the steps after it can make of the smallest difference: rounding to a code, the converter's rounding, and
-    /// a lossy code, whose own error both pictures have.
+    /// the steps after it can make of the smallest difference: rounding to a code, and the converter's rounding. A
+    /// lossy code comes after what the tolerance is about.
     fn grey_of(&self, scene: &Scene, candidates: &[Candidate], set: u64) -> f64 {
         let members =
             || candidates.iter().enumerate().filter(|(place, _)| set & (1 << place) != 0).map(|(_, s)| s);
@@ -147,19 +128,30 @@ impl Plan {
         if let (Some(_), Some(noise)) = (kept(EffectName::Noise), &scene.file().electronics.noise) {
             steps += 255.0 / f64::from((1_u32 << noise.bits.min(31)) - 1);
         }
-        if let Some(entry) = kept(EffectName::Compression) {
-            steps += 2.0 * entry.bound.map_or(0.0, |bound| bound.grey);
-        }
         sum + steps
     }
 
-    /// Whether the geometric effects of a set, left out together, stay within the tolerance: each one's bound is
-    /// that of its absence alone, and two absences might add to more than their sum.
+    /// What the light's effects among a set, left out together, change more than the sum of their bounds, grey levels.
+    fn light_beyond_sum(&self, scene: &Scene, candidates: &[Candidate], set: u64) -> Result<f64, SimError> {
+        let members = candidates.iter().enumerate().filter(|(place, _)| set & (1 << place) != 0);
+        let light: Vec<(EffectName, f64)> = members
+            .filter_map(|(_, candidate)| Some((self.entries.get(candidate.index)?.effect, candidate.grey)))
+            .filter(|(name, _)| EffectName::OF_LIGHT.contains(name))
+            .collect();
+        if light.len() < 2 {
+            return Ok(0.0);
+        }
+        let sum: f64 = light.iter().map(|(_, grey)| grey).sum();
+        let together = light_bound::change(scene, &|name| light.iter().any(|(member, _)| *member == name))?;
+        Ok((together.grey - sum).max(0.0))
+    }
+
+    /// Whether the geometric effects of a set, and those of the light, left out together, stay within the tolerance: each
+    /// one's bound is that of its absence alone, and two absences might add to more than their sum.
     fn holds_jointly(
         &self,
         scene: &Scene,
         (candidates, set): (&[Candidate], u64),
-        per_px: f64,
         tolerance: &ToleranceSection,
     ) -> Result<bool, SimError> {
         let out = |name: EffectName| {
@@ -168,6 +160,10 @@ impl Plan {
                 .into_iter()
                 .any(|(_, candidate)| self.entries.get(candidate.index).is_some_and(|e| e.effect == name))
         };
+        let light = self.light_beyond_sum(scene, candidates, set)?;
+        if light > 0.0 && light + self.grey_of(scene, candidates, set) > tolerance.grey {
+            return Ok(false);
+        }
         let geometric = EffectName::GEOMETRIC.into_iter().filter(|name| out(*name)).count();
         if geometric < 2 {
             return Ok(true);
@@ -176,29 +172,27 @@ impl Plan {
         let with = Geometry::of(&uses);
         let without = Geometry::of(&|name| uses(name) && !out(name));
         let shift = shift_px(scene, with, without)?;
-        Ok(shift <= tolerance.px && shift * per_px <= tolerance.grey)
+        Ok(shift <= tolerance.px && grey_of_shift(scene, shift)? <= tolerance.grey)
     }
 
     fn leave_out(&mut self, scene: &Scene) -> Result<(), SimError> {
         let mut tolerance = scene.file().tolerance;
-        tolerance.grey -= self.filled_grey;
+        tolerance.grey = grey_before_sharpening(scene) - self.filled_grey;
         let left = tolerance;
         let frames = u64::from(scene.frame_count());
-        let per_px = grey_per_px(scene);
-        self.choose_level(scene, per_px, &mut tolerance);
-        let candidates: Vec<Candidate> = self
-            .entries
-            .iter()
-            .enumerate()
-            .filter_map(|(index, entry)| {
-                let bound = entry.bound.filter(|_| entry.used)?;
-                let cost = entry.cost?.total(frames);
-                let grey = bound.grey + if bound.px > 0.0 { bound.px * per_px } else { 0.0 };
-                let small = bound.px <= tolerance.px && grey <= tolerance.grey;
-                let free = scene.choice(entry.effect) == EffectChoice::Plan;
-                (small && free && cost > 0).then_some(Candidate { index, px: bound.px, grey, cost })
-            })
-            .collect();
+        self.choose_level(scene, &mut tolerance)?;
+        let mut candidates: Vec<Candidate> = Vec::new();
+        for (index, entry) in self.entries.iter().enumerate() {
+            let Some((bound, cost)) = entry.bound.filter(|_| entry.used).zip(entry.cost) else { continue };
+            if bound.px > tolerance.px || bound.grey > tolerance.grey {
+                continue;
+            }
+            let (cost, grey) = (cost.total(frames), bound.grey + grey_of_shift(scene, bound.px)?);
+            let free = scene.choice(entry.effect) == EffectChoice::Plan;
+            if grey <= tolerance.grey && free && cost > 0 {
+                candidates.push(Candidate { index, px: bound.px, grey, cost });
+            }
+        }
         let mut banned: Vec<u64> = Vec::new();
         let mut chosen = 0;
         for _ in 0..JOINT_TRIES {
@@ -208,7 +202,7 @@ impl Plan {
                     && self.grey_of(scene, &candidates, set) <= tolerance.grey
             };
             chosen = best_set(&candidates, tolerance.px, tolerance.grey, &allowed);
-            if self.holds_jointly(scene, (&candidates, chosen), per_px, &left)? {
+            if self.holds_jointly(scene, (&candidates, chosen), &left)? {
                 break;
             }
             banned.push(chosen);
@@ -230,15 +224,15 @@ impl Plan {
     }
 
     /// Takes the coarsest level of contact that the tolerance allows; what it uses up is taken off.
-    fn choose_level(&mut self, scene: &Scene, per_px: f64, tolerance: &mut ToleranceSection) {
+    fn choose_level(&mut self, scene: &Scene, tolerance: &mut ToleranceSection) -> Result<(), SimError> {
         let free = scene.choice(EffectName::Contact) == EffectChoice::Plan;
         if !self.uses(EffectName::Contact) || !free {
-            return;
+            return Ok(());
         }
         for (name, px, _) in effects::contact::coarser_levels(scene) {
             // Under the design's lights a membrane of another shape may be lit quite otherwise.
             let lit = scene.draws() && scene.file().light.leds.is_some();
-            let grey = if lit { 255.0 } else { px * per_px };
+            let grey = if lit { 255.0 } else { grey_of_shift(scene, px)? };
             let steps = if grey > 0.0 { 1.0 } else { 0.0 };
             if px > tolerance.px || grey + steps > tolerance.grey {
                 continue;
@@ -254,8 +248,9 @@ impl Plan {
                     name.as_str()
                 );
             }
-            return;
+            return Ok(());
         }
+        Ok(())
     }
 
     /// Whether an effect is used.
@@ -294,93 +289,22 @@ fn is_none(grey: &f64) -> bool {
     *grey == 0.0
 }
 
+/// Largest shift that shows no other places than the picture without it, px.
+const MAX_SHIFT_PX: f64 = 4.0;
+
 /// Sets that are tried before the plan gives up leaving anything out.
 const JOINT_TRIES: u32 = 16;
 
-fn effect_of(name: EffectName) -> Option<&'static dyn Effect> {
-    effects::all().iter().copied().find(|effect| effect.name() == name)
-}
-
-/// Takes out effects that need one that is not used.
-fn drop_orphans(entries: &mut [Entry]) {
-    loop {
-        let orphan = entries.iter().position(|entry| {
-            entry.used
-                && effect_of(entry.effect).is_some_and(|effect| {
-                    effect.needs().iter().any(|need| !entries.iter().any(|e| e.effect == *need && e.used))
-                })
-        });
-        let Some(entry) = orphan.and_then(|at| entries.get_mut(at)) else { return };
-        entry.used = false;
-        entry.why = format!("{}; left out with what it needs", entry.why);
+/// What a shift of some pixels can do to the value of a pixel, grey levels: zero where no images are drawn.
+///
+/// A straight or convex edge that moves by `d` changes the covered part of a pixel by at most `d` times the pixel's width
+/// across the motion, `sqrt(2)`; two edges in one pixel may move apart. A larger shift may show other, brighter places.
+fn grey_of_shift(scene: &Scene, px: f64) -> Result<f64, SimError> {
+    if !scene.draws() || px == 0.0 {
+        return Ok(0.0);
     }
-}
-
-/// Whether a set to leave out takes with it everything that needs its members.
-fn closed(entries: &[Entry], candidates: &[Candidate], set: u64) -> bool {
-    let out = |index: usize| {
-        candidates
-            .iter()
-            .enumerate()
-            .any(|(place, candidate)| candidate.index == index && set & (1 << place) != 0)
-    };
-    entries.iter().enumerate().filter(|(index, entry)| entry.used && !out(*index)).all(|(_, entry)| {
-        let needs = effect_of(entry.effect).map_or(&[][..], |effect| effect.needs());
-        needs.iter().all(|need| {
-            !entries.iter().enumerate().any(|(at, other)| other.effect == *need && other.used && out(at))
-        })
-    })
-}
-
-/// The set, as bits, that saves most within both tolerances; of equal savings the first found, which leaves out
-/// the earlier effects.
-fn best_set(candidates: &[Candidate], px: f64, grey: f64, allowed: &dyn Fn(u64) -> bool) -> u64 {
-    struct Search<'a> {
-        candidates: &'a [Candidate],
-        allowed: &'a dyn Fn(u64) -> bool,
-        best: (u64, u64),
+    if px > MAX_SHIFT_PX {
+        return Ok(255.0);
     }
-    impl Search<'_> {
-        fn visit(&mut self, at: usize, set: u64, saved: u64, px: f64, grey: f64) {
-            let Some(candidate) = self.candidates.get(at) else {
-                if saved > self.best.0 && (self.allowed)(set) {
-                    self.best = (saved, set);
-                }
-                return;
-            };
-            let rest = self
-                .candidates
-                .iter()
-                .skip(at)
-                .fold(0_u64, |sum, candidate| sum.saturating_add(candidate.cost));
-            if saved.saturating_add(rest) <= self.best.0 {
-                return;
-            }
-            if candidate.px <= px && candidate.grey <= grey {
-                let saved = saved.saturating_add(candidate.cost);
-                self.visit(at + 1, set | 1 << at, saved, px - candidate.px, grey - candidate.grey);
-            }
-            self.visit(at + 1, set, saved, px, grey);
-        }
-    }
-    let mut search = Search { candidates, allowed, best: (0, 0) };
-    search.visit(0, 0, 0, px, grey);
-    search.best.1
-}
-
-/// What a shift of one pixel can do to the value of a pixel, grey levels: zero where no images are drawn.
-fn grey_per_px(scene: &Scene) -> f64 {
-    if !scene.draws() {
-        return 0.0;
-    }
-    let light = &scene.file().light;
-    let brightest = light.brightest_level();
-    // Under the design's lights parts of the dome may be dark.
-    let dark = (light.membrane_level * scene.file().ink.reflectance).min(light.surround_level);
-    let darkest = if light.leds.is_some() { 0.0 } else { dark };
-    // A straight or convex edge that moves by d changes the covered part of a pixel by at most d times the
-    // pixel's width across the motion, sqrt(2); two edges in one pixel may move apart.
-    let edges = 2.0 * std::f64::consts::SQRT_2;
-    let slope = scene.file().electronics.steepest_code(darkest);
-    255.0 * slope * edges * (brightest - darkest).max(0.0)
+    light_bound::covered_grey(scene, 2.0 * std::f64::consts::SQRT_2 * px)
 }

@@ -26,9 +26,15 @@ pub struct ElectronicsSection {
     /// Colour filters over the pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bayer: Option<BayerPattern>,
+    /// Pixels of the sensor that fill in the dark.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hot_pixels: Option<HotPixelsSection>,
     /// Shot, read and quantisation noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseSection>,
+    /// How the camera sharpens edges, after reading and before its lossy code.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sharpening: Option<SharpeningSection>,
     /// Quality of the JPEG code that the camera sends, 1 to 100; left out: no loss.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 100))]
@@ -48,7 +54,9 @@ impl Default for ElectronicsSection {
             focus: None,
             shutter: None,
             bayer: None,
+            hot_pixels: None,
             noise: None,
+            sharpening: None,
             jpeg_quality: None,
             jpeg_chroma: JpegChroma::HalfWidth,
             why: None,
@@ -126,6 +134,34 @@ pub enum BayerPattern {
     Grbg,
     /// Green blue / red green.
     Gbrg,
+}
+
+/// Pixels that gather electrons without light.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HotPixelsSection {
+    /// Share of the sensor's pixels that are hot.
+    #[schemars(range(min = 0.0, max = 0.1))]
+    pub share: f64,
+    /// Level that they gather in the mean, full scales a second of exposure (`shutter.exposure_s`; without a shutter a
+    /// frame's time). Each has a rate of its own, by an exponential law.
+    #[schemars(range(min = 0.0, max = 1e4))]
+    pub level_per_s: f64,
+    /// Which sensor it is: another number has other hot pixels. The run's `seed` does not move them.
+    #[serde(default)]
+    pub seed: u64,
+}
+
+/// Unsharp masking: `code + amount * (code - blurred code)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SharpeningSection {
+    /// How often what the blur takes is added.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub amount: f64,
+    /// Standard deviation of the blur, px.
+    #[schemars(range(min = 0.3, max = 20.0))]
+    pub radius_px: f64,
 }
 
 /// Noise of the sensor.

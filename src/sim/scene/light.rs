@@ -29,15 +29,6 @@ impl Default for LightSection {
     }
 }
 
-impl LightSection {
-    /// No level of the picture is above this: full scale under the design's lights, which may saturate.
-    pub fn brightest_level(&self) -> f64 {
-        let even = [self.membrane_level, self.marker_level, self.surround_level];
-        let start = if self.leds.is_some() { 1.0 } else { 0.0 };
-        even.into_iter().fold(start, f64::max)
-    }
-}
-
 /// The design's lights at work.
 ///
 /// Their flux, lobes, diffuser and the reflectances of what they light are the design's (`leds`, `elastomer`,

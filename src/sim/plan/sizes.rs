@@ -1,0 +1,171 @@
+//! Each effect's bound against its true size: the frame without it, every pixel traced and all other effects on.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use domecast_optics::numeric::SeededRandom;
+
+use super::grey_of_shift;
+use super::random_scenes::{apart, lit_designs, lit_scene, shipped};
+use crate::contact::between::Around;
+use crate::contact::stepper::Touch;
+use crate::output::render::{Drawn, Scratch};
+use crate::scene::SceneFile;
+use crate::*;
+
+/// Sizes below which an effect is not distinguished from none: a code, and a tenth of what a good tracker reads.
+const MIN_GREY: f64 = 1.0;
+const MIN_PX: f64 = 0.005;
+
+/// Bounds over true sizes, by effect.
+type Ratios = BTreeMap<&'static str, Vec<f64>>;
+
+/// Some frames of a scene by a plan; contact is solved up to the last of them.
+fn frames(scene: &Scene, plan: &Plan, numbers: &[u32], touches: &[Touch]) -> Vec<Drawn> {
+    let renderer = Renderer::new(scene, plan).unwrap();
+    let mut scratch = Scratch::default();
+    let draw = |number: &u32| {
+        let contact = plan.uses(EffectName::Contact);
+        let around = if contact { Around::of(touches, *number as usize) } else { None };
+        renderer.frame_around(*number, around.as_ref(), &mut scratch).unwrap()
+    };
+    numbers.iter().map(draw).collect()
+}
+
+/// The contact of all frames, by the scene's own level.
+fn touches(scene: &Scene, plan: &Plan) -> Vec<Touch> {
+    let renderer = Renderer::new(scene, plan).unwrap();
+    let Some(mut stepper) = renderer.stepper().unwrap() else { return Vec::new() };
+    let mut work = Work::default();
+    (0..scene.frame_count()).map(|k| stepper.next(k, scene.time_s(k), &mut work).unwrap()).collect()
+}
+
+/// Largest shift of a dot or marker and change of a pixel between two renderings; of what is random, the 99.9th percentile.
+fn difference(scene: &Scene, random: bool, a: &[Drawn], b: &[Drawn]) -> (f64, f64) {
+    let (mut px, mut grey) = (0.0_f64, 0.0_f64);
+    for (a, b) in a.iter().zip(b) {
+        for (a, b) in a.truth.black_dots.iter().zip(&b.truth.black_dots) {
+            px = px.max(apart(a.centroid_px, b.centroid_px));
+            for channel in 0..scene.planes() {
+                let of = |dot: &DotTruth| dot.centroid_rgb_px.map_or(dot.centroid_px, |three| three[channel]);
+                px = px.max(apart(of(a), of(b)));
+            }
+        }
+        for (a, b) in a.truth.white_markers.iter().zip(&b.truth.white_markers) {
+            px = px.max(apart(a.centroid_px, b.centroid_px));
+        }
+        if let (Some(a), Some(b)) = (&a.image, &b.image) {
+            let mut changes: Vec<u8> = a.bytes.iter().zip(&b.bytes).map(|(a, b)| a.abs_diff(*b)).collect();
+            changes.sort_unstable();
+            let rank = if random { changes.len() * 999 / 1000 } else { changes.len() - 1 };
+            grey = grey.max(f64::from(changes[rank]));
+        }
+    }
+    (px, grey)
+}
+
+/// Measures every effect of a scene that a plan may leave out, in some frames; what it is worth is printed line by line.
+fn measure(name: &str, scene: &Scene, numbers: &[u32], ratios: &mut Ratios) -> Vec<String> {
+    let plan = Plan::exact(scene).unwrap();
+    let touches = touches(scene, &plan);
+    // Noise hides what is smaller: the other effects are measured without it, and before a lossy code.
+    let quiet = |plan: &Plan, kept: EffectName| {
+        let mut plan = plan.clone();
+        for entry in &mut plan.entries {
+            entry.used &= entry.effect == kept
+                || !matches!(
+                    entry.effect,
+                    EffectName::Noise | EffectName::Sharpening | EffectName::Compression
+                );
+        }
+        plan
+    };
+    let bare_plan = quiet(&plan, EffectName::Dots);
+    let bare = frames(scene, &bare_plan, numbers, &touches);
+    let mut below = Vec::new();
+    for entry in plan.entries.iter().filter(|entry| entry.used) {
+        let bound = entry.bound.unwrap();
+        if bound == Bound::UNBOUNDED {
+            continue;
+        }
+        let random = entry.effect == EffectName::Noise;
+        let with_it = quiet(&plan, entry.effect);
+        let mut without = with_it.clone();
+        without.entries.iter_mut().filter(|other| other.effect == entry.effect).for_each(|e| e.used = false);
+        let own;
+        let with = if with_it == bare_plan {
+            &bare
+        } else {
+            own = frames(scene, &with_it, numbers, &touches);
+            &own
+        };
+        let (px, grey) = difference(scene, random, with, &frames(scene, &without, numbers, &touches));
+        let by_px = bound.px / px.max(MIN_PX);
+        let whole = (bound.grey + grey_of_shift(scene, bound.px).unwrap()).min(255.0);
+        let by_grey = whole / grey.max(MIN_GREY);
+        let ratio = if !scene.draws() || (bound.grey == 0.0 && px > MIN_PX) { by_px } else { by_grey };
+        let line = format!(
+            "{name} {}: {px:.4} of {:.4} px, {grey} of {whole:.2} grey, {ratio:.2} times",
+            entry.effect, bound.px
+        );
+        println!("{line}");
+        if bound.px < px || whole + 1.0 < grey {
+            below.push(line);
+        }
+        if ratio.is_finite() {
+            ratios.entry(entry.effect.as_str()).or_default().push(ratio);
+        }
+    }
+    below
+}
+
+/// The ratios as a table: how many, the median, the 95th percentile and the largest.
+fn table(ratios: &mut Ratios) -> String {
+    let mut text = String::new();
+    for (effect, found) in ratios {
+        found.sort_by(f64::total_cmp);
+        let at = |part: f64| found[((found.len() - 1) as f64 * part).round() as usize];
+        text +=
+            &format!("| {effect} | {} | {:.1} | {:.1} | {:.1} |\n", found.len(), at(0.5), at(0.95), at(1.0));
+    }
+    text
+}
+
+#[test]
+fn long_sizes_of_the_shipped_scenes() {
+    let mut ratios = Ratios::new();
+    let mut below = Vec::new();
+    for path in shipped() {
+        let scene = Scene::load(&path).unwrap();
+        let last = scene.frame_count() - 1;
+        let mut numbers = vec![0, last / 4, last / 2, last * 3 / 4, last];
+        numbers.dedup();
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        below.extend(measure(&name, &scene, &numbers, &mut ratios));
+    }
+    println!("{}", table(&mut ratios));
+    assert!(below.is_empty(), "{below:#?}");
+}
+
+#[test]
+fn long_sizes_of_random_scenes() {
+    let designs = lit_designs();
+    let mut ratios = Ratios::new();
+    let (mut below, mut compared) = (Vec::new(), 0);
+    for seed in 5000..5110 {
+        let mut random = SeededRandom::new(seed);
+        let design = designs[(random.uniform() * designs.len() as f64) as usize].clone();
+        let value = lit_scene(&mut random);
+        let file: SceneFile = domecast_design::from_value(&value).unwrap();
+        let scene = match Scene::new(file, Path::new(""), design) {
+            Ok(scene) => scene,
+            Err(SimError::Input(error)) if error.field.starts_with("motion") => continue,
+            Err(error) => panic!("{error}: {value}"),
+        };
+        below.extend(measure(&format!("seed {seed}"), &scene, &[0, 2], &mut ratios));
+        compared += 1;
+    }
+    println!("{}", table(&mut ratios));
+    assert!(compared >= 100, "{compared}");
+    assert!(below.is_empty(), "{below:#?}");
+}

@@ -226,8 +226,7 @@ mod tests {
             ] {
                 let start = Rigid::from_translation(at);
                 for force_n in [0.01, 0.4, 1.5] {
-                    let pressed =
-                        contact.press_held_with_force(&ball(), &start, way, force_n, None).unwrap();
+                    let pressed = contact.press_held_with_force(&ball(), &start, way, force_n, None).unwrap();
                     assert_eq!(pressed.status, PressStatus::Balanced, "{level:?} {force_n}: {pressed:?}");
                     assert_eq!(pressed.rest_from_platform, Rigid::identity());
                     let along = pressed.wrench.force_n.dot(way.normalize());

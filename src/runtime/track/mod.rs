@@ -71,7 +71,7 @@ mod wrench;
 
 pub use error::TrackError;
 pub use frame::{CameraFrame, FrameFault, Undistorted};
-pub use identities::MAX_FALSE_DOTS;
+pub use identities::{CameraTurn, MAX_FALSE_DOTS};
 pub use marks::MarkState;
 pub use options::{
     Channel, FollowMethod, MIN_MARKER_RISE_LEVELS, Reference, Steps, Thresholds, TrackOptions,

@@ -23,8 +23,7 @@ const MAX_FRAMES: u32 = 17;
 pub fn called_for(scene: &Scene) -> Geometry {
     let lens = scene.optics().lens();
     // A rigid mount does not give way to what touches the dome.
-    let moves =
-        scene.suspension().is_some() && (scene.motion().moves() || !scene.objects().is_empty());
+    let moves = scene.suspension().is_some() && (scene.motion().moves() || !scene.objects().is_empty());
     let layers = scene.optics().layers();
     let bends = layers.iter().any(|layer| layer.index != [1.0; 3]);
     Geometry {

@@ -7,9 +7,10 @@ use super::dot_prediction::DotPrediction;
 use super::dot_search::DotSearch;
 use super::dot_track::DotTrack;
 use super::false_dots::{MAX_FALSE_DOTS, find_false_dots};
+use super::key_check::{KeyCheck, KeyFrame, Orientation};
 use crate::track::frame::{Mask, Plane};
 use crate::track::marks::{BlobScan, DarkBlob, Flow, ScanSettings, SpotMeter};
-use crate::track::model::DotModel;
+use crate::track::model::{DotModel, SensorModel};
 use crate::track::options::{FollowMethod, Thresholds, TrackOptions};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
@@ -27,7 +28,7 @@ const BLOB_REACH: f64 = 0.3;
 pub(in crate::track) struct DotFrame<'a, 'b> {
     pub plane: &'a Plane<'b>,
     pub mask: &'a Mask,
-    pub models: &'a [DotModel],
+    pub model: &'a SensorModel,
     /// At the pose.
     pub optics: &'a SensorOptics,
     /// The platform's pose; `None` before the first one is found.
@@ -42,6 +43,8 @@ pub(in crate::track) struct DotsFound<'a> {
     /// Whether the whole frame was searched, and the blobs in it that are no dots.
     pub searched: bool,
     pub false_dots: &'a [DVec2],
+    /// How the picture lies against the constants' camera.
+    pub orientation: Orientation,
 }
 
 /// Dots and the buffers of their search.
@@ -99,14 +102,16 @@ pub(in crate::track) struct DotIdentities {
     since_search: u32,
     searched: bool,
     false_dots: Vec<DVec2>,
+    key: KeyCheck,
 }
 
 impl DotIdentities {
     /// For the dots of a sensor, in frames of one size.
-    pub fn new(models: &[DotModel], [width, height]: [usize; 2], options: &TrackOptions) -> Self {
+    pub fn new(model: &SensorModel, [width, height]: [usize; 2], options: &TrackOptions) -> Self {
+        let models = &model.dots;
         let mut meter = SpotMeter::default();
         let [smallest, largest] = RADIUS_RATIO;
-        for model in models {
+        for model in models.iter().chain(model.key.as_ref().map(|key| &key.dot)) {
             let mut radius = smallest * model.outline.radius_px;
             while radius < largest * model.outline.radius_px {
                 meter.prepare(radius);
@@ -137,12 +142,14 @@ impl DotIdentities {
             since_search: u32::MAX,
             searched: false,
             false_dots: Vec::with_capacity(MAX_FALSE_DOTS),
+            key: KeyCheck::new(options.camera_turned_rad.is_some(), width, height),
         }
     }
 
     /// Finds the dots of the next frame.
     pub fn find(&mut self, frame: &DotFrame<'_, '_>) -> DotsFound<'_> {
-        let &DotFrame { plane, mask, models, optics, ref pose } = frame;
+        let &DotFrame { plane, mask, model, optics, ref pose } = frame;
+        let models = &model.dots;
         self.searched = false;
         self.false_dots.clear();
         if let Some(flow) = &mut self.flow {
@@ -155,6 +162,16 @@ impl DotIdentities {
                 self.find_predicted(plane, mask, models);
             }
             None => self.dots.tracks.iter_mut().for_each(|track| track.spot = None),
+        }
+        if let Some(key) = &model.key
+            && !self.key.is_settled()
+        {
+            let Dots { meter, tracks, .. } = &mut self.dots;
+            self.key.test(&mut KeyFrame { plane, meter, key, models, tracks, optics });
+            if self.key.wants_search() {
+                let blobs = self.scan.dark_blobs(plane, |y| mask.span(y), &self.scan_settings);
+                self.key.search(blobs.unwrap_or_default(), key, models, model.optics.lens().spec());
+            }
         }
         self.dots.tracks.iter_mut().for_each(DotTrack::remember);
         self.now()
@@ -185,6 +202,8 @@ impl DotIdentities {
         self.since_search = 0;
         self.searched = true;
         if identify {
+            // Numbers are given anew: the key is asked again.
+            self.key.forget();
             let size = [plane.width(), plane.height()];
             let count = self.matcher.match_blobs(blobs, models, &self.dots.tracks, size);
             if count > self.dots.found() {
@@ -212,7 +231,12 @@ impl DotIdentities {
     }
 
     fn now(&self) -> DotsFound<'_> {
-        DotsFound { tracks: &self.dots.tracks, searched: self.searched, false_dots: &self.false_dots }
+        DotsFound {
+            tracks: &self.dots.tracks,
+            searched: self.searched,
+            false_dots: &self.false_dots,
+            orientation: self.key.orientation(),
+        }
     }
 
     /// The last frame does not count: the next one has nothing to be followed from.
@@ -228,5 +252,6 @@ impl DotIdentities {
         self.forget_last();
         self.dots.tracks.fill(DotTrack::default());
         self.prediction = DotPrediction::default();
+        self.key.forget();
     }
 }

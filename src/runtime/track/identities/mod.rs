@@ -10,11 +10,13 @@ mod dot_search;
 mod dot_track;
 mod dots;
 mod false_dots;
+mod key_check;
 mod marker_hypotheses;
 mod markers;
 
 pub(super) use dot_track::DotTrack;
 pub(super) use dots::{DotFrame, DotIdentities, DotsFound};
 pub use false_dots::MAX_FALSE_DOTS;
+pub use key_check::{CameraTurn, Orientation};
 pub(super) use marker_hypotheses::MarkerHypotheses;
 pub(super) use markers::{MarkerFrame, MarkerIdentities};

@@ -7,7 +7,7 @@ use super::problem::{Problem, Problems};
 use super::reference::ReferenceMean;
 use super::result::{DotResult, MarkerResult, Tracked};
 use crate::track::frame::Exposure;
-use crate::track::identities::{DotsFound, MAX_FALSE_DOTS};
+use crate::track::identities::{DotsFound, MAX_FALSE_DOTS, Orientation};
 use crate::track::marks::{FittedDisc, MarkState};
 use crate::track::model::SensorModel;
 use crate::track::options::{Reference, TrackOptions};
@@ -90,6 +90,7 @@ impl Reporter {
         result.problems = Problems::default();
         (result.pose, result.pose_sd, result.pose_rms_px) = (None, None, None);
         (result.wrench, result.wrench_sd) = (None, None);
+        result.camera_turn = None;
         for marker in &mut result.white_markers {
             let seen = marker.state != MarkState::Missing;
             let state = if seen { MarkState::Lost } else { MarkState::Missing };
@@ -180,6 +181,31 @@ impl Reporter {
         self.problem_if(estimate.is_beyond_springs, Problem::BeyondSprings);
     }
 
+    /// What the key says; numbers of a picture that lies otherwise would be other marks'.
+    fn orientation(&mut self, orientation: Orientation) {
+        match orientation {
+            Orientation::NoKey | Orientation::AsBuilt => return,
+            Orientation::Unsure => return self.problem(Problem::KeyUnsure),
+            Orientation::Turned(turn) => {
+                self.problem(if turn.is_mirrored { Problem::Mirrored } else { Problem::Turned });
+                self.result.camera_turn = Some(turn);
+            }
+        }
+        let result = &mut self.result;
+        (result.pose, result.pose_sd, result.pose_rms_px) = (None, None, None);
+        (result.wrench, result.wrench_sd) = (None, None);
+        result.false_dots.clear();
+        let unsure = |state: MarkState| {
+            if state == MarkState::Ok { MarkState::IdentityUnsure } else { state }
+        };
+        for dot in &mut result.black_dots {
+            *dot = DotResult { id: dot.id, state: unsure(dot.state), ..DotResult::default() };
+        }
+        for marker in &mut result.white_markers {
+            *marker = MarkerResult { id: marker.id, state: unsure(marker.state), ..MarkerResult::default() };
+        }
+    }
+
     /// Ends a frame in which marks were looked for.
     pub fn finish(&mut self, findings: &FrameFindings<'_>, model: &SensorModel) {
         self.markers(findings.discs, &findings.pose);
@@ -203,6 +229,7 @@ impl Reporter {
         let nothing =
             findings.discs.iter().all(Option::is_none) && tracks.iter().all(|track| track.spot.is_none());
         self.problem_if(findings.pose.refined.is_none() && nothing, Problem::NoMarks);
+        self.orientation(findings.dots.orientation);
         let good = known && self.result.problems.iter().all(|p| p >= Problem::Frozen);
         self.reference.apply(&mut self.result, good);
     }

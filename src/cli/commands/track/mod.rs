@@ -356,6 +356,10 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     }
     if let Some(turn) = turn {
         output.warn(&turned_hint(turn));
+    } else if tally.counts.contains_key("key_unsure") {
+        let whether = "the gap that tells how the picture lies is not seen (dirt, or a broken dot); nothing is stated of such \
+            frames: if the camera is as the constants say, track with --camera-turned 0";
+        output.warn(whether);
     }
     tally.summarize(output, arguments.out.as_deref())?;
     let nothing_read = tally.counts.keys().all(|status| *status == "unreadable");

@@ -144,6 +144,9 @@ impl KeyFrame<'_, '_> {
                 Found::Unclear => {}
             }
         }
+        if own == Found::Unclear && gaps == 0 {
+            return None;
+        }
         // Where a place cannot be looked at, the others must speak for it.
         let clear = 2 * dots >= key.images.len();
         Some(match (gaps, own, turn) {
@@ -160,6 +163,10 @@ pub(super) struct KeyCheck {
     orientation: Orientation,
     /// The user says how the picture lies: being unsure is no fault.
     is_told: bool,
+    /// Whether it once lay as the constants have it.
+    was_as_built: bool,
+    /// Whether there is dirt on the key.
+    is_dirty: bool,
     since_search: u32,
     size: [usize; 2],
     /// Pixels near a blob.
@@ -170,7 +177,15 @@ impl KeyCheck {
     /// For frames of one size; `is_told`: the user says how the picture lies.
     pub fn new(is_told: bool, width: usize, height: usize) -> Self {
         let near = vec![false; width * height];
-        Self { orientation: Orientation::NoKey, is_told, since_search: u32::MAX, size: [width, height], near }
+        Self {
+            orientation: Orientation::NoKey,
+            is_told,
+            was_as_built: false,
+            is_dirty: false,
+            since_search: u32::MAX,
+            size: [width, height],
+            near,
+        }
     }
 
     /// What is known.
@@ -196,7 +211,12 @@ impl KeyCheck {
 
     /// Whether a dot is where the gap was a frame ago: all numbers may be off by one then.
     pub fn is_filled(&self, frame: &mut KeyFrame<'_, '_>) -> bool {
-        self.is_settled() && frame.at_key() == Found::Dot
+        self.is_settled() && !self.is_dirty && frame.at_key() == Found::Dot
+    }
+
+    /// There is dirt on the key: it says nothing from now on.
+    pub fn look_away(&mut self) {
+        self.is_dirty = true;
     }
 
     /// Looks for the gap among the dots of a frame.
@@ -206,8 +226,17 @@ impl KeyCheck {
             // What the whole frame said stands until the dots say something.
             None | Some(Orientation::Unsure) if turned => {}
             Some(orientation) => self.orientation = orientation,
+            // A camera that was mounted right is not turned because a hand covers the dots.
+            None if self.was_as_built => self.orientation = Orientation::NoKey,
             None => self.orientation = Orientation::Unsure,
         }
+        self.was_as_built |= self.is_settled();
+    }
+
+    /// Forgets all frames.
+    pub fn restart(&mut self) {
+        self.forget();
+        (self.orientation, self.was_as_built, self.is_dirty) = (Orientation::NoKey, false, false);
     }
 
     /// Whether the whole frame should be compared with all turns.

@@ -37,6 +37,8 @@ pub(super) enum Hypothesis {
     FromRest { step_px: DVec2 },
     /// Where each dot was last.
     FromLast,
+    /// The dots as they were followed into the frame.
+    Followed,
 }
 
 /// Matches blobs to dots; keeps its buffers.
@@ -93,6 +95,7 @@ impl BlobMatcher {
         self.base.extend(tracks.iter().map(|track| {
             match hypothesis {
                 Hypothesis::FromRest { .. } => track.expected_px.filter(|_| track.is_wanted()),
+                Hypothesis::Followed => track.now_px(),
                 Hypothesis::FromLast => track
                     .expected_px
                     .zip(track.displaced_px)
@@ -103,6 +106,7 @@ impl BlobMatcher {
         let offset = match hypothesis {
             Hypothesis::FromRest { step_px } => self.commonest_offset(blobs, models) + step_px,
             Hypothesis::FromLast => self.commonest_offset(blobs, models),
+            Hypothesis::Followed => DVec2::ZERO,
         };
         self.pairs.clear();
         for (index, model) in models.iter().enumerate() {
@@ -111,6 +115,9 @@ impl BlobMatcher {
             }
         }
         self.take_best(f64::INFINITY);
+        if hypothesis == Hypothesis::Followed {
+            return;
+        }
         self.keep_largest_group(blobs, models);
         self.spread(blobs, models);
         if matches!(hypothesis, Hypothesis::FromLast) {

@@ -8,12 +8,11 @@ use glam::DVec2;
 
 use super::blob_matching::{BlobMatcher, Hypothesis};
 use super::dot_track::DotTrack;
-use super::skin;
 use crate::track::marks::DarkBlob;
 use crate::track::model::{DotModel, SensorModel};
 
 /// A blob where the key says that there is none costs this share of the dots.
-const FILLED_KEY_COST: f64 = 0.1;
+const FILLED_KEY_COST: f64 = 0.05;
 /// A numbering of this share of the dots needs no rivals.
 const CLEAR: f64 = 0.96;
 /// A rival this near to the best, in parts of the dots, leaves open what it says otherwise.
@@ -28,8 +27,10 @@ pub(super) struct IdentityChoice {
     pub blob_of: Vec<Option<usize>>,
     /// Dots that a numbering nearly as good has elsewhere.
     pub is_unsure: Vec<bool>,
+    /// Whether it is another one than that by which the dots were followed into the frame.
+    pub is_new: bool,
     /// How good it is: dots, each less by how rough the skin is there.
-    pub score: f64,
+    score: f64,
     second: Vec<Option<usize>>,
     second_score: f64,
 }
@@ -59,6 +60,10 @@ impl IdentityChoice {
         self.second.clear();
         (self.score, self.second_score) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         let wanted = tracks.iter().filter(|track| track.is_wanted()).count() as f64;
+        self.weigh(matcher, blobs, model, tracks, key_px, Hypothesis::Followed);
+        // What is as good as what was followed is no reason to change.
+        self.score += 0.5;
+        let followed = self.score;
         if tracks.iter().any(|track| track.displaced_px.is_some()) {
             self.weigh(matcher, blobs, model, tracks, key_px, Hypothesis::FromLast);
         }
@@ -75,6 +80,7 @@ impl IdentityChoice {
                 }
             }
         }
+        self.is_new = self.score > followed;
         self.is_unsure.clear();
         self.is_unsure.resize(dots.len(), false);
         if self.second_score > self.score - NEARLY * wanted - 1.0 {
@@ -119,14 +125,6 @@ impl IdentityChoice {
             self.second.extend_from_slice(&matcher.blob_of);
         }
     }
-}
-
-/// How good the dots as they are followed are, as [`IdentityChoice::score`]; `is_key_filled`: whether a dot is at the key.
-pub(super) fn score_of(dots: &[DotModel], tracks: &[DotTrack], is_key_filled: bool) -> f64 {
-    let at = |index: usize| tracks[index].expected_px;
-    let by = |index: usize| Some(tracks[index].now_px()? - tracks[index].expected_px?);
-    let filled = if is_key_filled { FILLED_KEY_COST * dots.len() as f64 } else { 0.0 };
-    skin::smoothness(dots, at, by) - filled
 }
 
 /// Two steps of the pattern near its middle, px: from a dot with the most neighbours to two of them that are not in a line.

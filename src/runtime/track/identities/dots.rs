@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::blob_matching::BlobMatcher;
-use super::choice::{IdentityChoice, score_of};
+use super::choice::IdentityChoice;
 use super::dot_prediction::DotPrediction;
 use super::dot_search::DotSearch;
 use super::dot_track::DotTrack;
@@ -230,8 +230,7 @@ impl DotIdentities {
             let key_px = model.key.as_ref().and_then(|key| optics.project(key.dot.surface_mm).ok());
             self.matcher.take(blobs, [plane.width(), plane.height()]);
             self.choice.choose(&mut self.matcher, blobs, model, &self.dots.tracks, key_px);
-            let followed = score_of(models, &self.dots.tracks, is_filled);
-            if self.choice.score > followed + 0.5 {
+            if self.choice.is_new {
                 let matched = &self.choice.blob_of;
                 let at = |blob: usize| blobs.get(blob).map(|blob: &DarkBlob| blob.at_px);
                 self.dots.measure_at(plane, models, |dot| matched.get(dot).copied().flatten().and_then(at));
@@ -244,9 +243,8 @@ impl DotIdentities {
                 // No other numbering is better: it is dirt.
                 self.key.look_away();
             }
-            let is_same = self.choice.score > followed - 0.02 * models.len() as f64;
             for (track, is_unsure) in self.dots.tracks.iter_mut().zip(&self.choice.is_unsure) {
-                track.is_unsure = *is_unsure && is_same;
+                track.is_unsure = *is_unsure;
             }
         }
         find_false_dots(blobs, models, &self.dots.tracks, &mut self.false_dots);

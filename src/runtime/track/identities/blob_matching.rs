@@ -208,24 +208,21 @@ impl BlobMatcher {
     pub fn has_blob_at(
         &self,
         blobs: &[DarkBlob],
+        models: &[DotModel],
         model: &DotModel,
         expected_px: DVec2,
         tracks: &[DotTrack],
     ) -> Option<bool> {
-        let (mut sum, mut count) = (DVec2::ZERO, 0.0);
-        for other in &model.neighbors {
-            if let (Some(blob), Some(at)) = (self.blob_of[*other], tracks[*other].expected_px) {
-                sum += blobs[blob].at_px - at;
-                count += 1.0;
-            }
-        }
-        let at = expected_px + sum / count;
+        let place = |other: usize| tracks[other].expected_px;
+        let by = |other: usize| Some(blobs[self.blob_of[other]?].at_px - place(other)?);
+        let lead = skin::beside(model, expected_px, usize::MAX, models, place, by);
+        let at = expected_px + lead.filter(|lead| lead.neighbors >= 2)?.displaced_px;
         let reach_px = GROW_REACH * model.spacing_px;
         let is_dot = |blob: usize| {
             let part = blobs[blob].area_px / model.outline.area_px;
             blobs[blob].at_px.distance(at) < reach_px && (AREA_RATIO[0]..AREA_RATIO[1]).contains(&part)
         };
-        (count >= 2.0).then(|| self.buckets.near(at, reach_px).any(is_dot))
+        Some(self.buckets.near(at, reach_px).any(is_dot))
     }
 
     /// The offset that most dots agree in: the fullest 3 x 3 cells of all offsets between a dot and the blobs around.

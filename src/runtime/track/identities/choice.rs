@@ -102,7 +102,7 @@ impl IdentityChoice {
         matcher.grow(blobs, &model.dots, tracks, hypothesis);
         let mut score = matcher.smoothness(blobs, &model.dots, tracks);
         if let (Some(key), Some(at)) = (&model.key, key_px)
-            && matcher.has_blob_at(blobs, &key.dot, at, tracks) == Some(true)
+            && matcher.has_blob_at(blobs, &model.dots, &key.dot, at, tracks) == Some(true)
         {
             score -= FILLED_KEY_COST * model.dots.len() as f64;
         }

@@ -10,6 +10,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 
 use super::dot_track::DotTrack;
+use super::skin;
 use crate::track::frame::Plane;
 use crate::track::marks::{DarkBlob, SpotFault, SpotMeter, SpotOutline};
 use crate::track::model::{DotModel, KeyModel};
@@ -83,18 +84,16 @@ enum Found {
 impl KeyFrame<'_, '_> {
     /// What is where the found dots around a dot put it.
     fn look(&mut self, model: &DotModel, expected_px: DVec2, outline: &SpotOutline) -> Found {
-        let (mut sum, mut count) = (DVec2::ZERO, 0.0);
-        for other in &model.neighbors {
-            let track = &self.tracks[*other];
-            if let (Some(now), Some(expected)) = (track.now_px(), track.expected_px) {
-                sum += now - expected;
-                count += 1.0;
-            }
-        }
-        if count < 2.0 {
-            return Found::Unclear;
-        }
-        match self.meter.measure(self.plane, expected_px + sum / count, outline, REACH * model.spacing_px) {
+        let at = |other: usize| self.tracks[other].expected_px;
+        let by = |other: usize| Some(self.tracks[other].now_px()? - self.tracks[other].expected_px?);
+        let lead = skin::beside(model, expected_px, usize::MAX, self.models, at, by);
+        let Some(lead) = lead.filter(|lead| lead.neighbors >= 2) else { return Found::Unclear };
+        match self.meter.measure(
+            self.plane,
+            expected_px + lead.displaced_px,
+            outline,
+            REACH * model.spacing_px,
+        ) {
             Ok(_) => Found::Dot,
             Err(SpotFault::Faint | SpotFault::Strayed) => Found::Gap,
             Err(SpotFault::NoGround | SpotFault::Misshapen) => Found::Unclear,

@@ -28,8 +28,20 @@ pub(super) fn estimate(
     at: impl Fn(usize) -> Option<DVec2>,
     displaced: impl Fn(usize) -> Option<DVec2>,
 ) -> Option<SkinEstimate> {
-    let center = at(index)?;
-    let spacing = models[index].spacing_px;
+    beside(&models[index], at(index)?, index, models, at, displaced)
+}
+
+/// [`estimate`] of a dot that need not be one of the pattern's, at its place on the undeformed dome; `index`: its own
+/// number, or one beyond all.
+pub(super) fn beside(
+    dot: &DotModel,
+    center: DVec2,
+    index: usize,
+    models: &[DotModel],
+    at: impl Fn(usize) -> Option<DVec2>,
+    displaced: impl Fn(usize) -> Option<DVec2>,
+) -> Option<SkinEstimate> {
+    let spacing = dot.spacing_px;
     let mut seen = [usize::MAX; MAX_AROUND];
     let mut count = 0;
     let mut matrix = DMat3::from_diagonal(DVec3::new(0.0, GRADIENT_COST, GRADIENT_COST));
@@ -49,10 +61,10 @@ pub(super) fn estimate(
         sums[1] += row * (weight * moved.y);
         neighbors += usize::from(is_next);
     };
-    for other in &models[index].neighbors {
+    for other in &dot.neighbors {
         add(*other, true);
     }
-    for other in &models[index].neighbors {
+    for other in &dot.neighbors {
         for further in &models[*other].neighbors {
             add(*further, false);
         }

@@ -119,8 +119,9 @@ impl KeyFrame<'_, '_> {
         self.look(&key.dot, center + offset, &outline)
     }
 
-    /// Where the one gap is; `None` where the dots are too few to be asked.
-    fn orientation(&mut self) -> Option<Orientation> {
+    /// Where the one gap is; `None` where the dots are too few to be asked. `is_trusted`: the camera was as built before, so
+    /// that other gaps are lost dots.
+    fn orientation(&mut self, is_trusted: bool) -> Option<Orientation> {
         let (mut wanted, mut found) = (0.0, 0.0);
         for track in self.tracks.iter().filter(|track| track.is_wanted() && track.expected_px.is_some()) {
             wanted += 1.0;
@@ -149,6 +150,7 @@ impl KeyFrame<'_, '_> {
         // Where a place cannot be looked at, the others must speak for it.
         let clear = 2 * dots >= key.images.len();
         Some(match (gaps, own, turn) {
+            (_, Found::Gap, _) if is_trusted => Orientation::AsBuilt,
             (1, Found::Gap, _) if clear => Orientation::AsBuilt,
             (1, Found::Dot, Some(turn)) if clear => Orientation::Turned(turn),
             _ => Orientation::Unsure,
@@ -221,7 +223,7 @@ impl KeyCheck {
     /// Looks for the gap among the dots of a frame.
     pub fn test(&mut self, frame: &mut KeyFrame<'_, '_>) {
         let turned = matches!(self.orientation, Orientation::Turned(_));
-        match frame.orientation() {
+        match frame.orientation(self.was_as_built) {
             // What the whole frame said stands until the dots say something.
             None | Some(Orientation::Unsure) if turned => {}
             Some(orientation) => self.orientation = orientation,

@@ -38,7 +38,7 @@ const REACH: f64 = 0.25;
 const MAX_JUDGED: usize = 2000;
 /// Images farther from the key than so many spacings are as good as any.
 const ENOUGH_APART: f64 = 2.5;
-/// Images nearer than this many spacings cannot be told from the key.
+/// Images nearer than this many spacings cannot be distinguished from the key.
 const MIN_APART: f64 = 0.9;
 
 /// The dot that is left out.

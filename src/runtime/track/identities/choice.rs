@@ -132,8 +132,8 @@ fn lattice(model: &SensorModel) -> Option<[DVec2; 2]> {
     let dots = &model.dots;
     let count = dots.len() as f64;
     let middle = dots.iter().map(|dot| dot.rest_px).sum::<DVec2>() / count;
-    let most = dots.iter().map(|dot| dot.neighbors.len()).max()?;
-    let full = dots.iter().filter(|dot| dot.neighbors.len() == most);
+    let sides = dots.iter().map(|dot| dot.neighbors.len()).max()?;
+    let full = dots.iter().filter(|dot| dot.neighbors.len() == sides);
     let from_middle = |dot: &&DotModel| dot.rest_px.distance_squared(middle);
     let dot = full.min_by(|a, b| from_middle(a).total_cmp(&from_middle(b)))?;
     let steps = dot.neighbors.iter().map(|other| dots[*other].rest_px - dot.rest_px);

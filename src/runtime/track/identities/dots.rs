@@ -171,7 +171,7 @@ impl DotIdentities {
             None => self.dots.tracks.iter_mut().for_each(|track| track.spot = None),
         }
         if let Some(key) = &model.key
-            && !self.key.is_settled()
+            && !self.key.is_sure()
         {
             let Dots { meter, tracks, .. } = &mut self.dots;
             self.key.test(&mut KeyFrame { plane, meter, key, models, tracks, optics });

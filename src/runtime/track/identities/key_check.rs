@@ -163,7 +163,7 @@ impl KeyFrame<'_, '_> {
 pub(super) struct KeyCheck {
     orientation: Orientation,
     /// The user says how the picture lies: being unsure is no fault.
-    is_told: bool,
+    is_given: bool,
     /// Whether it once lay as the constants have it.
     was_as_built: bool,
     /// Whether there is dirt on the key.
@@ -175,12 +175,12 @@ pub(super) struct KeyCheck {
 }
 
 impl KeyCheck {
-    /// For frames of one size; `is_told`: the user says how the picture lies.
-    pub fn new(is_told: bool, width: usize, height: usize) -> Self {
+    /// For frames of one size; `is_given`: the user says how the picture lies.
+    pub fn new(is_given: bool, width: usize, height: usize) -> Self {
         let near = vec![false; width * height];
         Self {
             orientation: Orientation::NoKey,
-            is_told,
+            is_given,
             was_as_built: false,
             is_dirty: false,
             since_search: u32::MAX,
@@ -192,13 +192,13 @@ impl KeyCheck {
     /// What is known.
     pub fn orientation(&self) -> Orientation {
         match self.orientation {
-            Orientation::Unsure if self.is_told => Orientation::NoKey,
+            Orientation::Unsure if self.is_given => Orientation::NoKey,
             orientation => orientation,
         }
     }
 
     /// Whether the key need not be asked again.
-    pub fn is_settled(&self) -> bool {
+    pub fn is_sure(&self) -> bool {
         self.orientation == Orientation::AsBuilt
     }
 
@@ -212,7 +212,7 @@ impl KeyCheck {
 
     /// Whether a dot is where the gap was a frame ago: all numbers may be off by one then.
     pub fn is_filled(&self, frame: &mut KeyFrame<'_, '_>) -> bool {
-        self.is_settled() && !self.is_dirty && frame.at_key() == Found::Dot
+        self.is_sure() && !self.is_dirty && frame.at_key() == Found::Dot
     }
 
     /// There is dirt on the key: it says nothing from now on.
@@ -231,7 +231,7 @@ impl KeyCheck {
             None if self.was_as_built => self.orientation = Orientation::NoKey,
             None => self.orientation = Orientation::Unsure,
         }
-        self.was_as_built |= self.is_settled();
+        self.was_as_built |= self.is_sure();
     }
 
     /// Forgets all frames.

@@ -13,6 +13,8 @@ use domecast_optics::pose::Sighting;
 
 /// A pose farther from rest than this is none, mm.
 const MAX_TRANSLATION_MM: f64 = 20.0;
+/// A pose turned farther from rest than this is none, rad: it is the camera that is turned.
+const MAX_TURN_RAD: f64 = 0.4;
 /// Discs that fit within this part of the largest residual need no rivals.
 const CLEAR_PART: f64 = 0.25;
 /// Combinations of three markers that are tried for each one left out.
@@ -174,7 +176,8 @@ impl PoseFinder {
             disc.map(|d| MarkerSighting { marker: *marker, centroid_px: d.centroid_px, sd_px: d.sd_px })
         }));
         let refined = refine(&mut self.optics, &self.sightings, start)?;
-        let near = refined.pose.translation_mm.length() < MAX_TRANSLATION_MM;
+        let cosine = 0.5 * (refined.pose.rotation.to_cols_array().iter().step_by(4).sum::<f64>() - 1.0);
+        let near = refined.pose.translation_mm.length() < MAX_TRANSLATION_MM && cosine > MAX_TURN_RAD.cos();
         (refined.rms_px <= self.max_residual_px && near).then_some(refined)
     }
 

@@ -14,7 +14,7 @@ fn ids(state: MarkState, tracked: &domecast::track::Tracked) -> Vec<u32> {
 
 #[test]
 fn missing_and_false_dots_are_named() {
-    let missing = [3, 40, 41, 120];
+    let missing = [3, 40, 41, 119];
     // Two false dots, each in the middle of four true ones.
     let dots = &SENSOR.constants.black_dots;
     let between = |id: usize| {
@@ -26,7 +26,7 @@ fn missing_and_false_dots_are_named() {
         };
         at(id) + 0.5 * (largest(DVec2::X) + largest(DVec2::Y))
     };
-    let extra = [(between(0), 3.4), (between(70), 3.0)];
+    let extra = [(between(0), 3.4), (between(69), 3.0)];
     let mut tracker = tracker(TrackOptions::default());
     for number in 0..40 {
         let down = -0.05 * number as f64;

@@ -28,6 +28,7 @@ pub mod evenness;
 mod fill;
 pub mod frame;
 mod gaps;
+pub mod key;
 pub mod lost;
 pub mod neighbors;
 pub mod outline;
@@ -47,6 +48,7 @@ mod zones;
 
 pub use dot::{Dot, DotSize};
 pub use error::LayoutError;
+pub use key::{KeyImage, PatternKey};
 pub use lost::{LostDot, Reason, Rule, Zone};
 pub use passes::PrintPass;
 pub use plan::Layout;

@@ -9,6 +9,7 @@ use super::dot::{Dot, DotProjector, DotSize};
 use super::edge::{center, edge};
 use super::error::LayoutError;
 use super::frame::EvenFrame;
+use super::key::{self, KeyChoice, KeyImage, PatternKey};
 use super::lost::{LostDot, Rule};
 use super::neighbors::neighbors;
 use super::passes::{self, PrintPass};
@@ -16,7 +17,7 @@ use super::pattern::{Pattern, PatternError};
 use super::spec::{LayoutOrigin, LayoutSpec};
 use super::{gaps, zones};
 use crate::spec::Design;
-use crate::spec::sections::{OnLost, PatternKind, PrintPasses, PrintSection};
+use crate::spec::sections::{KeyKind, OnLost, PatternKind, PrintPasses, PrintSection};
 use crate::transfer::TransferMap;
 use domecast_optics::DomeShape;
 
@@ -33,6 +34,9 @@ pub struct Layout {
     pub dots: Vec<Dot>,
     /// The dots of the pattern that are left out, with their reasons.
     pub lost: Vec<LostDot>,
+    /// The dot left out so that a turned or mirrored picture shows itself; `None` where the pattern has no symmetry or
+    /// the design wants none.
+    pub key: Option<PatternKey>,
     /// The print passes.
     pub passes: Vec<PrintPass>,
     /// Distance of neighbours in the even frame, px; solved if the design gives a number of dots.
@@ -134,6 +138,7 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
         }
     }
     refuse_required(spec, &lost, dots.len() + lost.len())?;
+    let key = take_key(spec, &frame, center_px, &mut dots, &mut warnings);
     let lattice = matches!(spec.pattern.kind, PatternKind::Square | PatternKind::Hexagonal);
     let even: Vec<DVec2> = dots.iter().map(|dot| dot.even_px).collect();
     let around = neighbors(&even, if lattice { LATTICE_NEIGHBORS } else { UNEVEN_NEIGHBORS });
@@ -159,6 +164,7 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
     Ok(Layout {
         dots,
         lost,
+        key,
         passes,
         pitch_px,
         size,
@@ -176,6 +182,44 @@ fn warn_of_lost(laid_out: usize, lost: usize, warnings: &mut Vec<String>) {
     if lost > 0 {
         warnings.push(format!("{lost} of {} dots of the pattern are left out", laid_out + lost));
     }
+}
+
+/// Takes the key out of the dots.
+fn take_key(
+    spec: &LayoutSpec,
+    frame: &EvenFrame<'_>,
+    center_px: DVec2,
+    dots: &mut Vec<Dot>,
+    warnings: &mut Vec<String>,
+) -> Option<PatternKey> {
+    let raw_center_px = frame.raw_from_even(center_px).ok()?;
+    let rotation_rad = spec.pattern.rotation_deg.to_radians();
+    let (index, images) = match key::choose(dots, raw_center_px, rotation_rad) {
+        KeyChoice::NotNeeded => return None,
+        KeyChoice::Dot(index, images) if spec.pattern.key == KeyKind::LeftOutDot => (index, images),
+        choice => {
+            let why = match choice {
+                KeyChoice::None => "the pattern is symmetric and has too few dots for a key",
+                _ => "pattern.key is \"none\"",
+            };
+            warnings.push(format!("{why}: a turned or mirrored picture passes for a good one"));
+            return None;
+        }
+    };
+    let mut dot = dots.remove(index);
+    dot.id = u32::MAX;
+    let spacing = |other: &Dot| other.image_px.distance(dot.image_px);
+    let nearest = dots.iter().map(spacing).fold(f64::INFINITY, f64::min);
+    let near = dots.iter().enumerate().filter(|(_, other)| spacing(other) < LATTICE_NEIGHBORS * nearest);
+    let neighbors = near.map(|(index, _)| index as u32).collect();
+    dot.neighbors = neighbors;
+    // Dots after the one taken out moved up by one.
+    let image = |(turned_rad, is_mirrored, at): (f64, bool, usize)| KeyImage {
+        turned_rad,
+        is_mirrored,
+        dot: (at - usize::from(at > index)) as u32,
+    };
+    Some(PatternKey { dot, images: images.into_iter().map(image).collect() })
 }
 
 /// The print passes that the dots of the pattern need, those that the lens does not see left out.

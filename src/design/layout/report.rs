@@ -20,6 +20,7 @@ use serde::Serialize;
 
 use super::coverage::{DomeCoverage, coverage};
 use super::evenness::{self, EvennessReport, PinholeComparison};
+use super::key::{KeyImage, PatternKey};
 use super::tolerances::{self, ToleranceReport};
 use super::window::Window;
 use super::{DotSize, Layout, LayoutSpec};
@@ -40,6 +41,8 @@ pub struct LayoutReport {
     pub dot_diameter_mm: [f64; 2],
     /// Dots of the pattern that are left out.
     pub lost: Vec<LostRecord>,
+    /// The dot left out so that a turned or mirrored picture shows itself; null where there is none.
+    pub key: Option<KeyRecord>,
     /// The print passes.
     #[serde(rename = "hits")]
     pub passes: Vec<PassRecord>,
@@ -66,6 +69,41 @@ pub struct LostRecord {
     pub reason: &'static str,
     /// Why, in words.
     pub because: String,
+}
+
+/// The dot left out so that a turned or mirrored picture shows itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KeyRecord {
+    /// Where it would be in the raw image, px.
+    pub image_px: [f64; 2],
+    /// Where it would be on the dome, degrees from the pole.
+    pub polar_deg: f64,
+    /// The dots where a turned or mirrored picture would show the gap.
+    pub images: Vec<u32>,
+    /// Why it is this one, in words.
+    pub because: String,
+}
+
+impl KeyRecord {
+    fn new(layout: &Layout, key: &PatternKey) -> Self {
+        let from_key = |image: &KeyImage| {
+            layout.dots[image.dot as usize].image_px.distance(key.dot.image_px) / layout.pitch_px
+        };
+        let nearest = key.images.iter().map(from_key).fold(f64::INFINITY, f64::min);
+        let polar_deg = key.dot.polar_rad().to_degrees();
+        let because = format!(
+            "the pattern maps onto itself by {} turns and mirrorings, so a turned or mirrored picture would pass for a \
+             good one; this dot is left out because each of them leads to another dot, {nearest:.1} pitches away or \
+             more, and because at {polar_deg:.0} degrees it is seen at rest and under load and prints safely",
+            key.images.len(),
+        );
+        Self {
+            image_px: key.dot.image_px.to_array(),
+            polar_deg,
+            images: key.images.iter().map(|image| image.dot).collect(),
+            because,
+        }
+    }
 }
 
 /// A print pass.
@@ -118,6 +156,7 @@ impl LayoutReport {
                     because: dot.reason.to_string(),
                 })
                 .collect(),
+            key: layout.key.as_ref().map(|key| KeyRecord::new(layout, key)),
             passes: passes(layout),
             evenness: evenness::by_design(layout),
             pinhole_alone: evenness::by_pinhole(spec, layout),

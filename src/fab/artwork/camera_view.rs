@@ -21,7 +21,7 @@ const MASK: [u8; 3] = [230, 110, 20];
 const CORNERS: u32 = 360;
 
 /// The dots as the camera will see them at rest: the membrane light, the dots and the white markers where the
-/// raw image shows them, the runtime's mask as a coloured line. A PNG of the raw image's size; the centre of
+/// raw image shows them, the runtime's mask and the outline of the dot that is left out as coloured lines. A PNG of the raw image's size; the centre of
 /// the top-left pixel is (0, 0).
 ///
 /// # Errors
@@ -42,6 +42,9 @@ pub fn camera_view(spec: &LayoutSpec, layout: &Layout) -> Result<Vec<u8>, Render
     }
     for dot in &layout.dots {
         fill_outline(&mut picture, &dot.image_outline, DOT);
+    }
+    if let Some(key) = &layout.key {
+        stroke(&mut picture, &key.dot.image_outline.polygon(8), true, 1.0, MASK);
     }
     for marker in &spec.white_markers {
         let rim = around().map(|out| {

@@ -28,12 +28,12 @@ pub use resolution::{DesignChoice, Resolution, design_choices, frames_to_average
 pub use sight::{MarkerSight, markers_of};
 pub use springs::{DesignSprings, claimed_loads, springs_of};
 
-use domecast_design::layout::Layout;
+use domecast_design::layout::{KeyImage, Layout, PatternKey};
 use domecast_design::{Design, DesignError};
 use domecast_optics::ColorChannel;
 use domecast_runtime::constants::{
-    BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants,
-    OpticsConstants, VERSION, WhiteMarker,
+    BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, KeyConstants, KeyImageConstants,
+    LayerConstants, MaskConstants, OpticsConstants, VERSION, WhiteMarker,
 };
 
 /// The constants of a design with its dots.
@@ -110,10 +110,27 @@ pub fn with_springs(
                 neighbors: dot.neighbors.iter().map(|id| *id as usize).collect(),
             })
             .collect(),
+        key: layout.key.as_ref().map(key_of),
         springs: springs.constants.clone(),
         tolerances: Some(priors_of(design)),
         calibrations: Vec::new(),
     })
+}
+
+fn key_of(key: &PatternKey) -> KeyConstants {
+    let image = |image: &KeyImage| KeyImageConstants {
+        // To a millionth of a degree: multiples of 15 are whole numbers then.
+        turned_deg: (image.turned_rad.to_degrees() * 1e6).round() / 1e6,
+        mirrored: image.is_mirrored,
+        dot: image.dot as usize,
+    };
+    KeyConstants {
+        image_px: key.dot.image_px.to_array(),
+        surface_mm: key.dot.surface_mm.to_array(),
+        diameter_mm: key.dot.diameter_mm,
+        neighbors: key.dot.neighbors.iter().map(|id| *id as usize).collect(),
+        images: key.images.iter().map(image).collect(),
+    }
 }
 
 /// The tolerances of a design, as the priors of `calibrate-optics`.

@@ -45,7 +45,18 @@ pub(super) fn dots(subject: &ReportSubject<'_>) -> Html {
         charts.iter().flatten().map(crate::chart::Chart::to_html).collect::<Html>(),
         evenness(subject),
         tolerances(subject),
-        lost(subject),
+        key(subject) + lost(subject),
+    )
+}
+
+/// The dot that is left out on purpose.
+fn key(subject: &ReportSubject<'_>) -> Html {
+    let Some(key) = &subject.judged.key else { return Html::default() };
+    html!(
+        "<p>One dot is left out at ({}, {}) px, ringed in the camera's view: {}.</p>\n",
+        typeset(key.image_px[0]),
+        typeset(key.image_px[1]),
+        key.because.as_str(),
     )
 }
 

@@ -26,8 +26,9 @@ pub use error::ConstantsError;
 pub use law::{MagnetLaw, SpringLaw, SpringLawEnds};
 pub use loads::{PosedLoad, loads_over};
 pub use model::{
-    BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, LayerConstants, MaskConstants, Matrix4,
-    OpticsConstants, PlainRuntime, SpringConstants, StiffnessAt, VERSION, WhiteMarker,
+    BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, KeyConstants, KeyImageConstants,
+    LayerConstants, MaskConstants, Matrix4, OpticsConstants, PlainRuntime, SpringConstants, StiffnessAt,
+    VERSION, WhiteMarker,
 };
 pub use plain::{Bias, PlainFit};
 pub use plain_input::{PlainError, PlainInput};

@@ -35,6 +35,9 @@ pub struct Constants {
     pub white_markers: Vec<WhiteMarker>,
     /// The dots on the dome.
     pub black_dots: Vec<BlackDot>,
+    /// The dot left out so that a turned or mirrored picture shows itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub key: Option<KeyConstants>,
     /// The springs between the platforms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub springs: Option<SpringConstants>,
@@ -183,6 +186,35 @@ pub struct BlackDot {
     pub diameter_mm: f64,
     /// The dots beside it, by number, ascending.
     pub neighbors: Vec<usize>,
+}
+
+/// The dot that a symmetric pattern leaves out. Where a picture is turned or mirrored, the gap is seen at one of the
+/// images instead of here.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct KeyConstants {
+    /// Its centre in the raw image at rest.
+    pub image_px: [f64; 2],
+    /// Its centre on the dome, in the sensor frame.
+    pub surface_mm: [f64; 3],
+    /// The diameter that it would have on the dome.
+    pub diameter_mm: f64,
+    /// The dots beside it, by number, ascending.
+    pub neighbors: Vec<usize>,
+    /// Where the gap is seen in a turned or mirrored picture.
+    pub images: Vec<KeyImageConstants>,
+}
+
+/// Where a turned or mirrored picture shows the gap.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct KeyImageConstants {
+    /// By how much the picture is turned, degrees, from image x towards image y; after it was mirrored, if it is.
+    pub turned_deg: f64,
+    /// Whether the picture is mirrored left to right.
+    pub mirrored: bool,
+    /// The number of the dot at whose place the gap is seen.
+    pub dot: usize,
 }
 
 /// The springs.

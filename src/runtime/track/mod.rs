@@ -71,7 +71,7 @@ mod wrench;
 
 pub use error::TrackError;
 pub use frame::{CameraFrame, FrameFault, Undistorted};
-pub use identities::MAX_FALSE_DOTS;
+pub use identities::{CameraTurn, MAX_FALSE_DOTS};
 pub use marks::MarkState;
 pub(crate) use marks::marker_in_still;
 pub use options::{

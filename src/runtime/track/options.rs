@@ -94,6 +94,9 @@ pub struct TrackOptions {
     pub max_misplaced: f64,
     /// The whole frame is searched for lost and false dots at least every so many frames; 0: only when needed.
     pub search_every: u32,
+    /// By how much the picture is known to be turned against the constants' camera, from image x towards image y, rad:
+    /// the camera was mounted so. With a number, 0 too, the key is not asked whether it is sure.
+    pub camera_turned_rad: Option<f64>,
 }
 
 impl Default for TrackOptions {
@@ -108,6 +111,7 @@ impl Default for TrackOptions {
             max_residual_px: 2.0,
             max_misplaced: 0.5,
             search_every: 30,
+            camera_turned_rad: None,
         }
     }
 }

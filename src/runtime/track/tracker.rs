@@ -44,6 +44,8 @@ impl Tracker {
         if gates.iter().any(|v| !(*v > 0.0 && *v < MAX_GATE)) {
             return Err(TrackError::at("options", "need gates above zero"));
         }
+        let turned = options.camera_turned_rad.map(|turned_rad| turned(constants, turned_rad)).transpose()?;
+        let constants = turned.as_ref().unwrap_or(constants);
         let springs = constants.springs.as_ref().map(Springs::new).transpose()?;
         let at_mm = springs.as_ref().map_or(DVec3::ZERO, Springs::at_mm);
         let model = SensorModel::new(constants, options.max_residual_px, at_mm)?;
@@ -52,7 +54,7 @@ impl Tracker {
             exposure: ExposureMeter::default(),
             markers: MarkerIdentities::new(model.markers.all.len()),
             pose: PoseFinder::new(&model, options.max_residual_px),
-            dots: DotIdentities::new(&model.dots, size, &options),
+            dots: DotIdentities::new(&model, size, &options),
             displacements: DotDisplacements::new(model.dots.len()),
             report: Reporter::new(&model, &options),
             springs,
@@ -141,7 +143,7 @@ impl Tracker {
         let dots = self.dots.find(&DotFrame {
             plane: &plane,
             mask: &model.mask,
-            models: &model.dots,
+            model,
             optics,
             pose: self.pose.last_pose(),
         });
@@ -159,4 +161,20 @@ impl Tracker {
         self.report.finish(&findings, model);
         self.report.result()
     }
+}
+
+/// The constants of the same sensor with its camera so turned that the picture is turned from image x towards image y.
+fn turned(constants: &Constants, turned_rad: f64) -> Result<Constants, TrackError> {
+    if !(turned_rad.is_finite() && turned_rad.abs() < 1e3) {
+        return Err(TrackError::at("options", "need a turn of the camera that is a number"));
+    }
+    let mut turned = constants.clone();
+    let matrix = &mut turned.camera.camera_from_sensor;
+    let (sin, cos) = turned_rad.sin_cos();
+    let [x, y, ..] = *matrix;
+    for column in 0..4 {
+        matrix[0][column] = cos * x[column] - sin * y[column];
+        matrix[1][column] = sin * x[column] + cos * y[column];
+    }
+    Ok(turned)
 }

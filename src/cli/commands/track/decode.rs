@@ -17,6 +17,19 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// Mirrors it left to right.
+    pub fn mirror(&mut self) {
+        for row in self.bytes.chunks_exact_mut(self.width * self.channels) {
+            let mut right = self.width;
+            for left in 0..self.width / 2 {
+                right -= 1;
+                for channel in 0..self.channels {
+                    row.swap(left * self.channels + channel, right * self.channels + channel);
+                }
+            }
+        }
+    }
+
     fn checked(self) -> Result<Self, String> {
         match CameraFrame::new(self.width, self.height, self.channels, &self.bytes) {
             Ok(_) => Ok(self),

@@ -17,8 +17,9 @@ use domecast_files::{OutputRules, StagedFile, StagedFolder};
 use domecast_optics::SensorOptics;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
-    CSV_HEADER, CameraFrame, Channel, DOTS_CSV_HEADER, FollowMethod, Reference, Steps, Thresholds,
-    TrackOptions, Tracked, Tracker, Undistorted, overlay_png, write_csv, write_dots_csv, write_json,
+    CSV_HEADER, CameraFrame, CameraTurn, Channel, DOTS_CSV_HEADER, FollowMethod, Reference, Steps,
+    Thresholds, TrackOptions, Tracked, Tracker, Undistorted, overlay_png, write_csv, write_dots_csv,
+    write_json,
 };
 use source::{FrameSource, RawSize};
 
@@ -104,6 +105,18 @@ pub struct TrackArguments {
     /// another sensor's.
     #[arg(long, alias = "most-misplaced", default_value_t = 0.5)]
     max_misplaced: f64,
+    /// The camera is mounted so that the picture is turned clockwise by so many degrees against the constants. With a
+    /// number, 0 too, a key that cannot be seen is no fault.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees)]
+    camera_turned: Option<f64>,
+    /// The picture is mirrored left to right, before it is turned; pixels are then stated as in the picture mirrored back.
+    #[arg(long)]
+    camera_mirrored: bool,
+}
+
+fn degrees(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|v: &f64| v.abs() <= 360.0);
+    number.ok_or_else(|| "a number of degrees from -360 to 360".into())
 }
 
 fn levels(text: &str) -> Result<[u8; 2], String> {
@@ -115,6 +128,12 @@ fn levels(text: &str) -> Result<[u8; 2], String> {
 }
 
 impl TrackArguments {
+    /// A picture that is mirrored and then turned is, mirrored back, turned the other way.
+    fn camera_turned_rad(&self) -> Option<f64> {
+        let turned_rad = self.camera_turned.map(f64::to_radians);
+        if self.camera_mirrored { Some(-turned_rad.unwrap_or(0.0)) } else { turned_rad }
+    }
+
     fn options(&self) -> TrackOptions {
         TrackOptions {
             channel: match self.channel {
@@ -133,6 +152,7 @@ impl TrackArguments {
             search_every: self.search_every,
             max_residual_px: self.max_residual_px,
             max_misplaced: self.max_misplaced,
+            camera_turned_rad: self.camera_turned_rad(),
         }
     }
 }
@@ -262,6 +282,20 @@ fn unfit(arguments: &TrackArguments, error: &domecast_runtime::track::TrackError
     input_fault(&arguments.constants, error.to_string(), "constants of a sensor")
 }
 
+/// What cures pictures that lie otherwise than the constants say.
+fn turned_hint(turn: CameraTurn) -> String {
+    let deg = (turn.turned_rad.to_degrees() * 10.0).round() / 10.0;
+    let (how, option) = if turn.is_mirrored {
+        ("mirrored left to right, then turned", "--camera-mirrored --camera-turned")
+    } else {
+        ("turned", "--camera-turned")
+    };
+    format!(
+        "the picture is {how} clockwise by {deg} degrees against the constants; nothing is stated of such frames: mount the \
+         camera as in the design, or track with {option} {deg}"
+    )
+}
+
 /// Tracks every frame that there is; a frame that cannot be read is reported and skipped.
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     let constants = read_constants(&arguments.constants)?;
@@ -280,7 +314,17 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     }
     let at_mm = tracker.springs().map_or(DVec3::ZERO, domecast_runtime::track::Springs::at_mm);
     let mut tally = Tally::default();
-    while let Some(next) = source.next_frame() {
+    if constants.key.is_none() {
+        let whether = "a picture that is turned or mirrored may pass for a good one (constants of a new build have a key)";
+        output.warn(&format!("{}: name no `key`: {whether}", arguments.constants.display()));
+    }
+    let mut turn = None;
+    while let Some(mut next) = source.next_frame() {
+        if arguments.camera_mirrored
+            && let Ok(picture) = &mut next.picture
+        {
+            picture.mirror();
+        }
         output.step(&format!("frame {}", next.number));
         let picture = match &next.picture {
             Ok(picture) => CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes)
@@ -298,6 +342,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         if picture.is_ok() {
             tally.times.push(began.elapsed());
         }
+        turn = tracked.camera_turn.or(turn);
         *tally.counts.entry(tracked.status()).or_default() += 1;
         line.clear();
         match arguments.format {
@@ -319,6 +364,13 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     if tally.counts.is_empty() {
         let allowed = "PNG or JPEG frames, a video, or raw";
         return Err(input_fault(&arguments.frames[0], "holds no frame", allowed));
+    }
+    if let Some(turn) = turn {
+        output.warn(&turned_hint(turn));
+    } else if tally.counts.contains_key("key_unsure") {
+        let whether = "the gap that tells how the picture lies is not seen (dirt, or a broken dot); nothing is stated of such \
+            frames: if the camera is as the constants say, track with --camera-turned 0";
+        output.warn(whether);
     }
     tally.summarize(output, arguments.out.as_deref())?;
     let nothing_read = tally.counts.keys().all(|status| *status == "unreadable");

@@ -180,7 +180,9 @@ fn wanted_numbers_are_met() {
             let mut spec = spec(LensModel::KannalaBrandt, change);
             spec.print.min_dot_mm = 0.01;
             let layout = Layout::new(&spec).unwrap();
-            let off = layout.dots.len().abs_diff(wanted);
+            // The dot that is left out as a key is one of them.
+            let laid_out = layout.dots.len() + usize::from(layout.key.is_some());
+            let off = laid_out.abs_diff(wanted);
             // Lattices gain dots in groups of up to twelve.
             let limit = if kind == "rings" || kind == "fill" { 0 } else { 6.max(wanted / 50) };
             assert!(off <= limit, "{kind}: {} for {wanted}", layout.dots.len());
@@ -301,6 +303,48 @@ fn patterns_are_symmetric_about_the_axis() {
                 assert!(is_same(&places, turn_rad, false), "{named}");
                 assert!(is_same(&places, turn_rad, true), "{named}, mirrored");
             }
+        }
+    }
+}
+
+#[test]
+fn the_key_is_one_dot_whose_images_are_dots() {
+    for (kind, centred_on, rotation_deg, images) in [
+        ("square", "gap", 0.0, 7),
+        ("square", "dot", 11.0, 7),
+        ("hexagonal", "dot", 0.0, 11),
+        ("hexagonal", "gap", 23.0, 3),
+        // A fill starts from triangles, and stays as symmetric as its edge.
+        ("fill", "dot", 0.0, 11),
+    ] {
+        let change = |key: &str| {
+            serde_json::json!({
+                "kind": kind, "centred_on": centred_on, "rotation_deg": rotation_deg, "key": key,
+            })
+        };
+        let without = Layout::new(&spec(LensModel::KannalaBrandt, change("none"))).unwrap();
+        let layout = Layout::new(&spec(LensModel::KannalaBrandt, change("left_out_dot"))).unwrap();
+        let said = without.warnings.iter().any(|warning| warning.contains("pattern.key"));
+        let key = layout.key.as_ref().expect("a key");
+        let exact_px = if kind == "fill" { 0.25 * layout.pitch_px } else { 1e-6 };
+        assert!(said && without.key.is_none());
+        assert_eq!(layout.dots.len() + 1, without.dots.len());
+        assert_eq!(key.images.len(), images, "{kind} {centred_on}");
+        let center = layout.center_px;
+        for image in &key.images {
+            let from = key.dot.image_px - center;
+            let from = if image.is_mirrored { DVec2::new(-from.x, from.y) } else { from };
+            let at = center + DVec2::from_angle(image.turned_rad).rotate(from);
+            let dot = &layout.dots[image.dot as usize];
+            assert!(dot.image_px.distance(at) < exact_px, "{kind}: {} for {at}", dot.image_px);
+            // Far enough from the key that neither is taken for the other.
+            assert!(at.distance(key.dot.image_px) > 1.9 * layout.pitch_px);
+        }
+        // In the middle of the pattern: not at the pole, not at the rim.
+        assert!((10.0..50.0).contains(&key.dot.polar_rad().to_degrees()));
+        for near in &key.dot.neighbors {
+            let apart = layout.dots[*near as usize].image_px.distance(key.dot.image_px);
+            assert!((apart - layout.pitch_px).abs() < exact_px.max(1e-6));
         }
     }
 }

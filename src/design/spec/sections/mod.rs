@@ -45,7 +45,8 @@ pub use making::{
 pub use mount::{MountKind, MountSection};
 pub use optics::{DomeSection, IndexRgb, IndexValue, LayerSection, OpticsSection};
 pub use pattern::{
-    CentredOn, EvenIn, ImageDiscSection, KeepOutSection, OnLost, PatternCentre, PatternKind, PatternSection,
+    CentredOn, EvenIn, ImageDiscSection, KeepOutSection, KeyKind, OnLost, PatternCentre, PatternKind,
+    PatternSection,
 };
 pub use platforms::{
     CableExitSection, ClampSection, LedColor, LedSection, LedsSection, LowerPlatform, MagnetPocketsSection,

@@ -63,6 +63,17 @@ pub enum OnLost {
     Drop,
 }
 
+/// What lets a runtime see that the picture is turned or mirrored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum KeyKind {
+    /// One dot of a symmetric pattern is left out, at half of its polar angle and off all its mirror lines.
+    #[default]
+    LeftOutDot,
+    /// Every dot is laid out: a turned or mirrored picture of a symmetric pattern passes for a good one.
+    None,
+}
+
 /// The black dots, defined in the image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -73,7 +84,8 @@ pub struct PatternSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 20000.0))]
     pub pitch_px: Option<f64>,
-    /// Wanted number of dots; the pitch is solved so that the number laid out comes as close as it can.
+    /// Wanted number of dots; the pitch is solved so that the number laid out comes as close as it can. The dot that
+    /// `key` leaves out is one of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 1000000))]
     pub count: Option<u32>,
@@ -108,6 +120,9 @@ pub struct PatternSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 20000.0))]
     pub image_radius_px: Option<f64>,
+    /// What lets a runtime see that the picture is turned or mirrored.
+    #[serde(default)]
+    pub key: KeyKind,
     /// A dot that the lens cannot see, or that a white marker hides.
     #[serde(default)]
     pub unseen: OnLost,

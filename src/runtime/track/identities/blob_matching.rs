@@ -1,12 +1,14 @@
 //! Which blob is which dot, from the constants' neighbour graph: no grid is assumed, and any dot may be missing.
 //!
 //! Most of the dome is where the pose puts it, or everything moved alike: the commonest offset between blobs and
-//! expected dots gives the first pairs. From there each dot that has neighbours in place is looked for where they
-//! lead, the best fit first. What fits nothing stays a blob without a name.
+//! expected dots gives the first pairs, of which the largest group counts. From there each dot that has neighbours in
+//! place is looked for where the skin leads, the surest first. What fits nothing stays a blob without a name.
 
 use glam::DVec2;
 
+use super::buckets::Buckets;
 use super::dot_track::DotTrack;
+use super::skin;
 use crate::track::marks::DarkBlob;
 use crate::track::model::DotModel;
 
@@ -18,9 +20,26 @@ const CELLS: usize = 32;
 const SEED_REACH: f64 = 0.2;
 /// A blob is this near to where the neighbours lead, in parts of the dot's spacing.
 const GROW_REACH: f64 = 0.38;
+/// Dots of the first group are beside their places alike within this part of the spacing.
+const ALIKE: f64 = 0.15;
+/// A blob this near to where the skin leads, in parts of the spacing, is as sure as any; and what is added where only one
+/// neighbour leads.
+const SURE: f64 = 0.06;
+const ONE_NEIGHBOR_COST: f64 = 0.1;
 /// A blob's area over the dot's may lie between these.
 const AREA_RATIO: [f64; 2] = [0.35, 2.2];
 const MAX_ROUNDS: usize = 256;
+
+/// What identities are looked for from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Hypothesis {
+    /// The dots at rest, most of them beside their places by the commonest offset and this much more, px.
+    FromRest { step_px: DVec2 },
+    /// Where each dot was last.
+    FromLast,
+    /// The dots as they were followed into the frame.
+    Followed,
+}
 
 /// Matches blobs to dots; keeps its buffers.
 #[derive(Debug, Clone, Default)]
@@ -30,73 +49,11 @@ pub(super) struct BlobMatcher {
     /// Whether a blob is some dot's.
     pub taken: Vec<bool>,
     pairs: Vec<(f64, usize, usize)>,
+    /// Where each dot is looked from.
+    base: Vec<Option<DVec2>>,
+    component: Vec<u32>,
+    stack: Vec<usize>,
     buckets: Buckets,
-}
-
-/// Blobs by place.
-#[derive(Debug, Clone, Default)]
-struct Buckets {
-    across: usize,
-    down: usize,
-    starts: Vec<u32>,
-    items: Vec<u32>,
-}
-
-const BUCKET_PX: f64 = 16.0;
-
-impl Buckets {
-    fn fill(&mut self, blobs: &[DarkBlob], width: f64, height: f64) {
-        self.across = (width / BUCKET_PX).ceil().max(1.0) as usize;
-        self.down = (height / BUCKET_PX).ceil().max(1.0) as usize;
-        self.starts.clear();
-        self.starts.resize(self.across * self.down + 1, 0);
-        for blob in blobs {
-            let cell = self.cell(blob.at_px);
-            self.starts[cell + 1] += 1;
-        }
-        for i in 1..self.starts.len() {
-            self.starts[i] += self.starts[i - 1];
-        }
-        self.items.clear();
-        self.items.resize(blobs.len(), 0);
-        // From the back, each start ends up where it was.
-        for (index, blob) in blobs.iter().enumerate().rev() {
-            let cell = self.cell(blob.at_px);
-            self.starts[cell + 1] -= 1;
-            self.items[self.starts[cell + 1] as usize] = index as u32;
-        }
-        // Now starts[cell + 1] is the start of the cell: shift back.
-        for i in 1..self.starts.len() {
-            self.starts[i - 1] = self.starts[i];
-        }
-        if let Some(last) = self.starts.last_mut() {
-            *last = blobs.len() as u32;
-        }
-    }
-
-    fn cell(&self, at: DVec2) -> usize {
-        let clamp = |v: f64, end: usize| ((v / BUCKET_PX).max(0.0) as usize).min(end - 1);
-        clamp(at.y, self.down) * self.across + clamp(at.x, self.across)
-    }
-
-    /// The blobs in the cells around a place.
-    fn near(&self, at: DVec2, reach_px: f64) -> impl Iterator<Item = usize> + '_ {
-        let clamp = |v: f64, end: usize| ((v / BUCKET_PX).max(0.0) as usize).min(end - 1);
-        let (x0, x1) = (clamp(at.x - reach_px, self.across), clamp(at.x + reach_px, self.across));
-        let (y0, y1) = (clamp(at.y - reach_px, self.down), clamp(at.y + reach_px, self.down));
-        (y0..=y1)
-            .flat_map(move |y| {
-                let row = y * self.across;
-                self.starts[row + x0] as usize..self.starts[row + x1 + 1] as usize
-            })
-            .map(|slot| self.items[slot] as usize)
-    }
-}
-
-/// Where a dot is expected, all that is known of it taken together.
-fn prior(track: &DotTrack) -> Option<DVec2> {
-    let expected = track.expected_px.filter(|_| track.is_wanted())?;
-    Some(expected + track.displaced_px.unwrap_or(DVec2::ZERO))
 }
 
 impl BlobMatcher {
@@ -106,64 +63,173 @@ impl BlobMatcher {
             blob_of: Vec::with_capacity(dots),
             taken: Vec::with_capacity(blobs),
             pairs: Vec::with_capacity(dots),
-            buckets: Buckets {
-                across: 0,
-                down: 0,
-                starts: Vec::with_capacity(blobs / 4 + 2),
-                items: Vec::with_capacity(blobs),
-            },
+            base: Vec::with_capacity(dots),
+            component: Vec::with_capacity(dots),
+            stack: Vec::with_capacity(dots),
+            buckets: Buckets::new(blobs),
         }
     }
 
-    /// Fills [`BlobMatcher::blob_of`]; the answer does not depend on the order of dots or blobs but for exact ties.
-    pub fn match_blobs(
+    /// Takes in the blobs of a frame.
+    pub fn take(&mut self, blobs: &[DarkBlob], size: [usize; 2]) {
+        self.buckets.fill(blobs, size[0] as f64, size[1] as f64);
+    }
+
+    /// Fills [`BlobMatcher::blob_of`] with what one hypothesis leads to; the answer does not depend on the order of dots
+    /// or blobs but for exact ties.
+    ///
+    /// The largest group of dots that lie beside their places alike is taken first. From there the skin leads on: each
+    /// dot next to those in place is looked for where a plane through their displacements has it, the surest first.
+    pub fn grow(
         &mut self,
         blobs: &[DarkBlob],
         models: &[DotModel],
         tracks: &[DotTrack],
-        size: [usize; 2],
-    ) -> usize {
+        hypothesis: Hypothesis,
+    ) {
         self.blob_of.clear();
         self.blob_of.resize(models.len(), None);
         self.taken.clear();
         self.taken.resize(blobs.len(), false);
-        self.buckets.fill(blobs, size[0] as f64, size[1] as f64);
-        let offset = self.commonest_offset(blobs, models, tracks);
+        self.base.clear();
+        self.base.extend(tracks.iter().map(|track| {
+            match hypothesis {
+                Hypothesis::FromRest { .. } => track.expected_px.filter(|_| track.is_wanted()),
+                Hypothesis::Followed => track.now_px(),
+                Hypothesis::FromLast => track
+                    .expected_px
+                    .zip(track.displaced_px)
+                    .map(|(at, by)| at + by)
+                    .filter(|_| track.is_wanted()),
+            }
+        }));
+        let offset = match hypothesis {
+            Hypothesis::FromRest { step_px } => self.commonest_offset(blobs, models) + step_px,
+            Hypothesis::FromLast => self.commonest_offset(blobs, models),
+            Hypothesis::Followed => DVec2::ZERO,
+        };
         self.pairs.clear();
-        for (index, (model, track)) in models.iter().zip(tracks).enumerate() {
-            if let Some(at) = prior(track) {
+        for (index, model) in models.iter().enumerate() {
+            if let Some(at) = self.base[index] {
                 self.propose(blobs, model, index, at + offset, SEED_REACH);
             }
         }
-        self.take_best();
-        for round in 0..MAX_ROUNDS {
-            // Two neighbours in place first; when that ends, one will do.
-            let mut count = 0;
-            for needed in [2, 1] {
-                self.pairs.clear();
-                for (index, (model, track)) in models.iter().zip(tracks).enumerate() {
-                    let Some(at) = prior(track).filter(|_| self.blob_of[index].is_none()) else { continue };
-                    if let Some(lead) = self.lead(blobs, models, tracks, index, needed) {
-                        self.propose(blobs, model, index, at + lead, GROW_REACH);
+        self.take_best(f64::INFINITY);
+        if hypothesis == Hypothesis::Followed {
+            return;
+        }
+        self.keep_largest_group(blobs, models);
+        self.spread(blobs, models);
+        if matches!(hypothesis, Hypothesis::FromLast) {
+            // Dots that were not seen before: by where the skin at rest would have them.
+            for (base, track) in self.base.iter_mut().zip(tracks) {
+                *base = track.expected_px.filter(|_| track.is_wanted());
+            }
+            self.spread(blobs, models);
+        }
+    }
+
+    /// Of the dots in place, only the largest group in which each is beside its place as its neighbours are.
+    fn keep_largest_group(&mut self, blobs: &[DarkBlob], models: &[DotModel]) {
+        self.component.clear();
+        self.component.resize(models.len(), 0);
+        let (mut best, mut best_size, mut last) = (0, 0, 0);
+        for start in 0..models.len() {
+            if self.component[start] != 0 || self.blob_of[start].is_none() {
+                continue;
+            }
+            last += 1;
+            let mut size = 0;
+            self.component[start] = last;
+            self.stack.push(start);
+            while let Some(index) = self.stack.pop() {
+                size += 1;
+                let Some(own) = self.moved(blobs, index) else { continue };
+                for other in &models[index].neighbors {
+                    let alike = self
+                        .moved(blobs, *other)
+                        .is_some_and(|moved| moved.distance(own) < ALIKE * models[index].spacing_px);
+                    if alike && self.component[*other] == 0 {
+                        self.component[*other] = last;
+                        self.stack.push(*other);
                     }
                 }
-                count = self.take_best();
-                if count > 0 {
-                    break;
+            }
+            if size > best_size {
+                (best, best_size) = (last, size);
+            }
+        }
+        for index in 0..models.len() {
+            if self.component[index] != best
+                && let Some(blob) = self.blob_of[index].take()
+            {
+                self.taken[blob] = false;
+            }
+        }
+    }
+
+    /// By how much a dot's blob is beside its place.
+    fn moved(&self, blobs: &[DarkBlob], index: usize) -> Option<DVec2> {
+        Some(blobs[self.blob_of[index]?].at_px - self.base[index]?)
+    }
+
+    /// From the dots in place to all that the skin leads to.
+    fn spread(&mut self, blobs: &[DarkBlob], models: &[DotModel]) {
+        for _ in 0..MAX_ROUNDS {
+            self.pairs.clear();
+            for (index, model) in models.iter().enumerate() {
+                let Some(at) = self.base[index].filter(|_| self.blob_of[index].is_none()) else { continue };
+                let base = |other: usize| self.base[other];
+                let Some(lead) = skin::estimate(index, models, base, |other| self.moved(blobs, other)) else {
+                    continue;
+                };
+                self.propose(blobs, model, index, at + lead.displaced_px, GROW_REACH);
+                if lead.neighbors == 1
+                    && let Some(last) = self.pairs.last_mut().filter(|pair| pair.1 == index)
+                {
+                    last.0 += ONE_NEIGHBOR_COST;
                 }
             }
-            if count == 0 || round + 1 == MAX_ROUNDS {
+            // Sure ones first: they make the next ones surer.
+            let best = self.pairs.iter().map(|pair| pair.0).fold(f64::INFINITY, f64::min);
+            if self.take_best(2.0 * best.max(SURE)) == 0 {
                 break;
             }
         }
-        self.blob_of.iter().flatten().count()
+    }
+
+    /// How well the dots in place make one skin, as [`skin::smoothness`].
+    pub fn smoothness(&self, blobs: &[DarkBlob], models: &[DotModel], tracks: &[DotTrack]) -> f64 {
+        let at = |index: usize| tracks[index].expected_px;
+        skin::smoothness(models, at, |index| Some(blobs[self.blob_of[index]?].at_px - at(index)?))
+    }
+
+    /// Whether a blob is at the place of a dot that is none of the pattern's, by the dots in place around it.
+    pub fn has_blob_at(
+        &self,
+        blobs: &[DarkBlob],
+        models: &[DotModel],
+        model: &DotModel,
+        expected_px: DVec2,
+        tracks: &[DotTrack],
+    ) -> Option<bool> {
+        let place = |other: usize| tracks[other].expected_px;
+        let by = |other: usize| Some(blobs[self.blob_of[other]?].at_px - place(other)?);
+        let lead = skin::beside(model, expected_px, usize::MAX, models, place, by);
+        let at = expected_px + lead.filter(|lead| lead.neighbors >= 2)?.displaced_px;
+        let reach_px = GROW_REACH * model.spacing_px;
+        let is_dot = |blob: usize| {
+            let part = blobs[blob].area_px / model.outline.area_px;
+            blobs[blob].at_px.distance(at) < reach_px && (AREA_RATIO[0]..AREA_RATIO[1]).contains(&part)
+        };
+        Some(self.buckets.near(at, reach_px).any(is_dot))
     }
 
     /// The offset that most dots agree in: the fullest 3 x 3 cells of all offsets between a dot and the blobs around.
-    fn commonest_offset(&self, blobs: &[DarkBlob], models: &[DotModel], tracks: &[DotTrack]) -> DVec2 {
+    fn commonest_offset(&self, blobs: &[DarkBlob], models: &[DotModel]) -> DVec2 {
         let mut votes = [[0_u16; CELLS]; CELLS];
-        for (model, track) in models.iter().zip(tracks) {
-            let Some(at) = prior(track) else { continue };
+        for (model, base) in models.iter().zip(&self.base) {
+            let Some(at) = *base else { continue };
             // Beyond the spacing other dots would vote for the lattice's next fit.
             let reach = (0.75 * model.spacing_px).min(VOTE_HALF_PX - CELL_PX);
             for index in self.buckets.near(at, reach) {
@@ -195,25 +261,6 @@ impl BlobMatcher {
         offset
     }
 
-    /// Mean over the neighbours in place (at least `needed`) of their blob less where they were expected.
-    fn lead(
-        &self,
-        blobs: &[DarkBlob],
-        models: &[DotModel],
-        tracks: &[DotTrack],
-        index: usize,
-        needed: usize,
-    ) -> Option<DVec2> {
-        let (mut sum, mut count) = (DVec2::ZERO, 0);
-        for other in &models[index].neighbors {
-            if let (Some(blob), Some(at)) = (self.blob_of[*other], prior(&tracks[*other])) {
-                sum += blobs[blob].at_px - at;
-                count += 1;
-            }
-        }
-        (count >= needed).then(|| sum / f64::from(count as u32))
-    }
-
     fn propose(&mut self, blobs: &[DarkBlob], model: &DotModel, index: usize, at: DVec2, reach: f64) {
         let reach_px = reach * model.spacing_px;
         let mut best: Option<(f64, usize)> = None;
@@ -231,12 +278,12 @@ impl BlobMatcher {
         }
     }
 
-    /// Of the proposed pairs the nearest first; returns how many were taken.
-    fn take_best(&mut self) -> usize {
+    /// Of the proposed pairs up to a cost the best first; returns how many were taken.
+    fn take_best(&mut self, max_cost: f64) -> usize {
         self.pairs.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut count = 0;
-        for (_, dot, blob) in &self.pairs {
-            if !self.taken[*blob] && self.blob_of[*dot].is_none() {
+        for (cost, dot, blob) in &self.pairs {
+            if *cost <= max_cost && !self.taken[*blob] && self.blob_of[*dot].is_none() {
                 self.taken[*blob] = true;
                 self.blob_of[*dot] = Some(*blob);
                 count += 1;
@@ -279,7 +326,9 @@ mod tests {
         let missing = [8, 21];
         let (models, tracks, blobs) = scene(&missing);
         let mut matcher = BlobMatcher::new(30, 64);
-        assert_eq!(matcher.match_blobs(&blobs, &models, &tracks, [200, 160]), 28);
+        matcher.take(&blobs, [200, 160]);
+        matcher.grow(&blobs, &models, &tracks, Hypothesis::FromRest { step_px: DVec2::ZERO });
+        assert_eq!(matcher.blob_of.iter().flatten().count(), 28);
         for (dot, blob) in matcher.blob_of.iter().enumerate() {
             let Some(blob) = blob else {
                 assert!(missing.contains(&dot));
@@ -295,7 +344,8 @@ mod tests {
     fn a_blob_between_dots_that_are_found_is_a_false_dot() {
         let (models, mut tracks, mut blobs) = scene(&[]);
         let mut matcher = BlobMatcher::new(30, 64);
-        matcher.match_blobs(&blobs, &models, &tracks, [200, 160]);
+        matcher.take(&blobs, [200, 160]);
+        matcher.grow(&blobs, &models, &tracks, Hypothesis::FromRest { step_px: DVec2::ZERO });
         for (track, blob) in tracks.iter_mut().zip(&matcher.blob_of) {
             track.spot = blob.map(|blob| crate::track::marks::DarkSpot {
                 at_px: blobs[blob].at_px,

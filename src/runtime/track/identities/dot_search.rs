@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::dot_track::DotTrack;
+use super::skin;
 use crate::track::frame::Plane;
 use crate::track::marks::{DarkSpot, Flow, MarkState, SpotFault, SpotMeter};
 use crate::track::model::DotModel;
@@ -16,9 +17,9 @@ const NEIGHBOR_REACH: f64 = 0.35;
 const ONE_BLOB: f64 = 0.3;
 /// Two starts nearer than this part of the spacing lead to the same spot.
 const SAME_PLACE: f64 = 0.25;
-/// How far a dot's displacement may differ from the mean of its neighbours', in parts of its spacing: a neighbour's blob
-/// is one spacing off, a dome's own folds are less.
-const MAX_TORN: f64 = 0.65;
+/// A dot's displacement that differs by less than this from the mean of its neighbours', in parts of its spacing, is that
+/// of the skin; beyond, the skin is asked as a plane through the dots around.
+const SURELY_SMOOTH: f64 = 0.3;
 /// How far a dot's motion may differ from its neighbours', in parts of its spacing.
 const MAX_UNLIKE: f64 = 0.4;
 /// Rounds in which found dots lead to their neighbours.
@@ -90,7 +91,10 @@ impl DotSearch<'_, '_> {
                 let Some(expected) = track.expected_px.filter(|_| count > 0) else { continue };
                 let spacing = self.models[index].spacing_px;
                 let guess = expected + track.displaced_px.map_or(displaced, |own| own + moved);
-                let starts = [guess, expected + displaced];
+                let at = |other: usize| self.tracks[other].expected_px;
+                let by = |other: usize| Some(self.tracks[other].now_px()? - self.tracks[other].expected_px?);
+                let lead = skin::estimate(index, self.models, at, by);
+                let starts = [expected + lead.map_or(displaced, |lead| lead.displaced_px), guess];
                 for start in starts {
                     // What was no spot from there is none from there again.
                     let again = track.start_px.is_some_and(|p| p.distance(start) < SAME_PLACE * spacing);
@@ -123,8 +127,10 @@ impl DotSearch<'_, '_> {
         !self.tracks.iter().enumerate().any(other)
     }
 
-    /// Two dots in one place are neither; a dot that moved unlike all its neighbours is another one's blob.
-    pub fn check(&mut self) {
+    /// Two dots in one place are neither; a dot that moved unlike all its neighbours, or where the skin could not have it,
+    /// is another one's blob. Returns how many were so.
+    pub fn check(&mut self) -> usize {
+        let mut torn_dots = 0;
         self.order.clear();
         self.order.extend((0..self.tracks.len()).filter(|i| self.tracks[*i].spot.is_some()));
         let x = |track: &DotTrack| track.now_px().map_or(0.0, |p| p.x);
@@ -152,13 +158,18 @@ impl DotSearch<'_, '_> {
             let spacing = self.models[index].spacing_px;
             let unlike = (now - start).distance(moved) > MAX_UNLIKE * spacing;
             let own = track.expected_px.map_or(displaced, |expected| now - expected);
-            let torn = own.distance(displaced) > MAX_TORN * spacing;
+            let at = |other: usize| self.tracks[other].expected_px;
+            let by = |other: usize| Some(self.tracks[other].now_px()? - self.tracks[other].expected_px?);
+            let rough = own.distance(displaced) > SURELY_SMOOTH * spacing;
+            let torn = rough && skin::is_torn(index, self.models, at, by);
             if count >= 2 && (unlike || torn) {
+                torn_dots += 1;
                 let track = &mut self.tracks[index];
-                track.lose(track.absent());
+                track.lose(if torn { MarkState::IdentityUnsure } else { track.absent() });
                 // Where it was is not where it is to be looked for.
                 track.displaced_px = None;
             }
         }
+        torn_dots
     }
 }

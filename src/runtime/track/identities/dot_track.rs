@@ -23,6 +23,8 @@ pub(in crate::track) struct DotTrack {
     pub start_px: Option<DVec2>,
     pub state: MarkState,
     pub ever_seen: bool,
+    /// Whether the last search left open which dot it is.
+    pub is_unsure: bool,
     pub spot: Option<DarkSpot>,
 }
 

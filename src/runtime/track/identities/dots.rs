@@ -3,13 +3,15 @@
 use glam::DVec2;
 
 use super::blob_matching::BlobMatcher;
+use super::choice::IdentityChoice;
 use super::dot_prediction::DotPrediction;
 use super::dot_search::DotSearch;
 use super::dot_track::DotTrack;
 use super::false_dots::{MAX_FALSE_DOTS, find_false_dots};
+use super::key_check::{KeyCheck, KeyFrame, Orientation};
 use crate::track::frame::{Mask, Plane};
 use crate::track::marks::{BlobScan, DarkBlob, Flow, ScanSettings, SpotMeter};
-use crate::track::model::DotModel;
+use crate::track::model::{DotModel, SensorModel};
 use crate::track::options::{FollowMethod, Thresholds, TrackOptions};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
@@ -20,6 +22,10 @@ const RADIUS_RATIO: [f64; 2] = [0.6, 1.6];
 const MIN_BLOB_CONTRAST: f32 = 0.12;
 /// Blobs that the search of the whole frame can hold.
 const MAX_BLOBS: usize = 1 << 15;
+/// One in so many dots lost between two frames calls for a search of the whole frame.
+const SUDDENLY_LOST: usize = 80;
+/// Frames between two searches while it is open which dot some blobs are.
+const OPEN_EVERY: u32 = 5;
 /// A blob's dot is at most this far from it, in parts of its spacing.
 const BLOB_REACH: f64 = 0.3;
 
@@ -27,7 +33,7 @@ const BLOB_REACH: f64 = 0.3;
 pub(in crate::track) struct DotFrame<'a, 'b> {
     pub plane: &'a Plane<'b>,
     pub mask: &'a Mask,
-    pub models: &'a [DotModel],
+    pub model: &'a SensorModel,
     /// At the pose.
     pub optics: &'a SensorOptics,
     /// The platform's pose; `None` before the first one is found.
@@ -42,6 +48,8 @@ pub(in crate::track) struct DotsFound<'a> {
     /// Whether the whole frame was searched, and the blobs in it that are no dots.
     pub searched: bool,
     pub false_dots: &'a [DVec2],
+    /// How the picture lies against the constants' camera.
+    pub orientation: Orientation,
 }
 
 /// Dots and the buffers of their search.
@@ -95,18 +103,21 @@ pub(in crate::track) struct DotIdentities {
     scan: BlobScan,
     scan_settings: ScanSettings,
     matcher: BlobMatcher,
+    choice: IdentityChoice,
     search_every: u32,
     since_search: u32,
     searched: bool,
     false_dots: Vec<DVec2>,
+    key: KeyCheck,
 }
 
 impl DotIdentities {
     /// For the dots of a sensor, in frames of one size.
-    pub fn new(models: &[DotModel], [width, height]: [usize; 2], options: &TrackOptions) -> Self {
+    pub fn new(model: &SensorModel, [width, height]: [usize; 2], options: &TrackOptions) -> Self {
+        let models = &model.dots;
         let mut meter = SpotMeter::default();
         let [smallest, largest] = RADIUS_RATIO;
-        for model in models {
+        for model in models.iter().chain(model.key.as_ref().map(|key| &key.dot)) {
             let mut radius = smallest * model.outline.radius_px;
             while radius < largest * model.outline.radius_px {
                 meter.prepare(radius);
@@ -133,16 +144,19 @@ impl DotIdentities {
                 min_contrast: MIN_BLOB_CONTRAST,
             },
             matcher: BlobMatcher::new(count, MAX_BLOBS),
+            choice: IdentityChoice::new(count),
             search_every: options.search_every,
             since_search: u32::MAX,
             searched: false,
             false_dots: Vec::with_capacity(MAX_FALSE_DOTS),
+            key: KeyCheck::new(options.camera_turned_rad.is_some(), width, height),
         }
     }
 
     /// Finds the dots of the next frame.
     pub fn find(&mut self, frame: &DotFrame<'_, '_>) -> DotsFound<'_> {
-        let &DotFrame { plane, mask, models, optics, ref pose } = frame;
+        let &DotFrame { plane, mask, model, optics, ref pose } = frame;
+        let models = &model.dots;
         self.searched = false;
         self.false_dots.clear();
         if let Some(flow) = &mut self.flow {
@@ -152,48 +166,85 @@ impl DotIdentities {
         match pose {
             Some(pose) => {
                 self.prediction.predict(pose, optics, mask, models, &mut self.dots.tracks);
-                self.find_predicted(plane, mask, models);
+                self.find_predicted(frame);
             }
             None => self.dots.tracks.iter_mut().for_each(|track| track.spot = None),
+        }
+        if let Some(key) = &model.key
+            && !self.key.is_sure()
+        {
+            let Dots { meter, tracks, .. } = &mut self.dots;
+            self.key.test(&mut KeyFrame { plane, meter, key, models, tracks, optics });
+            if self.key.wants_search() {
+                let blobs = self.scan.dark_blobs(plane, |y| mask.span(y), &self.scan_settings);
+                self.key.search(blobs.unwrap_or_default(), key, models, model.optics.lens().spec());
+            }
         }
         self.dots.tracks.iter_mut().for_each(DotTrack::remember);
         self.now()
     }
 
-    fn find_predicted(&mut self, plane: &Plane<'_>, mask: &Mask, models: &[DotModel]) {
+    fn find_predicted(&mut self, frame: &DotFrame<'_, '_>) {
+        let models = &frame.model.dots;
         let wanted = self.dots.tracks.iter().filter(|t| t.is_wanted());
         let (known, wanted) =
             wanted.fold((0, 0), |(known, all), t| (known + usize::from(t.displaced_px.is_some()), all + 1));
-        let mut search = self.dots.search(plane, models);
+        let mut search = self.dots.search(frame.plane, models);
         search.follow(self.flow.as_ref());
         search.spread();
-        search.check();
+        let torn = search.check();
         let found = self.dots.found();
         self.since_search = self.since_search.saturating_add(1);
         let few = 4 * found < 3 * known.max(1) || (known == 0 && wanted > 0);
+        // What moved by half of the spacing or more between two frames leaves gaps around it, or fills the key's.
+        let lost =
+            self.dots.tracks.iter().filter(|t| t.is_wanted() && t.last_px.is_some() && t.spot.is_none());
+        let has_jumped = lost.count() > (known / SUDDENLY_LOST).max(1) || torn > 0;
+        let is_open = self.since_search >= OPEN_EVERY && self.dots.tracks.iter().any(|t| t.is_unsure);
+        let is_filled = self.is_key_filled(frame);
         let due = self.search_every > 0 && self.since_search >= self.search_every;
-        if few || due {
-            self.search_frame(plane, mask, models, few);
+        let identify = few || has_jumped || is_filled || is_open;
+        if identify || due {
+            self.search_frame(frame, identify, is_filled);
         }
     }
 
+    /// Whether a dot is where the key's gap was a frame ago.
+    fn is_key_filled(&mut self, frame: &DotFrame<'_, '_>) -> bool {
+        let Some(key) = &frame.model.key else { return false };
+        let (plane, models, optics) = (frame.plane, frame.model.dots.as_slice(), frame.optics);
+        let Dots { meter, tracks, .. } = &mut self.dots;
+        self.key.is_filled(&mut KeyFrame { plane, meter, key, models, tracks, optics })
+    }
+
     /// The whole frame: for dots that were not found where they should be, and for blobs that are no dots.
-    fn search_frame(&mut self, plane: &Plane<'_>, mask: &Mask, models: &[DotModel], identify: bool) {
+    fn search_frame(&mut self, frame: &DotFrame<'_, '_>, identify: bool, is_filled: bool) {
+        let &DotFrame { plane, mask, model, optics, .. } = frame;
+        let models = &model.dots;
         let blobs = self.scan.dark_blobs(plane, |y| mask.span(y), &self.scan_settings);
         // More blobs than dots could make are noise. Nothing is known of false dots then.
         let Some(blobs) = blobs else { return };
         self.since_search = 0;
         self.searched = true;
         if identify {
-            let size = [plane.width(), plane.height()];
-            let count = self.matcher.match_blobs(blobs, models, &self.dots.tracks, size);
-            if count > self.dots.found() {
-                let matched = &self.matcher.blob_of;
+            let key_px = model.key.as_ref().and_then(|key| optics.project(key.dot.surface_mm).ok());
+            self.matcher.take(blobs, [plane.width(), plane.height()]);
+            self.choice.choose(&mut self.matcher, blobs, model, &self.dots.tracks, key_px);
+            if self.choice.is_new {
+                let matched = &self.choice.blob_of;
                 let at = |blob: usize| blobs.get(blob).map(|blob: &DarkBlob| blob.at_px);
                 self.dots.measure_at(plane, models, |dot| matched.get(dot).copied().flatten().and_then(at));
                 let mut search = self.dots.search(plane, models);
                 search.spread();
                 search.check();
+                // Numbers are given anew: the key is asked again.
+                self.key.forget();
+            } else if is_filled {
+                // No other numbering is better: it is dirt.
+                self.key.look_away();
+            }
+            for (track, is_unsure) in self.dots.tracks.iter_mut().zip(&self.choice.is_unsure) {
+                track.is_unsure = *is_unsure;
             }
         }
         find_false_dots(blobs, models, &self.dots.tracks, &mut self.false_dots);
@@ -212,7 +263,12 @@ impl DotIdentities {
     }
 
     fn now(&self) -> DotsFound<'_> {
-        DotsFound { tracks: &self.dots.tracks, searched: self.searched, false_dots: &self.false_dots }
+        DotsFound {
+            tracks: &self.dots.tracks,
+            searched: self.searched,
+            false_dots: &self.false_dots,
+            orientation: self.key.orientation(),
+        }
     }
 
     /// The last frame does not count: the next one has nothing to be followed from.
@@ -228,5 +284,6 @@ impl DotIdentities {
         self.forget_last();
         self.dots.tracks.fill(DotTrack::default());
         self.prediction = DotPrediction::default();
+        self.key.restart();
     }
 }

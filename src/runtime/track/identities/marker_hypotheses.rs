@@ -13,6 +13,9 @@ const PLACES: usize = 12;
 /// Combinations that are tried.
 const MAX_COMBINATIONS: usize = 96;
 
+/// A disc for each of four markers, by its rank; `None`: the marker is not used.
+pub(in crate::track) type Choice = [Option<usize>; 4];
+
 /// Views of the four markers at several poses: a platform pressed down shows them larger.
 pub(in crate::track) type Views = [[Option<MarkerView>; 4]; 3];
 
@@ -45,9 +48,9 @@ impl MarkerHypotheses {
         Self { discs }
     }
 
-    /// Whether there is a disc for every marker.
-    pub fn is_complete(&self) -> bool {
-        self.discs.iter().all(|discs| discs[0].is_some())
+    /// Whether there is a disc that a marker may be.
+    pub fn is_seen(&self, marker: usize) -> bool {
+        self.disc(marker, 0).is_some()
     }
 
     /// A marker's disc by its rank.
@@ -55,15 +58,21 @@ impl MarkerHypotheses {
         self.discs.get(marker)?.get(rank).copied().flatten()
     }
 
-    /// Combinations of one disc for each marker, each as the discs' ranks, the likeliest first: by the sum of the ranks,
-    /// which comes with them. At most [`MAX_COMBINATIONS`].
-    pub fn combinations(&self) -> impl Iterator<Item = (usize, [usize; 4])> + use<'_> {
+    /// Combinations of one disc for each marker that has any, but for one that is left out, each as the discs' ranks, the
+    /// likeliest first: by the sum of the ranks, which comes with them. At most [`MAX_COMBINATIONS`].
+    pub fn combinations(&self, left_out: Option<usize>) -> impl Iterator<Item = (usize, Choice)> + use<'_> {
+        let absent = move |marker: usize| left_out == Some(marker) || !self.is_seen(marker);
         (0..=4 * (DISCS - 1))
             .flat_map(|sum| (0..DISCS.pow(4)).map(move |code| (sum, code)))
             .map(|(sum, code)| (sum, std::array::from_fn(|i| code / DISCS.pow(i as u32) % DISCS)))
-            .filter(|(sum, ranks): &(usize, [usize; 4])| {
-                ranks.iter().sum::<usize>() == *sum
-                    && ranks.iter().enumerate().all(|(marker, rank)| self.disc(marker, *rank).is_some())
+            .filter(move |(sum, ranks): &(usize, [usize; 4])| {
+                let is_there = |(marker, rank): (usize, &usize)| {
+                    if absent(marker) { *rank == 0 } else { self.disc(marker, *rank).is_some() }
+                };
+                ranks.iter().sum::<usize>() == *sum && ranks.iter().enumerate().all(is_there)
+            })
+            .map(move |(sum, ranks)| {
+                (sum, std::array::from_fn(|marker| (!absent(marker)).then_some(ranks[marker])))
             })
             .take(MAX_COMBINATIONS)
     }
@@ -78,15 +87,23 @@ mod tests {
         let disc =
             FittedDisc { centroid_px: DVec2::ZERO, sd_px: 0.1, misfit: 0.1, levels: [1.0; 3], shading: None };
         let some = Some(disc);
-        let all = |discs| MarkerHypotheses { discs }.combinations().collect::<Vec<_>>();
+        let all = |discs| MarkerHypotheses { discs }.combinations(None).collect::<Vec<_>>();
         let found = all([[some, some, None, None], [some, None, None, None], [some; 4], [some; 4]]);
         assert_eq!(found.len(), 2 * 4 * 4);
-        assert_eq!(found[0], (0, [0; 4]));
+        assert_eq!(found[0], (0, [Some(0); 4]));
         assert!(found.is_sorted_by_key(|(sum, _)| *sum));
-        assert!(found.iter().all(|(sum, ranks)| ranks.iter().sum::<usize>() == *sum && ranks[1] == 0));
+        assert!(
+            found
+                .iter()
+                .all(|(sum, ranks)| ranks.iter().flatten().sum::<usize>() == *sum && ranks[1] == Some(0))
+        );
         assert_eq!(all([[some; 4]; 4]).len(), MAX_COMBINATIONS);
         let none = MarkerHypotheses { discs: [[some; 4], [None; 4], [some; 4], [some; 4]] };
-        assert!(!none.is_complete());
-        assert_eq!(none.combinations().count(), 0);
+        assert!(!none.is_seen(1) && none.is_seen(0));
+        // Three markers are combined without the fourth, whether it is not seen or left out.
+        assert!(none.combinations(None).all(|(_, ranks)| ranks[1].is_none() && ranks[2].is_some()));
+        let three = MarkerHypotheses { discs: [[some; 4]; 4] };
+        assert!(three.combinations(Some(2)).all(|(_, ranks)| ranks[2].is_none() && ranks[1].is_some()));
+        assert_eq!(three.combinations(Some(2)).count(), 4 * 4 * 4);
     }
 }

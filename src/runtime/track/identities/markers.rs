@@ -1,6 +1,6 @@
 //! The white markers of one frame, where a pose puts them.
 
-use super::marker_hypotheses::{MarkerHypotheses, Views};
+use super::marker_hypotheses::{Choice, MarkerHypotheses, Views};
 use crate::track::frame::Plane;
 use crate::track::marks::{Candidate, FIT_REACH_PX, FittedDisc, MarkerView, ShadingSlope};
 use crate::track::model::MarkerModels;
@@ -109,14 +109,14 @@ impl MarkerIdentities {
     /// of each are taken as found.
     pub fn find_anywhere(&mut self, frame: &MarkerFrame<'_, '_>, views: &Views) -> MarkerHypotheses {
         let hypotheses = MarkerHypotheses::propose(frame.plane, frame.models, frame.white, views);
-        self.choose(&hypotheses, [0; 4]);
+        self.choose(&hypotheses, [Some(0); 4]);
         hypotheses
     }
 
-    /// Takes one disc for each marker.
-    pub fn choose(&mut self, hypotheses: &MarkerHypotheses, choice: [usize; 4]) {
+    /// Takes one disc for each marker that is used.
+    pub fn choose(&mut self, hypotheses: &MarkerHypotheses, choice: Choice) {
         for (index, (disc, rank)) in self.discs.iter_mut().zip(choice).enumerate() {
-            *disc = hypotheses.disc(index, rank);
+            *disc = rank.and_then(|rank| hypotheses.disc(index, rank));
         }
     }
 

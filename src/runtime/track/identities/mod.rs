@@ -5,16 +5,21 @@
 //! and [`DotsFound`], a [`DotTrack`] for each dot.
 
 mod blob_matching;
+mod buckets;
+mod choice;
 mod dot_prediction;
 mod dot_search;
 mod dot_track;
 mod dots;
 mod false_dots;
+mod key_check;
 mod marker_hypotheses;
 mod markers;
+mod skin;
 
 pub(super) use dot_track::DotTrack;
 pub(super) use dots::{DotFrame, DotIdentities, DotsFound};
 pub use false_dots::MAX_FALSE_DOTS;
-pub(super) use marker_hypotheses::MarkerHypotheses;
+pub use key_check::{CameraTurn, Orientation};
+pub(super) use marker_hypotheses::{Choice, MarkerHypotheses};
 pub(super) use markers::{MarkerFrame, MarkerIdentities};

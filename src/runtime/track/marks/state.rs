@@ -12,6 +12,8 @@ pub enum MarkState {
     Lost,
     /// Run together with another one.
     Merged,
+    /// Seen, but it is not clear which mark it is.
+    IdentityUnsure,
     /// Outside of the mask or of the camera's view at this pose.
     Hidden,
 }
@@ -24,6 +26,7 @@ impl MarkState {
             Self::Missing => "missing",
             Self::Lost => "lost",
             Self::Merged => "merged",
+            Self::IdentityUnsure => "identity_unsure",
             Self::Hidden => "hidden",
         }
     }

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::constants::{BlackDot, Constants};
+use crate::constants::{BlackDot, Constants, KeyImageConstants};
 use crate::track::error::TrackError;
 use crate::track::marks::{MAX_RADIUS_PX, SpotOutline};
 use domecast_optics::SensorOptics;
@@ -25,6 +25,8 @@ pub(in crate::track) struct DotModel {
     pub neighbors: Vec<usize>,
     /// Distance to the nearest neighbour in the image at rest, px.
     pub spacing_px: f64,
+    /// Image of its centre at rest, px.
+    pub rest_px: DVec2,
 }
 
 /// Area, largest radius and spread of an outline of eight points about its centroid.
@@ -64,6 +66,61 @@ impl DotModel {
     }
 }
 
+/// The dot that a symmetric pattern leaves out, and the dots where a turned or mirrored picture shows the gap.
+#[derive(Debug, Clone)]
+pub(in crate::track) struct KeyModel {
+    /// The dot as it would be.
+    pub dot: DotModel,
+    /// Turn of the picture from image x towards image y, rad; whether it was mirrored before; number in the list of
+    /// dots.
+    pub images: Vec<(f64, bool, usize)>,
+}
+
+/// The key of constants that have one.
+pub(super) fn key_of(
+    constants: &Constants,
+    optics: &SensorOptics,
+    dots: &[DotModel],
+) -> Result<Option<KeyModel>, TrackError> {
+    let Some(key) = &constants.key else { return Ok(None) };
+    let find = |id: usize, field: &str| {
+        let found = dots.iter().position(|dot| dot.id as usize == id);
+        found.ok_or_else(|| TrackError::at(field, format!("names dot {id}, which is not there")))
+    };
+    let surface_mm = DVec3::from_array(key.surface_mm);
+    let Ok(rest_px) = optics.project(surface_mm) else {
+        return Err(TrackError::at("key.surface_mm", "is not seen at rest through these lens and layers"));
+    };
+    let neighbors =
+        key.neighbors.iter().map(|id| find(*id, "key.neighbors")).collect::<Result<Vec<_>, _>>()?;
+    let near = neighbors.iter().map(|n| dots[*n].rest_px.distance(rest_px));
+    let spacing_px = near.fold(f64::INFINITY, f64::min);
+    let mut dot = DotModel {
+        id: u32::MAX,
+        surface_mm,
+        radius_mm: 0.5 * key.diameter_mm,
+        outline: SpotOutline::default(),
+        neighbors,
+        spacing_px,
+        rest_px,
+    };
+    let outline = dot.image_at(optics, rest_px).map(|(_, outline)| outline);
+    let fits = |outline: &SpotOutline| outline.radius_px > 0.0 && outline.radius_px <= MAX_RADIUS_PX;
+    let Some(outline) = outline.filter(fits).filter(|_| spacing_px.is_finite() && spacing_px > 0.0) else {
+        return Err(TrackError::at("key", "has no neighbours, or an image that is no dot's"));
+    };
+    dot.outline = outline;
+    let image = |image: &KeyImageConstants| {
+        let turned_rad = image.turned_deg.to_radians();
+        if !turned_rad.is_finite() {
+            return Err(TrackError::at("key.images", "have a turn that is no number"));
+        }
+        Ok((turned_rad, image.mirrored, find(image.dot, "key.images")?))
+    };
+    let images = key.images.iter().map(image).collect::<Result<Vec<_>, _>>()?;
+    Ok(Some(KeyModel { dot, images }))
+}
+
 pub(super) fn dots_of(constants: &Constants, optics: &SensorOptics) -> Result<Vec<DotModel>, TrackError> {
     let given = &constants.black_dots;
     let fault = |index: usize, part: &str, problem: String| {
@@ -94,6 +151,7 @@ pub(super) fn dots_of(constants: &Constants, optics: &SensorOptics) -> Result<Ve
             outline: SpotOutline::default(),
             neighbors: neighbors_of(dot, index, &by_id)?,
             spacing_px: f64::INFINITY,
+            rest_px: center_px,
         };
         match model.image_at(optics, center_px) {
             Some((_, outline)) if outline.radius_px > 0.0 && outline.radius_px <= MAX_RADIUS_PX => {
@@ -107,8 +165,7 @@ pub(super) fn dots_of(constants: &Constants, optics: &SensorOptics) -> Result<Ve
         }
         dots.push(model);
     }
-    let places: Vec<DVec2> =
-        dots.iter().map(|d| optics.project(d.surface_mm).unwrap_or(DVec2::ZERO)).collect();
+    let places: Vec<DVec2> = dots.iter().map(|d| d.rest_px).collect();
     for index in 0..dots.len() {
         let near = dots[index].neighbors.iter().map(|n| places[*n].distance(places[index]));
         let nearest = near.fold(f64::INFINITY, f64::min);
@@ -152,6 +209,7 @@ impl DotModel {
             outline,
             neighbors: neighbors(index % columns, index / columns),
             spacing_px,
+            rest_px: DVec2::new((index % columns) as f64, (index / columns) as f64) * spacing_px,
         };
         (0..columns * rows).map(dot).collect()
     }

@@ -4,6 +4,6 @@ mod dots;
 mod markers;
 mod sensor;
 
-pub(super) use dots::DotModel;
+pub(super) use dots::{DotModel, KeyModel};
 pub(super) use markers::MarkerModels;
 pub(super) use sensor::SensorModel;

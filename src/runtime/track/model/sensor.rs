@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::dots::{DotModel, dots_of};
+use super::dots::{DotModel, KeyModel, dots_of, key_of};
 use super::markers::MarkerModels;
 use crate::constants::Constants;
 use crate::track::error::TrackError;
@@ -23,6 +23,8 @@ pub(in crate::track) struct SensorModel {
     /// At rest.
     pub optics: SensorOptics,
     pub dots: Vec<DotModel>,
+    /// The dot that is left out, where the constants name one.
+    pub key: Option<KeyModel>,
     pub markers: MarkerModels,
     /// Farthest that the platform can be pressed, mm.
     pub max_press_mm: f64,
@@ -61,10 +63,11 @@ impl SensorModel {
             Some(PoseSolver::new(&optics, &constants.markers(), options).map_err(unusable)?)
         };
         let dots = dots_of(constants, &optics)?;
+        let key = key_of(constants, &optics, &dots)?;
         let max_press_mm = press_mm.unwrap_or(DEFAULT_MAX_PRESS_MM).clamp(0.0, 100.0);
         let markers = MarkerModels::new(constants, &optics, at_mm, max_press_mm)?;
         let mask = Mask::new(optics.lens(), camera, mask);
-        Ok(Self { optics, dots, markers, max_press_mm, solver, mask })
+        Ok(Self { optics, dots, key, markers, max_press_mm, solver, mask })
     }
 }
 

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::refine::{MarkerSighting, RefinedPose, refine};
 use super::residual_scale::ResidualScale;
-use crate::track::identities::{MarkerFrame, MarkerHypotheses, MarkerIdentities};
+use crate::track::identities::{Choice, MarkerFrame, MarkerHypotheses, MarkerIdentities};
 use crate::track::marks::MarkerView;
 use crate::track::model::SensorModel;
 use domecast_optics::SensorOptics;
@@ -13,8 +13,15 @@ use domecast_optics::pose::Sighting;
 
 /// A pose farther from rest than this is none, mm.
 const MAX_TRANSLATION_MM: f64 = 20.0;
+/// A pose turned farther from rest than this is none, rad: it is the camera that is turned.
+const MAX_TURN_RAD: f64 = 0.4;
 /// Discs that fit within this part of the largest residual need no rivals.
 const CLEAR_PART: f64 = 0.25;
+/// Combinations of three markers that are tried for each one left out.
+const MAX_TRIPLES: usize = 12;
+/// A dot is dark where its level is below this part of the levels around; this share of the dots must be.
+const DARK: f64 = 0.85;
+const MIN_DARK_SHARE: f64 = 0.5;
 /// Parts of the deepest press at which a marker is looked at before there is a pose.
 const PRESSED_PARTS: [f64; 3] = [0.0, 0.5, 1.0];
 
@@ -169,7 +176,8 @@ impl PoseFinder {
             disc.map(|d| MarkerSighting { marker: *marker, centroid_px: d.centroid_px, sd_px: d.sd_px })
         }));
         let refined = refine(&mut self.optics, &self.sightings, start)?;
-        let near = refined.pose.translation_mm.length() < MAX_TRANSLATION_MM;
+        let cosine = 0.5 * (refined.pose.rotation.to_cols_array().iter().step_by(4).sum::<f64>() - 1.0);
+        let near = refined.pose.translation_mm.length() < MAX_TRANSLATION_MM && cosine > MAX_TURN_RAD.cos();
         (refined.rms_px <= self.max_residual_px && near).then_some(refined)
     }
 
@@ -230,14 +238,16 @@ impl PoseFinder {
             }
         }
         let hypotheses = markers.find_anywhere(frame, &views);
-        if !hypotheses.is_complete() {
-            return None;
-        }
-        let coarse = self.best_of(frame, &hypotheses, markers)?;
+        let coarse = self
+            .best_of(frame, &hypotheses, markers)
+            .or_else(|| self.best_of_three(frame, model, &hypotheses, markers))?;
         // Fitted again as they look from there; and asked whether another pose fits as well.
         self.optics.move_to(&coarse.pose).ok()?;
         markers.refit(frame, &self.optics);
         let refined = self.refine(frame, markers, &coarse.pose)?;
+        if self.sightings.len() < 4 {
+            return Some(refined);
+        }
         let mut sightings = [Sighting { id: 0, centroid_px: DVec2::ZERO }; 4];
         for (to, from) in sightings.iter_mut().zip(&self.sightings) {
             *to = Sighting { id: from.marker.id, centroid_px: from.centroid_px };
@@ -254,9 +264,12 @@ impl PoseFinder {
         hypotheses: &MarkerHypotheses,
         markers: &mut MarkerIdentities,
     ) -> Option<RefinedPose> {
-        let mut best: Option<(RefinedPose, [usize; 4])> = None;
+        let mut best: Option<(RefinedPose, Choice)> = None;
+        if !(0..4).all(|marker| hypotheses.is_seen(marker)) {
+            return None;
+        }
         let mut last_rank = 0;
-        for (rank, choice) in hypotheses.combinations() {
+        for (rank, choice) in hypotheses.combinations(None) {
             // The first choices fitting well need no rivals.
             let clear = best.as_ref().is_some_and(|(b, _)| b.rms_px < CLEAR_PART * self.max_residual_px);
             if rank > last_rank && clear {
@@ -270,7 +283,52 @@ impl PoseFinder {
                 best = Some((refined, choice));
             }
         }
-        markers.choose(hypotheses, best.as_ref().map_or([0; 4], |(_, choice)| *choice));
+        markers.choose(hypotheses, best.as_ref().map_or([Some(0); 4], |(_, choice)| *choice));
         best.map(|(refined, _)| refined)
+    }
+
+    /// Three markers, where the fourth is hidden or what is taken for it fits no pose. Any three places fit some pose, so
+    /// the dots decide: the pose counts that puts most of them where it is dark.
+    fn best_of_three(
+        &mut self,
+        frame: &MarkerFrame<'_, '_>,
+        model: &SensorModel,
+        hypotheses: &MarkerHypotheses,
+        markers: &mut MarkerIdentities,
+    ) -> Option<RefinedPose> {
+        let seen = (0..4).filter(|marker| hypotheses.is_seen(*marker)).count();
+        let mut best: Option<(f64, RefinedPose, Choice)> = None;
+        for left_out in (0..4).filter(|marker| seen == 4 || (seen == 3 && !hypotheses.is_seen(*marker))) {
+            for (_, choice) in hypotheses.combinations(Some(left_out)).take(MAX_TRIPLES) {
+                markers.choose(hypotheses, choice);
+                let Some(refined) = self.refine(frame, markers, &Rigid::identity()) else { continue };
+                let share = self.dark_share(frame, model);
+                if share >= MIN_DARK_SHARE && best.as_ref().is_none_or(|(so_far, ..)| share > *so_far) {
+                    best = Some((share, refined, choice));
+                }
+            }
+        }
+        let (found, choice) =
+            best.map_or((None, [Some(0); 4]), |(_, refined, choice)| (Some(refined), choice));
+        markers.choose(hypotheses, choice);
+        found
+    }
+
+    /// The share of the dots that the optics put where the frame is darker than half a spacing beside.
+    fn dark_share(&self, frame: &MarkerFrame<'_, '_>, model: &SensorModel) -> f64 {
+        let level = |at: DVec2| {
+            let mut level = [0.0_f32];
+            frame.plane.square_into(at.x.round() as i32, at.y.round() as i32, 1, &mut level);
+            f64::from(level[0])
+        };
+        let (mut dark, mut all) = (0.0, 0.0);
+        for dot in &model.dots {
+            let Ok(at) = self.optics.project(dot.surface_mm) else { continue };
+            let beside = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+            let beside = beside.map(|(x, y)| level(at + DVec2::new(x, y) * 0.5 * dot.spacing_px));
+            all += 1.0;
+            dark += if level(at) < DARK * 0.25 * beside.iter().sum::<f64>() { 1.0 } else { 0.0 };
+        }
+        dark / f64::max(all, 1.0)
     }
 }

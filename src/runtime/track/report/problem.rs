@@ -11,6 +11,10 @@ pub enum Problem {
     Dark,
     /// Most of the frame is at the largest value.
     Saturated,
+    /// The picture is turned against the constants' camera: every dot would carry another one's number.
+    Turned,
+    /// The picture is mirrored, and perhaps turned.
+    Mirrored,
     /// Nothing that could be this sensor's marks.
     NoMarks,
     /// Too few white markers are seen for a pose.
@@ -24,6 +28,9 @@ pub enum Problem {
     BeyondSprings,
     /// Two poses explain the white markers.
     AmbiguousPose,
+    /// The gap that tells how the picture lies is not seen, or more than one: broken dots, dirt, or dots of a picture
+    /// that is turned or shifted.
+    KeyUnsure,
     /// Marks are much wider than they should be.
     Blurred,
     /// The frame is the last one again, bit by bit.
@@ -38,17 +45,20 @@ pub enum Problem {
 
 impl Problem {
     /// All of them, the gravest first.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 18] = [
         Self::Unreadable,
         Self::WrongSize,
         Self::Dark,
         Self::Saturated,
+        Self::Turned,
+        Self::Mirrored,
         Self::NoMarks,
         Self::MarkersMissing,
         Self::MarkersDoNotFit,
         Self::ForeignConstants,
         Self::BeyondSprings,
         Self::AmbiguousPose,
+        Self::KeyUnsure,
         Self::Blurred,
         Self::Frozen,
         Self::Gap,
@@ -63,12 +73,15 @@ impl Problem {
             Self::WrongSize => "wrong_size",
             Self::Dark => "dark",
             Self::Saturated => "saturated",
+            Self::Turned => "turned",
+            Self::Mirrored => "mirrored",
             Self::NoMarks => "no_marks",
             Self::MarkersMissing => "markers_missing",
             Self::MarkersDoNotFit => "markers_do_not_fit",
             Self::ForeignConstants => "foreign_constants",
             Self::BeyondSprings => "beyond_springs",
             Self::AmbiguousPose => "ambiguous_pose",
+            Self::KeyUnsure => "key_unsure",
             Self::Blurred => "blurred",
             Self::Frozen => "frozen",
             Self::Gap => "gap",

@@ -7,7 +7,7 @@ use super::problem::{Problem, Problems};
 use super::reference::ReferenceMean;
 use super::result::{DotResult, MarkerResult, Tracked};
 use crate::track::frame::Exposure;
-use crate::track::identities::{DotsFound, MAX_FALSE_DOTS};
+use crate::track::identities::{DotsFound, MAX_FALSE_DOTS, Orientation};
 use crate::track::marks::{FittedDisc, MarkState};
 use crate::track::model::SensorModel;
 use crate::track::options::{Reference, TrackOptions};
@@ -44,6 +44,8 @@ pub(in crate::track) struct Reporter {
     checks: DotChecks,
     reference: ReferenceMean,
     max_misplaced: f64,
+    /// Whether the key and the dots around it were once in place.
+    was_placed: bool,
 }
 
 impl Reporter {
@@ -66,6 +68,7 @@ impl Reporter {
             checks: DotChecks::new(model.dots.len()),
             reference: ReferenceMean::new(wanted, model.dots.len()),
             max_misplaced: options.max_misplaced,
+            was_placed: false,
         }
     }
 
@@ -77,6 +80,7 @@ impl Reporter {
     /// Forgets all frames.
     pub fn restart(&mut self) {
         self.last_number = None;
+        self.was_placed = false;
         self.reference.restart();
         for marker in &mut self.result.white_markers {
             marker.state = MarkState::Missing;
@@ -90,6 +94,7 @@ impl Reporter {
         result.problems = Problems::default();
         (result.pose, result.pose_sd, result.pose_rms_px) = (None, None, None);
         (result.wrench, result.wrench_sd) = (None, None);
+        result.camera_turn = None;
         for marker in &mut result.white_markers {
             let seen = marker.state != MarkState::Missing;
             let state = if seen { MarkState::Lost } else { MarkState::Missing };
@@ -140,6 +145,10 @@ impl Reporter {
                 motion_px: track.motion_px,
                 displacement_mm: None,
             };
+            if track.is_unsure && track.spot.is_some() {
+                *to = DotResult { id: to.id, state: MarkState::IdentityUnsure, ..DotResult::default() };
+                continue;
+            }
             if let Some(displacements_mm) = displacements_mm {
                 to.displacement_mm = displacements_mm[index];
                 if track.is_wanted() {
@@ -180,6 +189,31 @@ impl Reporter {
         self.problem_if(estimate.is_beyond_springs, Problem::BeyondSprings);
     }
 
+    /// What the key says; numbers of a picture that lies otherwise would be other marks'.
+    fn orientation(&mut self, orientation: Orientation) {
+        match orientation {
+            Orientation::NoKey | Orientation::AsBuilt => return,
+            Orientation::Unsure => self.problem(Problem::KeyUnsure),
+            Orientation::Turned(turn) => {
+                self.problem(if turn.is_mirrored { Problem::Mirrored } else { Problem::Turned });
+                self.result.camera_turn = Some(turn);
+            }
+        }
+        let result = &mut self.result;
+        (result.pose, result.pose_sd, result.pose_rms_px) = (None, None, None);
+        (result.wrench, result.wrench_sd) = (None, None);
+        result.false_dots.clear();
+        let unsure = |state: MarkState| {
+            if state == MarkState::Ok { MarkState::IdentityUnsure } else { state }
+        };
+        for dot in &mut result.black_dots {
+            *dot = DotResult { id: dot.id, state: unsure(dot.state), ..DotResult::default() };
+        }
+        for marker in &mut result.white_markers {
+            *marker = MarkerResult { id: marker.id, state: unsure(marker.state), ..MarkerResult::default() };
+        }
+    }
+
     /// Ends a frame in which marks were looked for.
     pub fn finish(&mut self, findings: &FrameFindings<'_>, model: &SensorModel) {
         self.markers(findings.discs, &findings.pose);
@@ -192,17 +226,23 @@ impl Reporter {
         let is_blurred = self.checks.are_blurred(tracks)
             || findings.sharpness.is_some_and(|sharpness| sharpness < MIN_SHARPNESS);
         self.problem_if(is_blurred, Problem::Blurred);
-        let misplaced = known && self.checks.are_misplaced(tracks, &model.dots, self.max_misplaced);
+        let misplaced =
+            !self.was_placed && known && self.checks.are_misplaced(tracks, &model.dots, self.max_misplaced);
+        // Constants that once were the camera's stay so, however far the skin is pulled.
+        let is_placed = known && !misplaced && findings.dots.orientation == Orientation::AsBuilt;
+        self.was_placed |= is_placed;
         let wanted = tracks.iter().filter(|t| t.is_wanted()).count();
         let missing = self.result.count(MarkState::Missing);
         let unknown = known && wanted >= MIN_EXPECTED_DOTS && 2 * missing > wanted;
         let foreign = findings.pose.refined.is_some_and(|found| found.rms_px > model.markers.foreign_rms_px);
         self.problem_if(misplaced || unknown || foreign, Problem::ForeignConstants);
-        let lost = self.result.count(MarkState::Lost) + self.result.count(MarkState::Merged);
+        let lost = [MarkState::Lost, MarkState::Merged, MarkState::IdentityUnsure];
+        let lost: usize = lost.into_iter().map(|state| self.result.count(state)).sum();
         self.problem_if(lost as f64 > (MAX_LOST_PART * wanted as f64).max(1.0), Problem::DotsLost);
         let nothing =
             findings.discs.iter().all(Option::is_none) && tracks.iter().all(|track| track.spot.is_none());
         self.problem_if(findings.pose.refined.is_none() && nothing, Problem::NoMarks);
+        self.orientation(findings.dots.orientation);
         let good = known && self.result.problems.iter().all(|p| p >= Problem::Frozen);
         self.reference.apply(&mut self.result, good);
     }

@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::problem::Problems;
+use crate::track::identities::CameraTurn;
 use crate::track::marks::MarkState;
 use domecast_optics::numeric::Rigid;
 use domecast_springs::{Displacement, Wrench};
@@ -53,6 +54,8 @@ pub struct Tracked {
     pub frame: u64,
     /// What is wrong with it.
     pub problems: Problems,
+    /// How the picture lies against the constants' camera, where it is turned or mirrored: all numbers are withheld then.
+    pub camera_turn: Option<CameraTurn>,
     /// `rest_from_platform`; nothing is measured of it on a rigid mount, and then there is none, nor a wrench.
     pub pose: Option<Rigid>,
     /// Standard deviations of the displacement (mm, rad) about the springs' reference point, or the origin.

@@ -58,7 +58,12 @@ pub fn write_json(out: &mut impl Write, tracked: &Tracked) -> io::Result<()> {
     for (i, problem) in tracked.problems.iter().enumerate() {
         write!(out, "{}\"{}\"", if i == 0 { "" } else { "," }, problem.as_str())?;
     }
-    write!(out, "],\"pose\":")?;
+    write!(out, "]")?;
+    if let Some(turn) = tracked.camera_turn {
+        let (deg, mirrored) = (turn.turned_rad.to_degrees(), turn.is_mirrored);
+        write!(out, ",\"camera_turned_deg\":{deg:.1},\"camera_mirrored\":{mirrored}")?;
+    }
+    write!(out, ",\"pose\":")?;
     match &tracked.pose {
         None => write!(out, "null")?,
         Some(pose) => {

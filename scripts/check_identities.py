@@ -1,0 +1,244 @@
+#!/usr/bin/env python3
+"""Which mark is which, in frames that domecast did not draw: named scenarios, each with what may be said of it.
+
+    python3 scripts/check_identities.py target/release/domecast output/thumb24 [output/digit-rigid ...] [--only NAME]
+
+For each build frames are drawn by scripts/draw_frames.py (its own projector and its own skin), `domecast track` reads them
+with the build's constants, and every frame is held to the truth:
+
+- a dot that is called `ok` is no other dot: nearer than two fifths of the spacing to where it was drawn;
+- the status of the frames is one of those that the scenario names;
+- no more dots are withheld than the scenario allows.
+"""
+import copy
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import cv2
+import numpy as np
+
+from draw_frames import Sensor, rotation, turn_picture
+
+failed = 0
+
+
+def dent(center, depth, width):
+    """The skin pushed in by a finger's tip at a place, and pushed aside a little."""
+    center = np.asarray(center, float)
+    inward = -center / np.linalg.norm(center)
+
+    def skin(points):
+        away = points - center
+        bell = np.exp(-(away**2).sum(-1) / (2 * width**2))[..., None]
+        aside = away - (away @ inward)[..., None] * inward
+        return points + depth * bell * inward + 0.25 * depth / width * aside * bell
+
+    return skin
+
+
+def shear(sensor, way):
+    """The skin pulled sideways, the rim held."""
+    return lambda points: points + np.asarray(way) * np.clip(points[..., 2:] / sensor.radius, 0, 1)
+
+
+def slip(axis, angle):
+    """The whole skin turned over the dome."""
+    turn = rotation(np.asarray(axis, float) * angle)
+    return lambda points: points @ turn.T
+
+
+class Build:
+    def __init__(self, program, folder):
+        self.program = program
+        self.path = pathlib.Path(folder) / "constants/constants.json"
+        self.constants = json.loads(self.path.read_text())
+        self.sensor = Sensor(self.constants)
+        self.rest = self.sensor.project(self.sensor.dots)
+        apart = np.linalg.norm(self.rest[:, None] - self.rest[None], axis=2) + 1e9 * np.eye(len(self.rest))
+        self.spacing = apart.min(1)
+        self.center = self.sensor.matrix[:2, 2]
+        self.is_rigid = not self.constants["white_markers"]
+
+    def at(self, polar_deg, azimuth_deg=30):
+        p, a = np.radians([polar_deg, azimuth_deg])
+        return self.sensor.radius * np.array([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)])
+
+    def pitch_rad(self):
+        """The angle on the dome between the dots nearest to the pole and their neighbours."""
+        dots = self.sensor.dots / self.sensor.radius
+        middle = dots[np.argmax(dots[:, 2])]
+        return np.sort(np.arccos(np.clip(dots @ middle, -1, 1)))[1]
+
+    def track(self, frames, *options, constants=None):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            path = self.path
+            if constants is not None:
+                path = folder / "constants.json"
+                path.write_text(json.dumps(constants))
+            (folder / "frames").mkdir()
+            for index, frame in enumerate(frames):
+                cv2.imwrite(str(folder / f"frames/frame_{index:04d}.png"), frame)
+            out = folder / "track.jsonl"
+            done = subprocess.run([self.program, "track", folder / "frames", "--constants", path, "--out", out, *options],
+                                  capture_output=True, text=True)
+            if done.returncode:
+                raise SystemExit(done.stderr)
+            return [json.loads(line) for line in out.read_text().splitlines()], done.stderr
+
+
+def judge(build, name, lines, truths, statuses, may_lack=0.02, drawn=None):
+    """Every line against where the dots were drawn."""
+    global failed
+    swapped, worst, lacking, said = 0, 0.0, 0, []
+    for line, truth in zip(lines, truths):
+        said.append(line["status"])
+        lacks = 0
+        for index, dot in enumerate(line["black_dots"]):
+            if dot["state"] != "ok" or dot["centroid_px"] is None:
+                lacks += 1
+                continue
+            off = np.hypot(*(np.array(dot["centroid_px"]) - truth[index]))
+            swapped += off > 0.4 * build.spacing[index]
+            worst = max(worst, off)
+        lacking = max(lacking, lacks)
+    count = len(truths[0])
+    good = swapped == 0 and set(said) <= set(statuses) and lacking <= max(may_lack * count, 1) and len(lines) == len(truths)
+    failed += not good
+    shown = {status: said.count(status) for status in dict.fromkeys(said)}
+    print(f"{'ok  ' if good else 'FAIL'} {name:<46} swapped {swapped} of {count * len(lines)}, off by {worst:.3f} px at most, "
+          f"{lacking} withheld, {shown}")
+
+
+def scenarios(build):
+    """Name, and what draws and judges it."""
+    sensor = build.sensor
+    key = build.constants["key"]
+
+    def plain(name, poses_and_skins, statuses, may_lack=0.02, **drawing):
+        def run():
+            drawn = [sensor.draw(seed=i, **{**drawing, **scene}) for i, scene in enumerate(poses_and_skins)]
+            lines, _ = build.track([frame for frame, _ in drawn])
+            judge(build, name, lines, [truth for _, truth in drawn], statuses, may_lack)
+        return name, run
+
+    def lying(name, turned, mirrored, statuses, options=(), may_lack=1.0, constants=None, says="", **drawing):
+        def run():
+            pictures, truths = [], []
+            for seed in range(3):
+                frame, truth = sensor.draw(seed=seed, **drawing)
+                picture, matrix = turn_picture(frame, turned, mirrored, build.center)
+                pictures.append(picture)
+                truth = truth @ matrix[:, :2].T + matrix[:, 2]
+                if "--camera-mirrored" in options:
+                    truth[:, 0] = sensor.size[0] - 1 - truth[:, 0]
+                truths.append(truth)
+            lines, told = build.track(pictures, *options, constants=constants)
+            judge(build, name, lines, truths, statuses, may_lack)
+            if says not in told:
+                global failed
+                failed += 1
+                print(f"FAIL {name}: does not say '{says}': {told.strip()[-200:]}")
+        return name, run
+
+    own = [turn for turn in key["images"] if not turn["mirrored"]]
+    yield lying("as built", 0, False, ["ok"], may_lack=0.02)
+    for turn in key["images"]:
+        deg, mirrored = turn["turned_deg"], turn["mirrored"]
+        how = f"{'mirrored, ' if mirrored else ''}turned by {deg:g}"
+        yield lying(how, deg, mirrored, ["mirrored" if mirrored else "turned"], says=f"by {deg:g} degrees")
+    yield lying("turned by 37, no symmetry", 37, False, ["turned"])
+    yield lying("mirrored, turned by 37", 37, True, ["mirrored"])
+    deg = own[0]["turned_deg"]
+    yield lying(f"turned by {deg:g}, accepted", deg, False, ["ok"], ["--camera-turned", f"{deg:g}"], 0.02)
+    yield lying("turned by 37, accepted", 37, False, ["ok"], ["--camera-turned", "37"], 0.02)
+    yield lying("mirrored, accepted", 0, True, ["ok"], ["--camera-mirrored"], 0.02)
+    yield lying("mirrored, turned by 180, accepted", 180, True, ["ok"], ["--camera-mirrored", "--camera-turned", "180"], 0.02)
+    image = own[0]["dot"]
+    others = [dot for dot in range(len(sensor.dots)) if dot not in [i["dot"] for i in key["images"]] + key["neighbors"]]
+    rng = np.random.default_rng(5)
+    broken = tuple(rng.choice(others, 6, replace=False))
+    yield lying("six broken dots", 0, False, ["ok", "dots_lost"], may_lack=0.05, without=broken)
+    yield lying("six broken dots, turned", deg, False, ["turned"], without=broken)
+    yield lying("a broken dot at an image of the key", 0, False, ["key_unsure"], without=(image,), says="--camera-turned 0")
+    yield lying("the same, told how it lies", 0, False, ["ok"], ["--camera-turned", "0"], 0.02, without=(image,))
+    dirt = [(key["surface_mm"], key["diameter_mm"])]
+    yield lying("dirt on the key", 0, False, ["key_unsure"], specks=dirt)
+    yield lying("dirt on the key, turned", deg, False, ["key_unsure", "turned"], specks=dirt)
+    old = copy.deepcopy(build.constants)
+    del old["key"]
+    yield lying("constants without a key", 0, False, ["ok"], may_lack=0.02, constants=old, says="no `key`")
+    # touches
+    usual = ["ok", "dots_lost"]
+    # at the start nothing tells a skin pulled all over from another sensor's constants
+    start = usual + ["foreign_constants"]
+    r = sensor.radius
+    for polar in (0, 25, 40):
+        touch = dent(build.at(polar), 0.19 * r, 0.22 * r)
+        yield plain(f"touch of 1.9 mm in 10 at {polar} deg, on and off", [{}, {"skin": touch}, {"skin": touch}, {}, {}], usual, 0.15)
+        press = dent(build.at(polar), 0.2 * r, 0.25 * r)
+        yield plain(f"start under a press of 2 mm in 10 at {polar} deg", [{"skin": press}] * 3 + [{}], start, 0.15)
+    for azimuth in (0, 30):
+        way = 0.2 * r * np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0])
+        yield plain(f"start under 2 mm in 10 of shear to {azimuth} deg", [{"skin": shear(sensor, way)}] * 3, start, 0.2)
+        steps = [{"skin": shear(sensor, 1.5 * way * i / 15)} for i in range(16)]
+        yield plain(f"3 mm in 10 of shear in 15 frames to {azimuth} deg", steps, usual, 0.2)
+        slid = slip([-np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth)), 0], build.pitch_rad())
+        yield plain(f"skin slips by a pitch to {azimuth} deg", [{}, {"skin": slid}, {"skin": slid}], usual + ["key_unsure"], 0.35)
+        yield plain(f"start slipped by a pitch to {azimuth} deg", [{"skin": slid}] * 3, start + ["key_unsure"], 0.35)
+    if build.is_rigid:
+        return
+    # markers
+    for hidden in range(len(sensor.markers)):
+        yield plain(f"marker {hidden} hidden from the start", [{}] * 3, ["three_markers"], hidden=(hidden,))
+    press = [{"shift": (0, 0, -0.3)}, {"shift": (0.1, 0, -0.5), "turn": (0.01, 0, 0.01)}]
+    yield plain("marker 2 hidden, pressed from the start", press, ["three_markers"], hidden=(2,))
+
+    bad = ["ok", "blurred", "no_marks", "markers_missing", "markers_do_not_fit", "dots_lost", "three_markers", "foreign_constants",
+           "key_unsure"]
+
+    def blurred(at, way):
+        def run():
+            drawn = [sensor.draw(seed=i, shift=(0.02 * i, 0, -0.02 * i)) for i in range(6)]
+            frames = [frame for frame, _ in drawn]
+            frames[at] = cv2.blur(frames[at], way)
+            lines, _ = build.track(frames)
+            others = [i for i in range(6) if i != at]
+            judge(build, f"frames beside a blurred one, {way}", [lines[i] for i in others], [drawn[i][1] for i in others], ["ok"])
+            judge(build, "the blurred frame itself", [lines[at]], [drawn[at][1]], bad, 1.0)
+        return run
+
+    for at in (0, 3):
+        for way in ((9, 1), (9, 9), (1, 15)):
+            yield f"9 px of motion blur in frame {at}", blurred(at, way)
+
+
+def main(program, *builds):
+    only = None
+    builds = list(builds)
+    if "--only" in builds:
+        at = builds.index("--only")
+        only = builds[at + 1]
+        del builds[at:at + 2]
+    for folder in builds:
+        print(folder)
+        build = Build(program, folder)
+        off = np.abs(build.rest - [dot["image_px"] for dot in build.constants["black_dots"]]).max()
+        print(f"     both projectors agree to {off:.1e} px")
+        if not build.constants.get("key"):
+            print("     no key: its pattern has no symmetry, or its design wants none")
+            continue
+        for name, run in scenarios(build):
+            if only is None or only in name:
+                run()
+    print("every mark is itself, or named" if failed == 0 else f"{failed} faults")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,148 @@
+"""A second renderer: frames of a sensor from its constants, by NumPy and OpenCV alone.
+
+Its projector shares nothing with domecast: a point is carried into the platform's frame, the angle at which its ray leaves
+the layers is found by bisection on Snell's law, and the lens is OpenCV's formulas written out. Dots and markers are polygons
+filled at four times the frame's resolution. A skin that moves is a function from places on the dome to places in the sensor
+frame.
+"""
+import cv2
+import numpy as np
+
+FINE = 4
+RIM = 40
+
+
+def rotation(vector):
+    return cv2.Rodrigues(np.asarray(vector, float))[0]
+
+
+class Sensor:
+    def __init__(self, constants):
+        self.constants = constants
+        camera = constants["camera"]
+        self.size = camera["width"], camera["height"]
+        self.matrix = np.array(camera["matrix"])
+        self.model, self.distortion = camera["model"], list(camera["distortion"]) + [0.0] * 8
+        transform = np.array(camera["camera_from_sensor"])
+        self.camera_rotation = transform[:3, :3]
+        self.pupil = -transform[:3, :3].T @ transform[:3, 3]
+        layers = [layer for layer in constants["optics"]["layers"] if layer["name"] != "air"]
+        self.sheets = [(layer["index"], layer["thickness_mm"]) for layer in layers if layer["thickness_mm"] is not None]
+        self.fill = [layer["index"] for layer in layers if layer["thickness_mm"] is None][0]
+        self.radius = constants["optics"]["dome_radius_mm"]
+        dots = constants["black_dots"]
+        self.ids = np.array([dot["id"] for dot in dots])
+        self.dots = np.array([dot["surface_mm"] for dot in dots])
+        self.diameters = np.array([dot["diameter_mm"] for dot in dots])
+        self.markers = np.array([marker["position_mm"] for marker in constants["white_markers"]]).reshape(-1, 3)
+        self.marker_diameters = [marker["diameter_mm"] for marker in constants["white_markers"]]
+
+    def project(self, points, turn=(0, 0, 0), shift=(0, 0, 0)):
+        """Pixels of points in the sensor frame, the platform turned (rotation vector) and shifted (mm) from rest."""
+        platform = rotation(turn)
+        points = np.asarray(points, float)
+        pupil = platform.T @ (self.pupil - np.asarray(shift, float))
+        across = points[..., :2] - pupil[:2]
+        reach = np.hypot(across[..., 0], across[..., 1])
+        sheet = sum(thickness for _, thickness in self.sheets)
+        air = -pupil[2] - sheet
+        low, high = np.zeros_like(reach), np.full_like(reach, np.pi / 2 - 1e-9)
+        for _ in range(60):
+            angle = 0.5 * (low + high)
+            sine = np.sin(angle)
+            there = air * np.tan(angle)
+            for index, thickness in self.sheets + [(self.fill, None)]:
+                inner = sine / index
+                depth = points[..., 2] if thickness is None else thickness
+                there = there + depth * inner / np.sqrt(1 - inner**2)
+            near = there < reach
+            low, high = np.where(near, angle, low), np.where(near, high, angle)
+        angle = 0.5 * (low + high)
+        unit = across / np.maximum(reach, 1e-300)[..., None]
+        ray = np.concatenate([unit * np.sin(angle)[..., None], np.cos(angle)[..., None]], -1)
+        return self.lens(ray @ platform.T @ self.camera_rotation.T)
+
+    def lens(self, ray):
+        k = self.distortion
+        if self.model == "kannala_brandt":
+            across = np.hypot(ray[..., 0], ray[..., 1])
+            angle = np.arctan2(across, ray[..., 2])
+            bent = angle * (1 + sum(k[i] * angle ** (2 * i + 2) for i in range(4)))
+            flat = ray[..., :2] * (bent / np.maximum(across, 1e-300))[..., None]
+        else:
+            x, y = ray[..., 0] / ray[..., 2], ray[..., 1] / ray[..., 2]
+            r2 = x * x + y * y
+            if self.model == "pinhole":
+                k = [0.0] * 8
+            radial = (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])))
+            flat = np.stack([x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x),
+                             y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y], -1)
+        return flat @ self.matrix[:2, :2].T + self.matrix[:2, 2]
+
+    def outlines(self):
+        """Rims of the dots on the undeformed dome, and of the markers on the sheet."""
+        turn = np.linspace(0, 2 * np.pi, RIM, endpoint=False)
+        normal = self.dots / np.linalg.norm(self.dots, axis=1, keepdims=True)
+        east = np.cross([0, 0, 1], normal)
+        length = np.linalg.norm(east, axis=1, keepdims=True)
+        east = np.where(length > 1e-9, east / np.maximum(length, 1e-9), [1, 0, 0])
+        north = np.cross(normal, east)
+        wheel = east[:, None] * np.cos(turn)[:, None] + north[:, None] * np.sin(turn)[:, None]
+        rims = self.dots[:, None] + 0.5 * self.diameters[:, None, None] * wheel
+        rims *= (self.radius / np.linalg.norm(rims, axis=2))[..., None]
+        flat = np.stack([np.cos(turn), np.sin(turn), 0 * turn], -1)
+        markers = [p + 0.5 * d * flat for p, d in zip(self.markers, self.marker_diameters)]
+        return rims, markers
+
+    def draw(self, turn=(0, 0, 0), shift=(0, 0, 0), skin=None, without=(), hidden=(), specks=(), noise=1.0, seed=1):
+        """A frame, and the centroids of its dots. `skin`: from places on the dome to places in the sensor frame; `without`:
+        dots that came out not at all; `hidden`: markers under a cover; `specks`: dirt as (place on the dome, diameter)."""
+        width, height = self.size
+        fine = np.full((height * FINE, width * FINE), 60, np.float32)
+        around = np.linspace(0, 2 * np.pi, 240, endpoint=False)
+        rim = self.radius * np.stack([np.cos(around), np.sin(around), 0 * around], -1)
+
+        def fill(corners, level):
+            # the centre of a pixel is a whole number; of a fine one, at (i + 0.5) / FINE - 0.5
+            corners = (np.asarray(corners) + 0.5) * FINE - 0.5
+            cv2.fillPoly(fine, [np.round(corners * 16).astype(np.int32)], level, cv2.LINE_8, 4)
+
+        def seen(points):
+            return self.project(skin(points) if skin else points, turn, shift)
+
+        fill(self.project(rim, turn, shift), 165)
+        y, x = np.mgrid[0:height * FINE, 0:width * FINE].astype(np.float32) / FINE
+        shade = 1 - 0.25 * (((x - self.matrix[0, 2]) ** 2 + (y - self.matrix[1, 2]) ** 2) / height**2)
+        rims, markers = self.outlines()
+        pixels = seen(rims)
+        centers = []
+        for index, corners in enumerate(pixels):
+            ahead = np.roll(corners, -1, 0)
+            cross = corners[:, 0] * ahead[:, 1] - ahead[:, 0] * corners[:, 1]
+            centers.append(((corners + ahead) * cross[:, None]).sum(0) / (3 * cross.sum()))
+            if index not in without:
+                fill(corners, 25)
+        for place, diameter in specks:
+            place = np.asarray(place, float)
+            spot = Sensor.__new__(Sensor)
+            spot.__dict__ = {**self.__dict__, "dots": place[None], "diameters": np.array([diameter])}
+            fill(seen(spot.outlines()[0])[0], 25)
+        for index, corners in enumerate(markers):
+            if index not in hidden:
+                fill(self.project(corners, turn, shift), 235)
+        frame = cv2.resize(fine * shade, (width, height), interpolation=cv2.INTER_AREA)
+        frame = cv2.GaussianBlur(frame, (0, 0), 0.6)
+        frame += np.random.default_rng(seed).normal(0, noise, frame.shape)
+        return np.clip(np.round(frame), 0, 255).astype(np.uint8), np.array(centers)
+
+
+def turn_picture(frame, clockwise_deg, mirrored, center):
+    """A picture mirrored left to right about the centre, then turned clockwise about it."""
+    height, width = frame.shape[:2]
+    cx, cy = center
+    flip = np.array([[-1, 0, 2 * cx], [0, 1, 0], [0, 0, 1]]) if mirrored else np.eye(3)
+    angle = np.radians(clockwise_deg)
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, -s, cx - c * cx + s * cy], [s, c, cy - s * cx - c * cy], [0, 0, 1]])
+    matrix = (turn @ flip)[:2]
+    return cv2.warpAffine(frame, matrix, (width, height), flags=cv2.INTER_CUBIC, borderValue=int(frame[0, 0])), matrix

@@ -105,7 +105,7 @@ fn drift_of(pairs: &[Pair], axis: usize) -> Option<f64> {
         return None;
     }
     let ((before, _), (after, found)) = (residual(&plain, &readings)?, residual(&with, &readings)?);
-    let drift = *found.iter().last()?;
+    let drift = *found.as_slice().last()?;
     (after * CLEAR_FACTOR < before && drift.abs() > MIN_DRIFT * spread(&readings)).then_some(drift)
 }
 

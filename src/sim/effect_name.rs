@@ -71,6 +71,12 @@ effect_names! {
     Dots = dots,
     /// The ink fades out at a dot's edge.
     InkEdge = ink_edge,
+    /// No two dots are quite alike.
+    UnevenInk = uneven_ink,
+    /// The membrane's reflectance varies from place to place.
+    UnevenMembrane = uneven_membrane,
+    /// Dust and scratches on sheet and lens.
+    Dust = dust,
     /// The lights, their colours and lobes, through the sheet.
     DirectLight = direct_light,
     /// Falloff with distance and the cosine at the membrane.
@@ -93,8 +99,12 @@ effect_names! {
     RollingShutter = rolling_shutter,
     /// Each pixel sees one colour.
     Bayer = bayer,
+    /// Hot and dead pixels.
+    Defects = defects,
     /// Shot, read and quantisation noise.
     Noise = noise,
+    /// The camera sharpens.
+    Sharpening = sharpening,
     /// The camera's lossy code.
     Compression = compression,
 }

@@ -1,5 +1,7 @@
 //! What geometric effects shift, on the scene's own points and frames.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 
 use crate::SimError;
@@ -57,6 +59,14 @@ fn quickest_level(scene: &Scene) -> Level {
     }
 }
 
+/// The frames that stand for the scene's, solved.
+///
+/// # Errors
+/// A frame whose load has no balance.
+pub(super) fn solved_frames(scene: &Scene) -> Result<Arc<SolvedFrames>, SimError> {
+    scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames(scene)))
+}
+
 /// A dot's centroid moves with the mean of its surroundings: no more than this often the largest motion of a centre.
 const CENTROID: f64 = 1.1;
 /// The same under an object, where the states of the bound are those of another level of contact.
@@ -85,7 +95,7 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
     let colours = if a_eye.channels() == 1 && b_eye.channels() == 1 { 1 } else { scene.planes() };
     let mut last: Vec<DVec2> = Vec::new();
     let (mut worst, mut change): (f64, f64) = (0.0, 0.0);
-    let solved = scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames))?;
+    let solved = solved_frames(scene)?;
     for (frame, touch) in solved.touches() {
         let time_s = scene.time_s(frame);
         let between = Between::at_frame(touch.clone());

@@ -3,11 +3,13 @@
 mod bayer;
 mod compression;
 pub(crate) mod contact;
+mod defects;
 mod defocus;
 mod diffuser;
 mod direct_light;
 mod dispersion;
 mod dots;
+mod dust;
 pub(crate) mod effect;
 mod falloff;
 mod fresnel;
@@ -21,12 +23,17 @@ mod noise;
 pub mod pipeline;
 mod platform_shadow;
 mod pupil_shift;
+#[cfg(test)]
+mod real_frames_tests;
 mod refraction;
 mod rolling_shutter;
+mod sharpening;
 mod sheet_motion;
 pub mod speed;
 #[cfg(test)]
 mod tests;
+mod uneven_ink;
+mod uneven_membrane;
 mod vignetting;
 
 use self::effect::Effect;
@@ -43,6 +50,9 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &contact::ContactEffect,
         &dots::Dots,
         &ink_edge::InkEdge,
+        &uneven_ink::UnevenInk,
+        &uneven_membrane::UnevenMembrane,
+        &dust::Dust,
         &direct_light::DirectLightEffect,
         &falloff::Falloff,
         &diffuser::DiffuserEffect,
@@ -54,7 +64,9 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &motion_blur::MotionBlur,
         &rolling_shutter::RollingShutter,
         &bayer::Bayer,
+        &defects::DefectsEffect,
         &noise::Noise,
+        &sharpening::Sharpening,
         &compression::Compression,
     ]
 }

@@ -3,7 +3,9 @@
 use crate::electronics::pass::{CodedPass, Pass};
 use crate::light::LightUse;
 use crate::light::shading::Shading;
+use crate::light::uneven::Unevenness;
 use crate::raster::settings::{Geometry, Ink, Timing};
+use crate::raster::specks::Specks;
 use domecast_contact::Level;
 
 /// What the used effects have installed.
@@ -19,6 +21,10 @@ pub struct Pipeline {
     pub contact: Option<Level>,
     /// What the dots look like.
     pub ink: Ink,
+    /// Dust and scratches before the sensor.
+    pub dust: Option<Specks>,
+    /// How uneven the membrane is; taken into `shading` after all effects are applied.
+    pub unevenness: Option<Unevenness>,
     /// When the rows gather light.
     pub timing: Timing,
     /// Passes over the picture, run stage by stage, within a stage in the order of their installation.

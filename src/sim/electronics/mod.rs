@@ -4,7 +4,9 @@
 
 pub(crate) mod bayer;
 pub(crate) mod compression;
+pub(crate) mod defects;
 pub(crate) mod defocus;
 pub(crate) mod noise;
 pub mod pass;
+pub(crate) mod sharpening;
 pub(crate) mod vignetting;

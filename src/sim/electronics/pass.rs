@@ -15,8 +15,12 @@ pub enum Stage {
     Mosaic,
     /// Electrons: shot and read noise, the converter.
     Sensor,
+    /// What no light changes any more: dead pixels.
+    Readout,
     /// Back to three planes.
     Demosaic,
+    /// The camera's processor sharpens.
+    Sharpening,
 }
 
 /// Which picture a pass works on.

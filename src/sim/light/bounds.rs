@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::direct::EmitterRule;
 use super::parts::LightUse;
+use super::random_field::MAX_DEVIATIONS;
 use super::setup::{self, Channels};
 use super::shade::leaves;
 use super::shelf::Shelf;
@@ -41,6 +42,29 @@ pub fn grey_of_change(gamma: f64, change: f64) -> f64 {
     let power = 1.0 / gamma;
     let code = if power <= 1.0 { clear.powf(power) } else { (power * clear).min(1.0) };
     255.0 * code
+}
+
+/// The largest fall of a code, in grey levels, where light that is at most `brightest` full scales loses the part `part`
+/// of itself. Above full scale more light is no more code, so nothing there falls by more than full scale does.
+pub fn grey_of_loss(gamma: f64, brightest: f64, part: f64) -> f64 {
+    let power = 1.0 / gamma;
+    255.0 * brightest.clamp(0.0, 1.0).powf(power) * (1.0 - (1.0 - part.clamp(0.0, 1.0)).powf(power))
+}
+
+/// No level of a scene's picture is above this before the camera's gain, full scales.
+///
+/// # Errors
+/// Lights that do not fit the design.
+pub fn brightest(scene: &Scene) -> Result<f64, SimError> {
+    let light = &scene.file().light;
+    let even = match light.leds {
+        Some(_) => LightBounds::of(scene)?.brightest.max(light.surround_level),
+        None => light.brightest_level(),
+    };
+    // No place of an uneven membrane is brighter than its mean by more than this.
+    let uneven =
+        scene.file().uneven_membrane.as_ref().map_or(0.0, |uneven| MAX_DEVIATIONS * uneven.amplitude);
+    Ok(even * (1.0 + uneven))
 }
 
 /// Bounds on levels of membrane and white markers under the design's lights, parts of full scale. Each holds whichever

@@ -16,6 +16,7 @@ pub mod lobe;
 pub mod parts;
 pub mod quadrature;
 pub mod radiosity;
+pub mod random_field;
 mod rest;
 pub mod setup;
 pub mod shade;
@@ -24,6 +25,7 @@ mod shelf;
 pub mod tables;
 #[cfg(test)]
 mod tests;
+pub(crate) mod uneven;
 
 pub use cavity::Cavities;
 pub use parts::{LightUse, is_lit_by_leds};

@@ -243,6 +243,7 @@ impl<'a> Renderer<'a> {
             tolerance: self.pipeline.fill_tolerance,
             points: &self.points,
             field,
+            dust: self.pipeline.dust.as_ref(),
         };
         let (width, height) = scene.image_size();
         let planes = scene.planes();

@@ -1,5 +1,7 @@
 //! How far pixels of a lit membrane that are filled in between rays may be off.
 
+use crate::effect_name::EffectName;
+use crate::plan::growth::growth;
 use crate::scene::Scene;
 
 /// Part of a scene's grey tolerance that the filling takes; the rest is for the effects that are left out.
@@ -21,6 +23,8 @@ pub(crate) fn fill_grey(scene: &Scene) -> f64 {
 /// the stray light is the end.
 pub(crate) fn fill_tolerance(scene: &Scene, grey: f64) -> f32 {
     let file = scene.file();
+    // What is filled in is drawn before every effect that enlarges.
     let darkest = file.light.leds.as_ref().map_or(0.0, |leds| leds.stray_level).max(DARKEST);
-    (grey / 255.0 / file.electronics.steepest_code(darkest)) as f32
+    (grey / 255.0 / file.electronics.steepest_code(darkest) / growth(scene, EffectName::LensDistortion))
+        as f32
 }

@@ -1,6 +1,7 @@
 //! Which effects are used, and what leaving the others out can cost.
 
 pub(crate) mod fill;
+mod growth;
 #[cfg(test)]
 mod honesty;
 
@@ -13,6 +14,7 @@ use crate::effects;
 use crate::effects::effect::{Cost, Effect};
 use crate::effects::geometry_bound::shift_px;
 use crate::plan::fill::{fill_grey, fill_tolerance};
+use crate::plan::growth::growth;
 use crate::raster::settings::Geometry;
 use crate::scene::Scene;
 use crate::scene::file::{LevelName, ToleranceSection};
@@ -120,7 +122,8 @@ impl Plan {
         // What a scene forbids takes with it what needs it.
         drop_orphans(&mut entries);
         let mut plan = Self { entries, left_out: Bound::default(), filled_grey: 0.0, contact_level: None };
-        if light::is_lit_by_leds(scene) && plan.uses(EffectName::DirectLight) {
+        let lit = light::is_lit_by_leds(scene) && plan.uses(EffectName::DirectLight);
+        if lit || plan.uses(EffectName::UnevenMembrane) {
             plan.filled_grey = fill_grey(scene);
         }
         if candidate {
@@ -145,7 +148,8 @@ impl Plan {
         };
         let mut steps = 1.0;
         if let (Some(_), Some(noise)) = (kept(EffectName::Noise), &scene.file().electronics.noise) {
-            steps += 255.0 / f64::from((1_u32 << noise.bits.min(31)) - 1);
+            let step = 255.0 / f64::from((1_u32 << noise.bits.min(31)) - 1);
+            steps += step * growth(scene, EffectName::Noise);
         }
         if let Some(entry) = kept(EffectName::Compression) {
             steps += 2.0 * entry.bound.map_or(0.0, |bound| bound.grey);
@@ -193,7 +197,8 @@ impl Plan {
             .filter_map(|(index, entry)| {
                 let bound = entry.bound.filter(|_| entry.used)?;
                 let cost = entry.cost?.total(frames);
-                let grey = bound.grey + if bound.px > 0.0 { bound.px * per_px } else { 0.0 };
+                let shifted = if bound.px > 0.0 { bound.px * per_px } else { 0.0 };
+                let grey = bound.grey * growth(scene, entry.effect) + shifted;
                 let small = bound.px <= tolerance.px && grey <= tolerance.grey;
                 let free = scene.choice(entry.effect) == EffectChoice::Plan;
                 (small && free && cost > 0).then_some(Candidate { index, px: bound.px, grey, cost })
@@ -286,6 +291,9 @@ impl Plan {
         pipeline.passes.sort_by_key(|pass| pass.stage());
         pipeline.fill_tolerance = fill_tolerance(scene, self.filled_grey);
         pipeline.shading = light::shading_of(scene, &pipeline.light, work)?;
+        if let Some(uneven) = pipeline.unevenness.take() {
+            pipeline.shading = Some(uneven.over(pipeline.shading.take()));
+        }
         Ok(pipeline)
     }
 }
@@ -382,5 +390,6 @@ fn grey_per_px(scene: &Scene) -> f64 {
     // pixel's width across the motion, sqrt(2); two edges in one pixel may move apart.
     let edges = 2.0 * std::f64::consts::SQRT_2;
     let slope = scene.file().electronics.steepest_code(darkest);
-    255.0 * slope * edges * (brightest - darkest).max(0.0)
+    // What any geometric effect moves, all others may enlarge.
+    255.0 * slope * edges * (brightest - darkest).max(0.0) * growth(scene, EffectName::LensDistortion)
 }

@@ -12,6 +12,7 @@ use crate::raster::lattice::Lattice;
 use crate::raster::lens_field::{LensField, inside, rim_polygon};
 use crate::raster::rolled::Slice;
 use crate::raster::sensor_state::units;
+use crate::raster::specks::Specks;
 use crate::raster::spots::{Points, Spots};
 use crate::raster::surface::{ShadedSlice, ShadedSurface};
 use crate::scene::Scene;
@@ -32,6 +33,8 @@ pub struct Parts<'a> {
     pub points: &'a Points,
     /// The columns that the lens shows.
     pub field: &'a LensField,
+    /// Dust before the sensor.
+    pub dust: Option<&'a Specks>,
 }
 
 /// Draws instants of a scene; what it keeps is room to work in.
@@ -59,6 +62,9 @@ impl Painter {
             self.dots(parts, spots, frame, work);
         }
         self.markers(parts, spots, frame, work);
+        if let Some(dust) = parts.dust {
+            dust.lay(slices, parts.field, frame, work);
+        }
     }
 
     /// Surround and membrane.
@@ -184,10 +190,11 @@ impl Painter {
 
     fn dots(&mut self, parts: Parts<'_>, spots: &Spots, frame: &mut Frame, work: &mut Work) {
         let (width, height) = (frame.width(), frame.height());
-        let taken = 1.0 - parts.scene.file().ink.reflectance as f32;
+        let even = parts.scene.file().ink.reflectance as f32;
         let channels = spots.channels();
         for index in 0..parts.scene.dots().len() {
             let rings = parts.points.rings(index);
+            let taken = 1.0 - parts.points.ink(index).unwrap_or(even);
             for (channel, plane) in frame.planes.iter_mut().enumerate() {
                 if channel < channels {
                     let Some(spot) = spots.dot(index, channel) else {

@@ -5,6 +5,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::camera::{DefectsSection, SharpeningSection};
 use domecast_design::sections::Why;
 
 /// From light on the image plane to bytes.
@@ -26,9 +27,15 @@ pub struct ElectronicsSection {
     /// Colour filters over the pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bayer: Option<BayerPattern>,
+    /// Hot and dead pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub defects: Option<DefectsSection>,
     /// Shot, read and quantisation noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseSection>,
+    /// Sharpening by the camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sharpening: Option<SharpeningSection>,
     /// Quality of the JPEG code that the camera sends, 1 to 100; left out: no loss.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 100))]
@@ -48,7 +55,9 @@ impl Default for ElectronicsSection {
             focus: None,
             shutter: None,
             bayer: None,
+            defects: None,
             noise: None,
+            sharpening: None,
             jpeg_quality: None,
             jpeg_chroma: JpegChroma::HalfWidth,
             why: None,

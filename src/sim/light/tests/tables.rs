@@ -120,6 +120,7 @@ fn the_sensor_is_lit_from_three_sides() {
     // A point that was not moved has the same light by either table.
     let sample = |direction: DVec3, deformed| SurfaceSample {
         point_mm: (direction * 10.0).as_vec3a(),
+        material_mm: (direction * 10.0).as_vec3a(),
         normal: direction.as_vec3a(),
         to_camera: Vec3A::NEG_Z,
         is_moved: deformed,
@@ -158,6 +159,7 @@ fn largest_change(a: &ShadedDome, b: &ShadedDome, deformed: bool) -> f64 {
         let part = if deformed { (1.0 - direction.z).max(0.93) } else { 1.0 };
         let sample = SurfaceSample {
             point_mm: (direction * (10.0 * part)).as_vec3a(),
+            material_mm: (direction * 10.0).as_vec3a(),
             normal: direction.as_vec3a(),
             to_camera: Vec3A::NEG_Z,
             is_moved: deformed,

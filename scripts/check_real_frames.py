@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks what real frames have besides (dust, sharpening, defects, an uneven membrane) from outside, by NumPy and OpenCV.
+"""Checks what real frames have besides (dust, sharpening, defects, exposure, an uneven membrane) from outside, by NumPy and OpenCV.
 
 Each effect's frames are rendered twice, with it and without it, and compared with what is computed here from the design's
 numbers alone:
@@ -8,6 +8,7 @@ numbers alone:
   focussed, and those that meet the scratch's rectangle are counted;
 - sharpening: OpenCV's Gaussian on the frame without it;
 - hot and dead pixels: number, level and nothing else;
+- exposure and white balance: the loop in NumPy, from the frames without it;
 - an uneven membrane: over many seeds, the standard deviation of one pixel's level and its correlation with another's
   against `exp(-d^2 / (2 l^2))`, the places on the dome found by Snell's law.
 
@@ -139,6 +140,31 @@ def check_defects(program, folder):
     assert change[change > 0].min() >= 25 and change.max() <= 52 and ((change < 0) <= (image[..., 0] == 0)).all()
 
 
+def check_exposure(program, folder):
+    exposure = {"target_level": 0.35, "speed": 0.6, "first_gain": 2.0, "gain": [0.5, 3.0]}
+    balance = {"speed": 0.7, "first": [0.6, 1, 1.8]}
+    scene = {
+        "frames": {"count": 6, "rate_hz": 30}, "light": {"membrane_level": 0.55, "surround_level": 0.1},
+        "electronics": {"auto_exposure": exposure, "white_balance": balance},
+    }
+    images, truth = render(program, folder, scene, "exposed")
+    never = {"auto_exposure": "never", "white_balance": "never"}
+    plain, _ = render(program, folder, {**scene, "effects": never}, "unexposed")
+    gain, colours, worst = exposure["first_gain"], np.array(balance["first"]), 0.0
+    for image, light, line in zip(images, plain, truth):
+        light = light / 255
+        worst = max(worst, abs(line["exposure"]["gain"] / gain - 1),
+                    np.abs(np.array(line["exposure"]["white_balance"]) / colours - 1).max())
+        expected = np.clip(np.clip(light * gain, 0, 1) * colours, 0, 1) * 255
+        assert np.abs(expected - image).max() <= 0.5 + 0.5 * gain * colours.max() + 1e-6
+        means = np.clip(light * gain, 0, 1).mean(axis=(0, 1))
+        colours = np.clip(colours * (means[1] / (colours * means)) ** balance["speed"], 0.25, 4)
+        colours[1] = 1
+        gain = np.clip(gain * (exposure["target_level"] / means.mean()) ** exposure["speed"], *exposure["gain"])
+    print(f"exposure: gains {[round(line['exposure']['gain'], 3) for line in truth]}, off by at most {worst:.4f} of themselves")
+    assert worst < 5e-3
+
+
 def check_membrane(program, folder, sensor):
     amplitude, correlation_mm, seeds = 0.08, 2.0, 60
     places = [(320, 240), (340, 240), (365, 250), (320, 300), (250, 180)]
@@ -166,6 +192,7 @@ def main():
         check_scratch(program, folder, sensor)
         check_sharpening(program, folder)
         check_defects(program, folder)
+        check_exposure(program, folder)
         check_membrane(program, folder, sensor)
 
 

@@ -75,8 +75,6 @@ effect_names! {
     UnevenInk = uneven_ink,
     /// The membrane's reflectance varies from place to place.
     UnevenMembrane = uneven_membrane,
-    /// Dust and scratches on sheet and lens.
-    Dust = dust,
     /// The lights, their colours and lobes, through the sheet.
     DirectLight = direct_light,
     /// Falloff with distance and the cosine at the membrane.
@@ -89,6 +87,10 @@ effect_names! {
     PlatformShadow = platform_shadow,
     /// The membrane lights itself.
     Interreflection = interreflection,
+    /// The lights mirrored in the sheet's faces.
+    Gloss = gloss,
+    /// Dust and scratches on sheet and lens.
+    Dust = dust,
     /// The lens darkens towards the edge.
     Vignetting = vignetting,
     /// What is not in focus is blurred.
@@ -99,10 +101,14 @@ effect_names! {
     RollingShutter = rolling_shutter,
     /// Each pixel sees one colour.
     Bayer = bayer,
+    /// The camera sets its exposure by the frames before.
+    AutoExposure = auto_exposure,
     /// Hot and dead pixels.
     Defects = defects,
     /// Shot, read and quantisation noise.
     Noise = noise,
+    /// The camera sets its colours by the frames before.
+    WhiteBalance = white_balance,
     /// The camera sharpens.
     Sharpening = sharpening,
     /// The camera's lossy code.

@@ -26,8 +26,10 @@ impl Effect for DefectsEffect {
         let defects = Defects::of(scene);
         let gamma = scene.file().electronics.gamma;
         let hottest = defects.hot.iter().map(|(_, level)| f64::from(*level)).fold(0.0, f64::max);
-        let hot = bounds::grey_of_change(gamma, hottest);
-        let dead = bounds::grey_of_loss(gamma, bounds::brightest(scene)?, 1.0);
+        // Dark current is gained as light is.
+        let gain = scene.file().electronics.auto_exposure.as_ref().map_or(1.0, |section| section.gain[1]);
+        let hot = bounds::grey_of_change(gamma, gain * hottest);
+        let dead = bounds::grey_of_loss(gamma, gain * bounds::brightest(scene)?, 1.0);
         Ok(Bound::grey(if defects.dead.is_empty() { hot } else { hot.max(dead) }))
     }
 

@@ -1,5 +1,6 @@
 //! The effects, one file each.
 
+mod auto_exposure;
 mod bayer;
 mod compression;
 pub(crate) mod contact;
@@ -15,6 +16,7 @@ mod falloff;
 mod fresnel;
 mod gap_change;
 pub(crate) mod geometry_bound;
+mod gloss;
 mod ink_edge;
 mod interreflection;
 mod lens_distortion;
@@ -35,6 +37,7 @@ mod tests;
 mod uneven_ink;
 mod uneven_membrane;
 mod vignetting;
+mod white_balance;
 
 use self::effect::Effect;
 
@@ -52,20 +55,23 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &ink_edge::InkEdge,
         &uneven_ink::UnevenInk,
         &uneven_membrane::UnevenMembrane,
-        &dust::Dust,
         &direct_light::DirectLightEffect,
         &falloff::Falloff,
         &diffuser::DiffuserEffect,
         &fresnel::Fresnel,
         &platform_shadow::PlatformShadow,
         &interreflection::Interreflection,
+        &gloss::GlossEffect,
+        &dust::Dust,
         &vignetting::Vignetting,
         &defocus::Defocus,
         &motion_blur::MotionBlur,
         &rolling_shutter::RollingShutter,
         &bayer::Bayer,
+        &auto_exposure::AutoExposure,
         &defects::DefectsEffect,
         &noise::Noise,
+        &white_balance::WhiteBalance,
         &sharpening::Sharpening,
         &compression::Compression,
     ]

@@ -28,7 +28,9 @@ impl Effect for Noise {
         let Some(noise) = &electronics.noise else { return Ok(Bound::default()) };
         // The 99.9th percentile of a Gaussian's size is 3.29 deviations; Poisson's law reaches further by less than
         // (z^2 - 1) / 6 + 1 electrons. The converter is off by half a step. The steepest place of the code takes it.
-        let full = noise.full_scale_electrons;
+        // Behind the largest gain full scale stands for the fewest electrons.
+        let gain = electronics.auto_exposure.as_ref().map_or(1.0, |section| section.gain[1]);
+        let full = noise.full_scale_electrons / gain;
         let deviation = (full + noise.read_electrons.powi(2)).sqrt();
         let change = (3.29 * deviation + 3.0) / full + 0.5 / steps(noise);
         Ok(Bound::grey(bounds::grey_of_change(electronics.gamma, change)))

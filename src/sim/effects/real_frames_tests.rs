@@ -10,12 +10,15 @@ use crate::{Image8, Scene, Work};
 use domecast_optics::numeric::SeededRandom;
 
 /// The effects of these tests.
-const EFFECTS: [EffectName; 5] = [
+const EFFECTS: [EffectName; 8] = [
     EffectName::UnevenInk,
     EffectName::UnevenMembrane,
     EffectName::Dust,
     EffectName::Defects,
     EffectName::Sharpening,
+    EffectName::AutoExposure,
+    EffectName::WhiteBalance,
+    EffectName::Gloss,
 ];
 
 fn scene_of(more: &str) -> Scene {
@@ -73,7 +76,7 @@ fn random_scene(seed: u64, effect: EffectName) -> Scene {
         EffectName::UnevenInk => format!(
             r#""ink": {{ "edge_mm": 0.05, "uneven": {{ "reflectance": {}, "diameter": {} }} }}"#,
             log_between(random, 1e-3, 0.1),
-            log_between(random, 1e-3, 0.15)
+            log_between(random, 1e-3, 0.1)
         ),
         EffectName::UnevenMembrane => format!(
             r#""uneven_membrane": {{ "amplitude": {}, "correlation_mm": {} }}"#,
@@ -103,6 +106,16 @@ fn random_scene(seed: u64, effect: EffectName) -> Scene {
         ),
         _ => String::new(),
     };
+    let gain = log_between(random, 0.4, 2.5);
+    let camera = match effect {
+        EffectName::AutoExposure => {
+            format!(r#", "auto_exposure": {{ "target_level": 0.3, "speed": 0, "first_gain": {gain} }}"#)
+        }
+        EffectName::WhiteBalance => {
+            format!(r#", "white_balance": {{ "speed": 0, "first": [{gain}, 1, 1] }}"#)
+        }
+        _ => camera,
+    };
     let focus = if random.uniform() < 0.6 {
         format!(
             r#", "focus": {{ "pupil_diameter_mm": {}, "distance_mm": {} }}"#,
@@ -114,8 +127,11 @@ fn random_scene(seed: u64, effect: EffectName) -> Scene {
     };
     let comma = if part.is_empty() { "" } else { ", " };
     let membrane = random.between(0.3, 0.9);
+    let leds =
+        format!(r#", "leds": {{ "level_per_mw_mm2": {}, "gloss": true }}"#, log_between(random, 0.05, 500.0));
+    let leds = if effect == EffectName::Gloss { leds } else { String::new() };
     scene_of(&format!(
-        r#"{comma}{part}, "seed": {seed}, "light": {{ "membrane_level": {membrane} }},
+        r#"{comma}{part}, "seed": {seed}, "light": {{ "membrane_level": {membrane} {leds} }},
            "electronics": {{ "gamma": {gamma} {focus} {camera} }}"#
     ))
 }
@@ -253,5 +269,50 @@ fn an_uneven_membrane_keeps_to_its_field_under_lights_and_without() {
             }
         }
         assert!(seen > 50, "{seen}");
+    }
+}
+
+/// Frames of a scene under a light that grows stronger, whose camera follows.
+fn followed(threads: usize) -> (Vec<Vec<u8>>, Vec<serde_json::Value>) {
+    let mut scene = scene_of(
+        r#", "light": { "membrane_level": 0.2, "surround_level": 0.1 },
+        "motion": { "pose": [{ "time_s": 0 }, { "time_s": 0.2, "translation_mm": [0, 0, -0.4] }] },
+        "electronics": { "auto_exposure": { "target_level": 0.3, "speed": 0.5 },
+            "white_balance": { "speed": 0.5, "first": [0.8, 1, 1.3] },
+            "noise": { "full_scale_electrons": 5000 } }"#,
+    );
+    scene.override_run(Some(6), None).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let plan = Plan::of(&scene).unwrap();
+    pool.install(|| crate::run::run(&scene, &plan, &out, &mut |_| {})).unwrap();
+    let truth = std::fs::read_to_string(out.join(crate::run::TRUTH_NAME)).unwrap();
+    let frames = (0..6).map(|k| std::fs::read(out.join(format!("frame_{k:04}.png"))).unwrap()).collect();
+    let renderer = Renderer::new(&scene, &plan).unwrap();
+    let alone = renderer.frame(4).unwrap();
+    let lines: Vec<serde_json::Value> =
+        truth.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(
+        serde_json::to_value(alone.truth.exposure).unwrap(),
+        lines[4]["exposure"],
+        "a frame drawn alone"
+    );
+    (frames, lines)
+}
+
+#[test]
+fn gains_follow_the_frames_before_and_not_the_threads() {
+    let (frames, truth) = followed(1);
+    assert!(followed(3) == (frames, truth.clone()));
+    let gains: Vec<f64> = truth.iter().map(|line| line["exposure"]["gain"].as_f64().unwrap()).collect();
+    let reds: Vec<f64> =
+        truth.iter().map(|line| line["exposure"]["white_balance"][0].as_f64().unwrap()).collect();
+    println!("{gains:?} {reds:?}");
+    assert!(gains[0] == 1.0 && gains.windows(2).all(|pair| pair[1] > pair[0]), "{gains:?}");
+    assert!(reds[0] == 0.8 && reds.windows(2).all(|pair| pair[1] > pair[0] && pair[1] < 1.001), "{reds:?}");
+    // Halfway in the logarithm of what is left, with each frame: grey light has balanced colours.
+    for pair in reds.windows(2) {
+        assert!((pair[1] / pair[0].sqrt() - 1.0).abs() < 0.01, "{reds:?}");
     }
 }

@@ -27,6 +27,7 @@ impl Effect for Sharpening {
         let Some(section) = &electronics.sharpening else { return Ok(Bound::default()) };
         // The mask may make any value darker or brighter by so much, from what may be dark.
         let random = electronics.noise.is_some() || electronics.defects.is_some();
+        let random = random || electronics.auto_exposure.is_some() || electronics.white_balance.is_some();
         let brightest = if random { 1.0 } else { bounds::brightest(scene)?.min(1.0) };
         let change = section.amount * given_away(section) * brightest;
         Ok(Bound::grey(bounds::grey_of_change(electronics.gamma, change)))

@@ -61,7 +61,7 @@ impl Effect for UnevenInk {
         // The code rises most from the darkest ink, or ends with the steepest slope.
         let rise = ((darkest + change).min(1.0).powf(power) - darkest.powf(power))
             .max(1.0 - (1.0 - change).powf(power));
-        let grey = 255.0 * bounds::brightest(scene)?.min(1.0).powf(power) * rise;
+        let grey = 255.0 * bounds::brightest_membrane(scene)?.min(1.0).powf(power) * rise;
         Ok(Bound { px: centroids_apart_px(scene)?, grey })
     }
 
@@ -90,12 +90,10 @@ fn centroids_apart_px(scene: &Scene) -> Result<f64, SimError> {
     };
     let (even, uneven) = (points(false), points(true));
     let solved = solved_frames(scene)?;
-    let count = solved.touches().count();
-    let every = count.div_ceil(MAX_FRAMES).max(1);
+    let last = solved.touches().count().saturating_sub(1);
+    let step = last.div_ceil(MAX_FRAMES - 1).max(1);
     let mut apart_px = 0.0_f64;
-    for (frame, touch) in
-        solved.touches().filter(|(k, _)| *k as usize % every == 0 || *k as usize + 1 == count)
-    {
+    for (frame, touch) in solved.touches().step_by(step).chain(solved.touches().skip(last)) {
         let touched = SkinShape { touch: Some(Between::at_frame(touch.clone())), ..SkinShape::default() };
         let time_s = scene.time_s(frame);
         let instant =

@@ -52,7 +52,7 @@ impl Effect for UnevenMembrane {
         let between = 1.1 + 0.5 * spacing * radius_mm / uneven.correlation_mm;
         let part = uneven.amplitude * (largest * between).min(MAX_DEVIATIONS);
         let power = 1.0 / scene.file().electronics.gamma;
-        let brightest = bounds::brightest(scene)? / (1.0 + MAX_DEVIATIONS * uneven.amplitude);
+        let brightest = bounds::brightest_membrane(scene)? / (1.0 + MAX_DEVIATIONS * uneven.amplitude);
         let full = brightest.min(1.0).powf(power);
         let rise = 255.0 * full * ((1.0 + part).powf(power) - 1.0).min(1.0);
         Ok(Bound::grey(rise.max(bounds::grey_of_loss(scene.file().electronics.gamma, brightest, part))))

@@ -78,11 +78,12 @@ impl Pass for HotPixels {
         Stage::Sensor
     }
 
-    fn run(&self, frame: &mut Frame, _context: &PassContext, work: &mut Work) {
+    fn run(&self, frame: &mut Frame, context: &PassContext, work: &mut Work) {
         let width = frame.width();
+        let gain = context.gains.exposure as f32;
         for plane in &mut frame.planes {
             for ([x, y], level) in &self.0 {
-                plane.get_mut(y * width + x).into_iter().for_each(|value| *value += level);
+                plane.get_mut(y * width + x).into_iter().for_each(|value| *value += gain * level);
             }
             work.add(EffectName::Defects, self.0.len() as u64 * PIXEL_UNITS);
         }

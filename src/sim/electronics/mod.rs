@@ -6,6 +6,7 @@ pub(crate) mod bayer;
 pub(crate) mod compression;
 pub(crate) mod defects;
 pub(crate) mod defocus;
+pub(crate) mod exposure;
 pub(crate) mod noise;
 pub mod pass;
 pub(crate) mod sharpening;

@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     fn sharpened(section: &SharpeningSection, frame: &mut Frame) {
-        let context = PassContext { frame: 0, seed: 0 };
+        let context = PassContext::default();
         UnsharpMask::of(section).run(frame, &context, &mut Work::default());
     }
 

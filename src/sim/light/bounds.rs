@@ -57,10 +57,19 @@ pub fn grey_of_loss(gamma: f64, brightest: f64, part: f64) -> f64 {
 /// Lights that do not fit the design.
 pub fn brightest(scene: &Scene) -> Result<f64, SimError> {
     let light = &scene.file().light;
-    let even = match light.leds {
-        Some(_) => LightBounds::of(scene)?.brightest.max(light.surround_level),
-        None => light.brightest_level(),
-    };
+    // Mirrored lights may be as bright as they are.
+    let mirrored = if light.leds.as_ref().is_some_and(|leds| leds.gloss) { f64::INFINITY } else { 0.0 };
+    Ok(brightest_membrane(scene)?.max(light.marker_level).max(light.surround_level).max(mirrored))
+}
+
+/// The same of the membrane alone.
+///
+/// # Errors
+/// As [`brightest`].
+pub fn brightest_membrane(scene: &Scene) -> Result<f64, SimError> {
+    let light = &scene.file().light;
+    let lit = if light.leds.is_some() { LightBounds::of(scene)?.brightest } else { 0.0 };
+    let even = lit.max(light.membrane_level);
     // No place of an uneven membrane is brighter than its mean by more than this.
     let uneven =
         scene.file().uneven_membrane.as_ref().map_or(0.0, |uneven| MAX_DEVIATIONS * uneven.amplitude);

@@ -12,6 +12,7 @@ pub mod direct;
 pub mod dome_map;
 pub mod field;
 pub mod fresnel;
+pub(crate) mod gloss;
 pub mod lobe;
 pub mod parts;
 pub mod quadrature;

@@ -198,7 +198,8 @@ impl Plan {
                 let bound = entry.bound.filter(|_| entry.used)?;
                 let cost = entry.cost?.total(frames);
                 let shifted = if bound.px > 0.0 { bound.px * per_px } else { 0.0 };
-                let grey = bound.grey * growth(scene, entry.effect) + shifted;
+                let own = if bound.grey > 0.0 { bound.grey * growth(scene, entry.effect) } else { 0.0 };
+                let grey = own + shifted;
                 let small = bound.px <= tolerance.px && grey <= tolerance.grey;
                 let free = scene.choice(entry.effect) == EffectChoice::Plan;
                 (small && free && cost > 0).then_some(Candidate { index, px: bound.px, grey, cost })

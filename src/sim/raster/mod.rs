@@ -3,6 +3,7 @@
 pub(crate) mod coverage;
 pub mod edges;
 pub(crate) mod frame;
+pub(crate) mod glints;
 pub(crate) mod lattice;
 pub(crate) mod lens_field;
 pub(crate) mod outline;

@@ -5,9 +5,11 @@ use std::ops::Range;
 use glam::DVec2;
 
 use crate::effect_name::EffectName;
+use crate::light::gloss::Gloss;
 use crate::light::shading::Shading;
 use crate::raster::coverage::{Coverage, clip, clip_to_image};
 use crate::raster::frame::Frame;
+use crate::raster::glints;
 use crate::raster::lattice::Lattice;
 use crate::raster::lens_field::{LensField, inside, rim_polygon};
 use crate::raster::rolled::Slice;
@@ -33,6 +35,8 @@ pub struct Parts<'a> {
     pub points: &'a Points,
     /// The columns that the lens shows.
     pub field: &'a LensField,
+    /// The lights mirrored in the sheet.
+    pub gloss: Option<&'a Gloss>,
     /// Dust before the sensor.
     pub dust: Option<&'a Specks>,
 }
@@ -62,6 +66,9 @@ impl Painter {
             self.dots(parts, spots, frame, work);
         }
         self.markers(parts, spots, frame, work);
+        if let Some(gloss) = parts.gloss {
+            glints::lay(gloss, slices, frame, &mut self.coverage, work);
+        }
         if let Some(dust) = parts.dust {
             dust.lay(slices, parts.field, frame, work);
         }

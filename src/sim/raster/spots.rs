@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::effect_name::EffectName;
+use crate::light::random_field::PLACE_UNITS;
 use crate::raster::coverage::{area_moment, clip, clip_to_image};
 use crate::raster::outline::RimFit;
 use crate::raster::printed::printed_dots;
@@ -94,6 +95,7 @@ impl Points {
             std::array::from_fn(|k| k.checked_sub(1).map_or(center, |k| rim[k]))
         };
         let printed = if ink.uneven { printed_dots(scene) } else { Vec::new() };
+        work.add(EffectName::UnevenInk, printed.len() as u64 * PLACE_UNITS);
         let dot_points = |(index, dot): (usize, &SceneDot)| {
             let scale = printed.get(index).map_or(1.0, |printed| printed.scale);
             let rim = dot.rim_mm.map(|place| scaled_on_dome(dot.center_mm, place, scale));
@@ -118,11 +120,13 @@ impl Points {
             work.add(EffectName::Refraction, count as u64 * units::BEND);
         }
         let edge_mm = scene.file().ink.edge_mm;
-        let rings = scene.layout().dots.iter().map(|dot| {
+        let rings = scene.layout().dots.iter().enumerate().map(|(index, dot)| {
             if !ink.soft_edge {
                 return vec![1.0];
             }
-            let half = (edge_mm / dot.diameter_mm).min(1.0);
+            // The ink's edge is as wide on a smaller dot.
+            let scale = printed.get(index).map_or(1.0, |printed| printed.scale);
+            let half = (edge_mm / (dot.diameter_mm * scale)).min(1.0);
             let ring = |k: u32| 1.0 + half * ((f64::from(k) + 0.5) * 2.0 / f64::from(EDGE_RINGS) - 1.0);
             (0..EDGE_RINGS).map(ring).collect()
         });

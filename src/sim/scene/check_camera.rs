@@ -3,6 +3,15 @@
 use super::file::SceneFile;
 use domecast_design::DesignError;
 
+/// A gain of the first frame lies within the range of the others.
+fn within(field: String, value: f64, [low, high]: [f64; 2]) -> Result<(), DesignError> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    let allowed = format!("{low} to {high}, the range of `gain` beside it");
+    Err(DesignError::at(field, value, "the first gain is outside of the range of gains", allowed))
+}
+
 /// Pairs from small to large, pixels inside of the picture.
 pub(super) fn check(file: &SceneFile, [width, height]: [u32; 2]) -> Result<(), DesignError> {
     let rises = |field: String, [low, high]: [f64; 2]| {
@@ -23,6 +32,16 @@ pub(super) fn check(file: &SceneFile, [width, height]: [u32; 2]) -> Result<(), D
         }
         for (index, lot) in dust.scratches.iter().enumerate() {
             rises(format!("dust.scratches[{index}].length_mm"), lot.length_mm)?;
+        }
+    }
+    if let Some(section) = &file.electronics.auto_exposure {
+        rises("electronics.auto_exposure.gain".into(), section.gain)?;
+        within("electronics.auto_exposure.first_gain".into(), section.first_gain, section.gain)?;
+    }
+    if let Some(section) = &file.electronics.white_balance {
+        rises("electronics.white_balance.gain".into(), section.gain)?;
+        for (colour, first) in section.first.iter().enumerate() {
+            within(format!("electronics.white_balance.first[{colour}]"), *first, section.gain)?;
         }
     }
     let Some(defects) = &file.electronics.defects else { return Ok(()) };

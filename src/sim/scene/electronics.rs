@@ -5,7 +5,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::camera::{DefectsSection, SharpeningSection};
+use super::camera::{AutoExposureSection, DefectsSection, SharpeningSection, WhiteBalanceSection};
 use domecast_design::sections::Why;
 
 /// From light on the image plane to bytes.
@@ -27,12 +27,18 @@ pub struct ElectronicsSection {
     /// Colour filters over the pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bayer: Option<BayerPattern>,
+    /// An exposure that the camera sets by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub auto_exposure: Option<AutoExposureSection>,
     /// Hot and dead pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub defects: Option<DefectsSection>,
     /// Shot, read and quantisation noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseSection>,
+    /// A white balance that the camera sets by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub white_balance: Option<WhiteBalanceSection>,
     /// Sharpening by the camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sharpening: Option<SharpeningSection>,
@@ -55,8 +61,10 @@ impl Default for ElectronicsSection {
             focus: None,
             shutter: None,
             bayer: None,
+            auto_exposure: None,
             defects: None,
             noise: None,
+            white_balance: None,
             sharpening: None,
             jpeg_quality: None,
             jpeg_chroma: JpegChroma::HalfWidth,

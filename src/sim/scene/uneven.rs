@@ -35,7 +35,7 @@ pub struct UnevenInkSection {
     pub correlation_mm: f64,
     /// Standard deviation of a dot's diameter, part of it, each dot for itself; none is off by more than three of them.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 0.2))]
+    #[schemars(range(min = 0.0, max = 0.1))]
     pub diameter: f64,
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -49,7 +49,7 @@ impl Effect for Dust {
 
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
         let specks = specks_of(scene);
-        let taken = most_taken(scene, &specks)?;
+        let taken = max_taken(scene, &specks)?;
         let gamma = scene.file().electronics.gamma;
         let level = specks.things.iter().map(|thing| thing.level).fold(0.0, f64::max);
         let darker = bounds::grey_of_loss(gamma, bounds::brightest(scene)?, taken);
@@ -170,7 +170,7 @@ fn scratch_things(scene: &Scene, lot: &ScratchLot, random: &mut SeededRandom, th
 }
 
 /// The largest part of its light that any pixel can lose to the dust, in the frames that stand for the scene's.
-fn most_taken(scene: &Scene, specks: &Specks) -> Result<f64, SimError> {
+fn max_taken(scene: &Scene, specks: &Specks) -> Result<f64, SimError> {
     // What each thing takes at most, and the widest cone at it.
     let mut found = vec![(0.0_f64, 0.0_f64); specks.things.len()];
     let solved = geometry_bound::solved_frames(scene)?;
@@ -205,7 +205,7 @@ fn most_taken(scene: &Scene, specks: &Specks) -> Result<f64, SimError> {
         });
         let left: f64 = near.map(|(_, (taken, _))| 1.0 - taken).product();
         match faces.iter_mut().find(|(face, _)| *face == thing.face) {
-            Some((_, least)) => *least = least.min(left),
+            Some((_, lowest)) => *lowest = lowest.min(left),
             None => faces.push((thing.face, left)),
         }
     }

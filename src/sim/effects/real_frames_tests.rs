@@ -160,14 +160,14 @@ fn within_bounds(seeds: std::ops::Range<u64>) {
         ratios.sort_by(f64::total_cmp);
         counted.sort_by(f64::total_cmp);
         let middle = ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
-        let most = ratios.last().copied().unwrap_or(1.0);
+        let largest = ratios.last().copied().unwrap_or(1.0);
         println!(
-            "{effect}: bound over size: median {middle:.2}, largest {most:.2} of {}; counted over predicted {:.2} to {:.2}",
+            "{effect}: bound over size: median {middle:.2}, largest {largest:.2} of {}; counted over predicted {:.2} to {:.2}",
             ratios.len(),
             counted.first().unwrap(),
             counted.last().unwrap()
         );
-        assert!(middle <= 3.0 && most <= 10.0, "{effect}: {ratios:?}");
+        assert!(middle <= 3.0 && largest <= 10.0, "{effect}: {ratios:?}");
     }
 }
 

@@ -16,19 +16,19 @@ pub(crate) fn growth(scene: &Scene, effect: EffectName) -> f64 {
         factor *= 1.0 + 2.0 * section.amount * given_away(section);
     }
     let electronics = &file.electronics;
-    let (mut gain, mut least) = (1.0_f64, f64::INFINITY);
+    let (mut gain, mut min_mean) = (1.0_f64, f64::INFINITY);
     if let Some(section) = electronics.auto_exposure.as_ref().filter(|_| after(EffectName::AutoExposure)) {
         gain = section.gain[1].max(1.0);
-        least = MIN_PART * section.target_level;
+        min_mean = MIN_PART * section.target_level;
     }
     if let Some(section) = electronics.white_balance.as_ref().filter(|_| after(EffectName::WhiteBalance)) {
         gain *= section.gain[1].max(1.0);
         // Both green's mean and the colour's own.
-        least = least.min(0.5 * MIN_MEAN);
+        min_mean = min_mean.min(0.5 * MIN_MEAN);
     }
     // What changes the mean by a part of it changes the gain by no more of itself, and with it every pixel.
-    if least.is_finite() {
-        factor *= gain * (1.0 + 1.0 / least);
+    if min_mean.is_finite() {
+        factor *= gain * (1.0 + 1.0 / min_mean);
     }
     // The membrane is below all of them: where it is brighter than its mean, so is what they change.
     if let Some(uneven) = &file.uneven_membrane

@@ -1,7 +1,7 @@
 //! How far pixels of a lit membrane that are filled in between rays may be off.
 
 use crate::effect_name::EffectName;
-use crate::plan::growth::growth;
+use crate::plan::growth::{growth, is_sharpened};
 use crate::scene::Scene;
 
 /// Part of a scene's grey tolerance that the filling takes; the rest is for the effects that are left out.
@@ -23,8 +23,9 @@ pub(crate) fn fill_grey(scene: &Scene) -> f64 {
 /// the stray light is the end.
 pub(crate) fn fill_tolerance(scene: &Scene, grey: f64) -> f32 {
     let file = scene.file();
-    // What is filled in is drawn before every effect that enlarges.
-    let darkest = file.light.leds.as_ref().map_or(0.0, |leds| leds.stray_level).max(DARKEST);
+    // What is filled in is drawn before every effect that enlarges; sharpening may take stray light away as well.
+    let leds = file.light.leds.as_ref().filter(|_| !is_sharpened(scene, EffectName::LensDistortion));
+    let darkest = leds.map_or(0.0, |leds| leds.stray_level).max(DARKEST);
     (grey / 255.0 / file.electronics.steepest_code(darkest) / growth(scene, EffectName::LensDistortion))
         as f32
 }

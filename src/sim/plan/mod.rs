@@ -22,7 +22,7 @@ use crate::effects;
 use crate::effects::geometry_bound::shift_px;
 use crate::effects::light_bound;
 use crate::plan::fill::{fill_grey, fill_tolerance};
-use crate::plan::growth::growth;
+use crate::plan::growth::{grown, growth};
 use crate::plan::search::{Candidate, best_set, closed, drop_orphans, effect_of};
 use crate::raster::settings::Geometry;
 use crate::scene::Scene;
@@ -318,9 +318,4 @@ fn grey_of_shift(scene: &Scene, px: f64) -> Result<f64, SimError> {
     // What any geometric effect moves, all others may enlarge.
     let grey = light_bound::covered_grey(scene, 2.0 * std::f64::consts::SQRT_2 * px)?;
     Ok(grown(scene, EffectName::LensDistortion, grey))
-}
-
-/// What the absence of an effect changes, with what the effects after it make of that, grey levels.
-fn grown(scene: &Scene, effect: EffectName, grey: f64) -> f64 {
-    if grey > 0.0 { grey * growth(scene, effect) } else { 0.0 }
 }

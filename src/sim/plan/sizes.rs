@@ -5,8 +5,9 @@ use std::path::Path;
 
 use domecast_optics::numeric::SeededRandom;
 
+use super::grey_of_shift;
+use super::growth::grown;
 use super::random_scenes::{apart, lit_designs, lit_scene, shipped};
-use super::{grey_of_shift, grown};
 use crate::contact::between::Around;
 use crate::contact::stepper::Touch;
 use crate::output::drawn::{Drawn, Scratch};

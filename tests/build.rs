@@ -53,6 +53,11 @@ fn distance<const N: usize>(a: [f64; N], b: [f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
+/// Height of the sphere's centre over the sheet's top: not 0 for a cap.
+fn center_z_mm(constants: &Value) -> f64 {
+    constants["optics"]["dome_center_z_mm"].as_f64().unwrap_or(0.0)
+}
+
 #[test]
 fn dots_lie_on_the_dome_and_project_to_their_pixels() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -66,8 +71,9 @@ fn dots_lie_on_the_dome_and_project_to_their_pixels() {
         let mut points = String::new();
         for dot in dots {
             let [x, y, z] = numbers(&dot["surface_mm"]);
-            assert!(((x * x + y * y + z * z).sqrt() - radius_mm).abs() < 1e-9, "{name}: {dot}");
-            assert!(distance(numbers(&dot["normal"]), [x / radius_mm, y / radius_mm, z / radius_mm]) < 1e-9);
+            let up = z - center_z_mm(&constants);
+            assert!(((x * x + y * y + up * up).sqrt() - radius_mm).abs() < 1e-9, "{name}: {dot}");
+            assert!(distance(numbers(&dot["normal"]), [x / radius_mm, y / radius_mm, up / radius_mm]) < 1e-9);
             points += &format!("{x:?},{y:?},{z:?}\n");
         }
         // through the command line, as another program would ask
@@ -153,7 +159,7 @@ fn the_artwork_lands_on_the_dots() {
                 let landed = [
                     azimuth_cos * along - azimuth_sin * across,
                     azimuth_sin * along + azimuth_cos * across,
-                    up,
+                    up + center_z_mm(&constants),
                 ];
                 assert!(distance(landed, numbers(&dots[id]["surface_mm"])) < 1e-4, "{name}: {element}");
                 assert!(distance([x, y], numbers(&dots[id]["plate_mm"])) < 1e-9, "{name}: {element}");
@@ -181,7 +187,9 @@ fn the_whole_sensor_fits_its_envelope() {
             numbers(&part["bbox_mm"][end])
         };
         let (upper, lower) = (corner("upper_platform", 1), corner("lower_platform", 0));
+        let constants = json(&built.join("constants/constants.json"));
         let pole_mm = given("dome.radius_mm").as_f64().expect("a radius")
+            + center_z_mm(&constants)
             + given("elastomer.membrane_thickness_mm").as_f64().expect("a thickness");
         let size = [
             corner("lower_platform", 1)[0].max(upper[0]) - lower[0].min(corner("upper_platform", 0)[0]),

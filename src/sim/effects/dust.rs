@@ -95,7 +95,7 @@ fn face_of(scene: &Scene, on: DustyFace) -> Face {
 
 /// Middle and radius of the part of a face through which the camera at rest sees the dome's foot, mm.
 fn seen_part(scene: &Scene, face: Face) -> (DVec2, f64) {
-    let (camera_mm, radius_mm) = (camera_mm(scene), scene.optics().dome_radius_mm());
+    let (camera_mm, radius_mm) = (camera_mm(scene), scene.optics().dome().rim_radius_mm());
     let height_mm = (-camera_mm.z).max(1e-6);
     match face {
         Face::Lens(distance_mm) => (DVec2::ZERO, radius_mm * distance_mm / height_mm),

@@ -9,7 +9,7 @@ use crate::light::bounds;
 use crate::light::random_field::{MAX_DEVIATIONS, PLACE_UNITS, RandomField};
 use crate::light::uneven::Unevenness;
 use crate::{Pipeline, Scene, SimError};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 /// See the module.
 pub struct UnevenMembrane;
@@ -39,18 +39,19 @@ impl Effect for UnevenMembrane {
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
         let Some(uneven) = &scene.file().uneven_membrane else { return Ok(Bound::default()) };
         let field = field_of(scene, uneven.correlation_mm);
-        let radius_mm = scene.optics().dome_radius_mm();
+        let dome = scene.optics().dome();
+        let radius_mm = dome.radius_mm();
         let spacing = 2.0 / ALONG as f64;
         let at = |k: usize| (k as f64 + 0.5) * spacing - 1.0;
         let mut largest = 0.0_f64;
         for aside in (0..ALONG * ALONG).map(|k| DVec2::new(at(k % ALONG), at(k / ALONG))) {
             // Pictures show the dome's continuation below its foot for a pixel or two: its rim stands for that.
-            let aside = aside.clamp_length_max(1.0);
-            let up: DVec3 = aside.extend((1.0 - aside.length_squared()).max(0.0).sqrt());
-            largest = largest.max(field.at(up * radius_mm).abs());
+            let meridian_rad = aside.length().min(1.0) * dome.meridian_end_rad();
+            let azimuth_rad = aside.y.atan2(aside.x);
+            largest = largest.max(field.at(dome.point_mm(meridian_rad, azimuth_rad)).abs());
         }
         // Between two places, and where the slope of the dome is steep, the field may be larger.
-        let between = 1.1 + 0.5 * spacing * radius_mm / uneven.correlation_mm;
+        let between = 1.1 + 0.5 * spacing * dome.meridian_end_rad() * radius_mm / uneven.correlation_mm;
         let part = uneven.amplitude * (largest * between).min(MAX_DEVIATIONS);
         let power = 1.0 / scene.file().electronics.gamma;
         let [brightest, _] = light_bound::brightest_membrane(scene)?;

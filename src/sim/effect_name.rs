@@ -71,6 +71,10 @@ effect_names! {
     Dots = dots,
     /// The ink fades out at a dot's edge.
     InkEdge = ink_edge,
+    /// No two dots are quite alike.
+    UnevenInk = uneven_ink,
+    /// The membrane's reflectance varies from place to place.
+    UnevenMembrane = uneven_membrane,
     /// The lights, their colours and lobes, through the sheet.
     DirectLight = direct_light,
     /// Falloff with distance and the cosine at the membrane.
@@ -83,6 +87,10 @@ effect_names! {
     PlatformShadow = platform_shadow,
     /// The membrane lights itself.
     Interreflection = interreflection,
+    /// The lights mirrored in the sheet's faces.
+    Gloss = gloss,
+    /// Dust and scratches on sheet and lens.
+    Dust = dust,
     /// The lens darkens towards the edge.
     Vignetting = vignetting,
     /// What is not in focus is blurred.
@@ -93,11 +101,15 @@ effect_names! {
     RollingShutter = rolling_shutter,
     /// Each pixel sees one colour.
     Bayer = bayer,
-    /// Some pixels fill in the dark.
-    HotPixels = hot_pixels,
+    /// The camera sets its exposure by the frames before.
+    AutoExposure = auto_exposure,
+    /// Hot and dead pixels.
+    Defects = defects,
     /// Shot, read and quantisation noise.
     Noise = noise,
-    /// The camera sharpens what it has read.
+    /// The camera sets its colours by the frames before.
+    WhiteBalance = white_balance,
+    /// The camera sharpens.
     Sharpening = sharpening,
     /// The camera's lossy code.
     Compression = compression,

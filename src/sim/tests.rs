@@ -312,7 +312,7 @@ fn a_contact_at_its_bound_is_told_with_what_is_left() {
 
 #[test]
 fn frames_do_not_depend_on_threads() {
-    for (name, count) in [("push.json", 5), ("ball.json", 12)] {
+    for (name, count) in [("push.json", 5), ("ball.json", 12), ("worn.json", 4)] {
         check_frames_by_threads(name, count);
     }
 }

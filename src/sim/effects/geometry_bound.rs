@@ -1,5 +1,7 @@
 //! What geometric effects shift, on the scene's own points and frames.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 
 use crate::SimError;
@@ -58,8 +60,7 @@ fn frames(scene: &Scene) -> Vec<u32> {
 pub(super) fn poses(scene: &Scene) -> Result<Vec<Rigid>, SimError> {
     let mut out = vec![Rigid::identity()];
     if called_for(scene).sheet_motion {
-        let frames = frames(scene);
-        let solved = scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames))?;
+        let solved = solved_frames(scene)?;
         let all: Vec<Rigid> = solved.touches().map(|(_, touch)| touch.state.pose).collect();
         let step = all.len().div_ceil(MAX_POSES).max(1);
         out.extend(all.iter().step_by(step).chain(all.last()).copied());
@@ -81,7 +82,7 @@ pub(super) fn px_per_touched_frame(scene: &Scene) -> Result<Option<f64>, SimErro
     let geometry = called_for(scene);
     let eye = Projector::new(scene, geometry)?;
     let points = Points::new(scene, (geometry, Ink::default()), &eye, 0.1, &mut uncounted);
-    let solved = scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames))?;
+    let solved = solved_frames(scene)?;
     let (mut last, mut fastest): (Vec<Option<DVec2>>, f64) = (Vec::new(), 0.0);
     for (frame, touch) in solved.touches() {
         let shape = SkinShape { touch: Some(Between::at_frame(touch.clone())), ..SkinShape::default() };
@@ -107,6 +108,14 @@ fn quickest_level(scene: &Scene) -> Level {
         LevelName::Linear if edged => level_named(scene, LevelName::Linear),
         _ => Level::Geometric,
     }
+}
+
+/// The frames that stand for the scene's, solved.
+///
+/// # Errors
+/// A frame whose load has no balance.
+pub(super) fn solved_frames(scene: &Scene) -> Result<Arc<SolvedFrames>, SimError> {
+    scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames(scene)))
 }
 
 /// A dot's centroid moves with the mean of its surroundings: no more than this often the largest motion of a centre.
@@ -137,7 +146,7 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
     let colours = if a_eye.channels() == 1 && b_eye.channels() == 1 { 1 } else { scene.planes() };
     let mut last: Vec<DVec2> = Vec::new();
     let (mut worst, mut change): (f64, f64) = (0.0, 0.0);
-    let solved = scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames))?;
+    let solved = solved_frames(scene)?;
     for (frame, touch) in solved.touches() {
         let time_s = scene.time_s(frame);
         let between = Between::at_frame(touch.clone());

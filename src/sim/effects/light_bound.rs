@@ -6,8 +6,9 @@ use super::geometry_bound::poses;
 use crate::SimError;
 use crate::bound::Bound;
 use crate::effect_name::{EffectChoice, EffectName};
-use crate::electronics::hot_pixels::DarkCurrent;
-use crate::light::bounds::{CoarseLight, grey_of_change_from, grey_of_level};
+use crate::electronics::defects::Defects;
+use crate::light::bounds::{CoarseLight, grey_of_change, grey_of_change_from, grey_of_level};
+use crate::light::random_field::MAX_DEVIATIONS;
 use crate::light::{LightUse, is_lit_by_leds};
 use crate::scene::Scene;
 
@@ -57,7 +58,69 @@ pub fn change(scene: &Scene, left_out: &dyn Fn(EffectName) -> bool) -> Result<Bo
         platform_shadow: with.platform_shadow && kept.platform_shadow,
         interreflection: with.interreflection && kept.interreflection,
     };
-    Ok(Bound::grey(light.change_grey(&with, &without)))
+    // What mirrored lights add lifts a change to where a code of a gamma below 1 is steepest. A membrane of k times the light
+    // changes k times as much, or k^(1/gamma) times where that is more.
+    let (gamma, steepest) = (scene.file().electronics.gamma, (1.0 / scene.file().electronics.gamma).max(1.0));
+    let grey = if shines(scene) && gamma < 1.0 {
+        steepest * light.change_grey(&with, &without, 1.0)
+    } else {
+        light.change_grey(&with, &without, gamma)
+    };
+    Ok(Bound::grey((grey * (1.0 + unevenness(scene)).powf(steepest)).min(255.0)))
+}
+
+/// What a change of the membrane by some full scales makes of its code, grey levels, where mirrored lights may lift it to where
+/// the code is steepest; `own` is what it makes without them.
+pub fn lifted_grey(scene: &Scene, change: f64, own: f64) -> f64 {
+    let gamma = scene.file().electronics.gamma;
+    if shines(scene) && gamma < 1.0 { own.max(grey_of_change(gamma, change)) } else { own }
+}
+
+/// Whether the camera sees the lights mirrored in the sheet.
+fn shines(scene: &Scene) -> bool {
+    let gloss = scene.file().light.leds.as_ref().is_some_and(|leds| leds.gloss);
+    gloss && is_lit_by_leds(scene) && scene.choice(EffectName::Gloss) != EffectChoice::Never
+}
+
+/// No place of an uneven membrane is brighter or darker than its mean by a larger part of it.
+fn unevenness(scene: &Scene) -> f64 {
+    let uneven = scene.file().uneven_membrane.as_ref();
+    let uneven = uneven.filter(|_| scene.choice(EffectName::UnevenMembrane) != EffectChoice::Never);
+    uneven.map_or(0.0, |uneven| MAX_DEVIATIONS * uneven.amplitude)
+}
+
+/// The largest gain that the camera may set, and 1 where that is more: what it does where it sets none.
+pub fn max_gain(scene: &Scene) -> f64 {
+    let section = scene.file().electronics.auto_exposure.as_ref();
+    let section = section.filter(|_| scene.choice(EffectName::AutoExposure) != EffectChoice::Never);
+    section.map_or(1.0, |section| section.gain[1].max(1.0))
+}
+
+/// The brightest of what is neither membrane nor marker: what lies beside the dome, dust, and mirrored lights, which may be as
+/// bright as they are.
+fn brightest_beside(scene: &Scene) -> f64 {
+    let dust = scene.file().dust.as_ref();
+    let dust = dust.filter(|_| scene.choice(EffectName::Dust) != EffectChoice::Never);
+    let levels = dust.into_iter().flat_map(|dust| {
+        let specks = dust.specks.iter().map(|lot| lot.level);
+        specks.chain(dust.scratches.iter().map(|lot| lot.level))
+    });
+    // Not infinite, so that no part of it is no number.
+    let mirrored = if shines(scene) { f64::MAX } else { 0.0 };
+    levels.fold(scene.file().light.surround_level.max(mirrored), f64::max)
+}
+
+/// No level of the membrane is above this before any other effect than those of the light, full scales: of an even one and of
+/// one that is as uneven as the scene's.
+///
+/// # Errors
+/// Lights that do not fit the design.
+pub fn brightest_membrane(scene: &Scene) -> Result<[f64; 2], SimError> {
+    let even = match light(scene)? {
+        Some(light) => light.brightest(&whole(scene)),
+        None => scene.file().light.membrane_level,
+    };
+    Ok([even, even * (1.0 + unevenness(scene))])
 }
 
 /// No level of the picture is above this, full scales; above 1 it saturates.
@@ -65,19 +128,19 @@ pub fn change(scene: &Scene, left_out: &dyn Fn(EffectName) -> bool) -> Result<Bo
 /// # Errors
 /// Lights that do not fit the design.
 pub fn brightest_level(scene: &Scene) -> Result<f64, SimError> {
-    let file = &scene.file().light;
-    Ok(match light(scene)? {
-        Some(light) => light.brightest(&whole(scene)).max(file.surround_level),
-        None => [file.membrane_level, file.marker_level, file.surround_level].into_iter().fold(0.0, f64::max),
-    })
+    let [_, membrane] = brightest_membrane(scene)?;
+    // Under the design's lights the markers are among what the membrane's bound looks at.
+    let markers = if light(scene)?.is_some() { 0.0 } else { scene.file().light.marker_level };
+    Ok(membrane.max(markers).max(brightest_beside(scene)))
 }
 
 /// Levels between which an edge may lie: the darkest and the brightest, full scales.
 fn range(scene: &Scene) -> Result<(f64, f64), SimError> {
     let file = &scene.file().light;
-    let dark = (file.membrane_level * scene.file().ink.reflectance).min(file.surround_level);
-    // Under the design's lights parts of the dome may be dark.
-    let darkest = if light(scene)?.is_some() { 0.0 } else { dark };
+    let inked = file.membrane_level * scene.file().ink.reflectance * (1.0 - unevenness(scene)).max(0.0);
+    // Under the design's lights parts of the dome may be dark, and so may dust be.
+    let dark = light(scene)?.is_some() || scene.file().dust.is_some();
+    let darkest = if dark { 0.0 } else { inked.min(file.surround_level) };
     Ok((darkest, brightest_level(scene)?))
 }
 
@@ -97,29 +160,38 @@ pub fn covered_grey(scene: &Scene, covered: f64) -> Result<f64, SimError> {
 /// Lights that do not fit the design.
 pub fn inked_grey(scene: &Scene, covered: f64) -> Result<f64, SimError> {
     let (file, ink) = (scene.file(), &scene.file().ink);
-    let (darkest, ground) = match light(scene)? {
-        Some(_) => (0.0, brightest_level(scene)?),
-        None => (file.light.membrane_level * ink.reflectance, file.light.membrane_level),
+    let [_, ground] = brightest_membrane(scene)?;
+    let darkest = match light(scene)? {
+        Some(_) => 0.0,
+        None => file.light.membrane_level * ink.reflectance * (1.0 - unevenness(scene)).max(0.0),
     };
     let change = covered.clamp(0.0, 1.0) * ground * (1.0 - ink.reflectance);
     Ok(grey_of_change_from(file.electronics.gamma, darkest, change))
 }
 
-/// No value that the sensor reads is above this, full scales: the brightest level, and what the hottest pixel adds to it.
+/// No value that the sensor reads is above this, full scales: the brightest level, and what the hottest pixel adds to it,
+/// behind the largest gain.
 ///
 /// # Errors
 /// Lights that do not fit the design.
 pub fn brightest_value(scene: &Scene) -> Result<f64, SimError> {
-    let hot = scene.file().electronics.hot_pixels.as_ref();
-    Ok(brightest_level(scene)? + hot.map_or(0.0, |hot| DarkCurrent::of(scene, hot).largest()))
+    Ok(max_gain(scene) * (brightest_level(scene)? + hottest(scene)))
 }
 
-/// The largest step between two codes of the picture, grey levels.
+/// What the hottest pixel adds at a gain of 1, full scales.
+fn hottest(scene: &Scene) -> f64 {
+    if scene.choice(EffectName::Defects) == EffectChoice::Never {
+        return 0.0;
+    }
+    Defects::of(scene).hottest()
+}
+
+/// The largest step between two codes of the picture at a gain of 1, grey levels.
 ///
 /// # Errors
 /// Lights that do not fit the design.
 pub fn contrast_grey(scene: &Scene) -> Result<f64, SimError> {
-    Ok(grey_of_level(scene.file().electronics.gamma, brightest_value(scene)?))
+    Ok(grey_of_level(scene.file().electronics.gamma, brightest_level(scene)? + hottest(scene)))
 }
 
 /// The most that a loss by field angle takes of any pixel, grey levels; `left` tells what it leaves, `edge_rad` where the
@@ -132,7 +204,8 @@ pub fn darkening_grey(scene: &Scene, edge_rad: f64, left: impl Fn(f64) -> f64) -
     let at_edge = |level: f64| grey_of_level(gamma, level) * (1.0 - left(edge_rad).powf(1.0 / gamma));
     Ok(match light(scene)? {
         Some(light) => {
-            light.darkening_grey(&whole(scene), &left).max(at_edge(scene.file().light.surround_level))
+            let uneven = (1.0 + unevenness(scene)).powf(1.0 / gamma);
+            (uneven * light.darkening_grey(&whole(scene), &left)).max(at_edge(brightest_beside(scene)))
         }
         None => at_edge(brightest_level(scene)?),
     })

@@ -1,19 +1,22 @@
 //! The effects, one file each.
 
+mod auto_exposure;
 mod bayer;
 mod compression;
 pub(crate) mod contact;
+mod defects;
 mod defocus;
 mod diffuser;
 mod direct_light;
 mod dispersion;
 mod dots;
+mod dust;
 pub(crate) mod effect;
 mod falloff;
 mod fresnel;
 mod gap_change;
 pub(crate) mod geometry_bound;
-mod hot_pixels;
+mod gloss;
 mod ink_edge;
 mod interreflection;
 mod lens_distortion;
@@ -23,6 +26,8 @@ mod noise;
 pub mod pipeline;
 mod platform_shadow;
 mod pupil_shift;
+#[cfg(test)]
+mod real_frames_tests;
 mod refraction;
 mod rolling_shutter;
 mod sharpening;
@@ -30,7 +35,10 @@ mod sheet_motion;
 pub mod speed;
 #[cfg(test)]
 mod tests;
+mod uneven_ink;
+mod uneven_membrane;
 mod vignetting;
+mod white_balance;
 
 use self::effect::Effect;
 
@@ -46,19 +54,25 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &contact::ContactEffect,
         &dots::Dots,
         &ink_edge::InkEdge,
+        &uneven_ink::UnevenInk,
+        &uneven_membrane::UnevenMembrane,
         &direct_light::DirectLightEffect,
         &falloff::Falloff,
         &diffuser::DiffuserEffect,
         &fresnel::Fresnel,
         &platform_shadow::PlatformShadow,
         &interreflection::Interreflection,
+        &gloss::GlossEffect,
+        &dust::Dust,
         &vignetting::Vignetting,
         &defocus::Defocus,
         &motion_blur::MotionBlur,
         &rolling_shutter::RollingShutter,
         &bayer::Bayer,
-        &hot_pixels::HotPixels,
+        &auto_exposure::AutoExposure,
+        &defects::DefectsEffect,
         &noise::Noise,
+        &white_balance::WhiteBalance,
         &sharpening::Sharpening,
         &compression::Compression,
     ]

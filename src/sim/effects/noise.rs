@@ -32,8 +32,9 @@ impl Effect for Noise {
         let Some(noise) = &electronics.noise else { return Ok(Bound::default()) };
         // The 99.9th percentile of a Gaussian's size is 3.29 deviations; Poisson's law reaches further by less than
         // (z^2 - 1) / 6 + 1 electrons. The converter is off by half a step. The steepest place of the code takes it.
-        let full = noise.full_scale_electrons;
         let brightest = light_bound::brightest_value(scene)?.min(1.0);
+        // Behind the largest gain full scale stands for the fewest electrons.
+        let full = noise.full_scale_electrons / light_bound::max_gain(scene);
         let at = |level: f64| {
             let deviation = (full * level + noise.read_electrons.powi(2)).sqrt();
             let change = (3.29 * deviation + 3.0) / full + 0.5 / steps(noise);

@@ -1,9 +1,13 @@
 //! The parts that the used effects have put together, in the order in which light meets them.
 
+use crate::electronics::exposure::Metering;
 use crate::electronics::pass::{CodedPass, Pass};
 use crate::light::LightUse;
+use crate::light::gloss::Gloss;
 use crate::light::shading::Shading;
+use crate::light::uneven::Unevenness;
 use crate::raster::settings::{Geometry, Ink, Timing};
+use crate::raster::specks::Specks;
 use domecast_contact::Level;
 
 /// What the used effects have installed.
@@ -19,8 +23,16 @@ pub struct Pipeline {
     pub contact: Option<Level>,
     /// What the dots look like.
     pub ink: Ink,
+    /// The lights mirrored in the sheet's faces.
+    pub gloss: Option<Gloss>,
+    /// Dust and scratches before the sensor.
+    pub dust: Option<Specks>,
+    /// How uneven the membrane is; taken into `shading` after all effects are applied.
+    pub unevenness: Option<Unevenness>,
     /// When the rows gather light.
     pub timing: Timing,
+    /// The gains that follow the frames before.
+    pub metering: Metering,
     /// Passes over the picture, run stage by stage, within a stage in the order of their installation.
     pub passes: Vec<Box<dyn Pass>>,
     /// Passes over the coded picture, in order.

@@ -97,8 +97,8 @@ fn one_effect_of_the_electronics_alone_runs_alone() {
         ),
         (r#", "electronics": { "bayer": "grbg" }"#, EffectName::Bayer),
         (
-            r#", "electronics": { "hot_pixels": { "share": 0.001, "level_per_s": 20 } }"#,
-            EffectName::HotPixels,
+            r#", "electronics": { "defects": { "hot_per_million": 1000, "hot_level": [0.2, 0.4] } }"#,
+            EffectName::Defects,
         ),
         (r#", "electronics": { "noise": { "full_scale_electrons": 5000 } }"#, EffectName::Noise),
         (r#", "electronics": { "sharpening": { "amount": 0.5, "radius_px": 1.2 } }"#, EffectName::Sharpening),

@@ -110,7 +110,7 @@ mod tests {
         [BayerPattern::Rggb, BayerPattern::Bggr, BayerPattern::Grbg, BayerPattern::Gbrg];
 
     fn through(pattern: BayerPattern, frame: &mut Frame) {
-        let context = PassContext { frame: 0, seed: 0 };
+        let context = PassContext::default();
         let mut work = Work::default();
         Filter { pattern }.run(frame, &context, &mut work);
         assert_eq!(frame.planes.len(), 1);
@@ -148,7 +148,7 @@ mod tests {
         for (pattern, first) in PATTERNS.into_iter().zip([0, 2, 1, 1]) {
             let mut frame = Frame::new(4, 4, 3);
             frame.planes[first][0] = 1.0;
-            let context = PassContext { frame: 0, seed: 0 };
+            let context = PassContext::default();
             Filter { pattern }.run(&mut frame, &context, &mut Work::default());
             assert_eq!(frame.planes[0][0], 1.0);
         }

@@ -106,7 +106,7 @@ mod tests {
     fn a_picture_too_wide_for_the_code_is_left_as_it_is() {
         let mut image = Image8 { width: 70_000, height: 1, channels: 1, bytes: vec![7; 70_000] };
         let before = image.clone();
-        let context = PassContext { frame: 0, seed: 0 };
+        let context = PassContext::default();
         Jpeg { quality: 50, chroma: JpegChroma::Full }.run(&mut image, &context, &mut Work::default());
         assert_eq!(image, before);
     }

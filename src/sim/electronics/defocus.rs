@@ -205,7 +205,7 @@ mod tests {
             frame.planes[0][25 * width + 30] = 1.0;
             let half = vec![(0.5 * variance / steps as f64) as f32; width * height];
             let pass = Blur { half_variance: half, steps };
-            let context = PassContext { frame: 0, seed: 0 };
+            let context = PassContext::default();
             pass.run(&mut frame, &context, &mut Work::default());
             let (mut sum, mut x, mut y, mut xx, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0);
             for (i, v) in frame.planes[0].iter().enumerate() {
@@ -230,7 +230,7 @@ mod tests {
             plane.fill(0.25);
         }
         let pass = Blur { half_variance: vec![0.2; 35], steps: 3 };
-        pass.run(&mut frame, &PassContext { frame: 0, seed: 0 }, &mut Work::default());
+        pass.run(&mut frame, &PassContext::default(), &mut Work::default());
         assert!(frame.planes.iter().flatten().all(|v| (v - 0.25).abs() < 1e-6));
     }
 }

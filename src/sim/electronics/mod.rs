@@ -4,9 +4,10 @@
 
 pub(crate) mod bayer;
 pub(crate) mod compression;
+pub(crate) mod defects;
 pub(crate) mod defocus;
 pub mod deviation;
-pub(crate) mod hot_pixels;
+pub(crate) mod exposure;
 pub(crate) mod noise;
 pub mod pass;
 pub(crate) mod sharpening;

@@ -45,8 +45,8 @@ impl SensorNoise {
 
     /// The value that is read for a value of light.
     #[inline]
-    fn value(&self, light: f32, key: u64) -> f32 {
-        let expected = (light * self.electrons).max(0.0);
+    fn value(&self, light: f32, electrons: f32, key: u64) -> f32 {
+        let expected = (light * electrons).max(0.0);
         let random = mix64(key);
         let first = normal(random as u32);
         let gathered = if expected < POISSON_BELOW {
@@ -55,7 +55,7 @@ impl SensorNoise {
             // Two independent Gaussians add up to one.
             expected + first * (expected + self.read * self.read).sqrt()
         };
-        let code = (gathered / self.electrons * self.steps).round().clamp(0.0, self.steps);
+        let code = (gathered / electrons * self.steps).round().clamp(0.0, self.steps);
         code / self.steps
     }
 }
@@ -71,11 +71,13 @@ impl Pass for SensorNoise {
 
     fn run(&self, frame: &mut Frame, context: &PassContext, work: &mut Work) {
         let width = frame.width();
+        // Behind a gain full scale stands for fewer electrons.
+        let electrons = self.electrons / context.gains.exposure as f32;
         for (c, plane) in frame.planes.iter_mut().enumerate() {
             let stream = mix64(context.seed ^ mix64((u64::from(context.frame) << 2) | c as u64));
             plane.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
                 for (x, value) in row.iter_mut().enumerate() {
-                    *value = self.value(*value, stream.wrapping_add((y * width + x) as u64));
+                    *value = self.value(*value, electrons, stream.wrapping_add((y * width + x) as u64));
                 }
             });
         }
@@ -152,7 +154,7 @@ mod tests {
     }
 
     fn run(sensor: &SensorNoise, frame: &mut Frame, number: u32, seed: u64) {
-        let context = PassContext { frame: number, seed };
+        let context = PassContext { frame: number, seed, ..PassContext::default() };
         sensor.run(frame, &context, &mut Work::default());
     }
 

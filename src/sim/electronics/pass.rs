@@ -16,17 +16,40 @@ pub enum Stage {
     Mosaic,
     /// Electrons: shot and read noise, the converter.
     Sensor,
+    /// What no light changes any more: dead pixels.
+    Readout,
     /// Back to three planes.
     Demosaic,
+    /// The gains of the colours.
+    Balance,
+    /// The camera's processor sharpens.
+    Sharpening,
+}
+
+/// The gains of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gains {
+    /// Before the converter, for all colours.
+    pub exposure: f64,
+    /// After it, for red, green and blue.
+    pub balance: [f64; 3],
+}
+
+impl Default for Gains {
+    fn default() -> Self {
+        Self { exposure: 1.0, balance: [1.0; 3] }
+    }
 }
 
 /// Which picture a pass works on.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct PassContext {
     /// Number of the frame.
     pub frame: u32,
     /// Seed of the run; random numbers depend on seed, frame and place only, never on threads.
     pub seed: u64,
+    /// The gains that the camera has set.
+    pub gains: Gains,
 }
 
 /// A pass over the picture.

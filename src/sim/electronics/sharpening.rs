@@ -1,96 +1,99 @@
-//! Sharpening by the camera: what a Gaussian blur would take from the picture is added to it, several times over (unsharp
-//! masking; R. C. Gonzalez and R. E. Woods, Digital Image Processing, 2018).
+//! Sharpening by the camera's processor: an unsharp mask.
 //!
-//! It works on the coded values, as camera processors do. Edges overshoot on both sides: that of a step by
-//! `amount * (1 - Phi(d / radius))` of it at the distance `d`.
+//! `out = v + amount (v - G v)`, `G` being a Gaussian of the standard deviation `radius_px`, cut at three of them and its
+//! weights scaled to the sum 1, along x and then along y; beyond the border the picture goes on as its last pixel.
+//! What the sensor read is at most full scale and not below nothing, so the mask sees values from 0 to 1.
 
 use rayon::prelude::*;
 
 use crate::effect_name::EffectName;
-use crate::electronics::pass::{CodedPass, PassContext};
-use crate::raster::frame::Image8;
-use crate::scene::electronics::SharpeningSection;
+use crate::electronics::pass::{Pass, PassContext, Stage};
+use crate::raster::frame::Frame;
+use crate::scene::camera::SharpeningSection;
 use crate::work::Work;
 
-/// Radii of the Gaussian after which its weights end.
-const REACH: f64 = 3.0;
+/// Standard deviations at which the Gaussian ends.
+const ENDS_AT: f64 = 3.0;
 
-/// Work of one weight on one value.
-pub(crate) const WEIGHT_UNITS: u64 = 1;
-
-/// Weights of the Gaussian from the middle outwards; all of them, both sides, sum to one.
-pub(crate) fn weights(radius_px: f64) -> Vec<f32> {
-    let reach = (REACH * radius_px).ceil().max(1.0) as i32;
-    let raw: Vec<f64> = (0..=reach).map(|k| (-0.5 * (f64::from(k) / radius_px).powi(2)).exp()).collect();
-    let sum = 2.0 * raw.iter().sum::<f64>() - raw[0];
-    raw.iter().map(|w| (w / sum) as f32).collect()
+/// Pixels from the middle to the Gaussian's end.
+pub(crate) fn reach(section: &SharpeningSection) -> usize {
+    (ENDS_AT * section.radius_px).ceil().max(1.0) as usize
 }
 
-/// The most by which sharpening makes a difference between two pictures larger: what is added has the difference at the pixel and
-/// that of its surroundings.
-pub(crate) fn gain(sharpening: &SharpeningSection) -> f64 {
-    1.0 + 2.0 * sharpening.amount
+/// Weights of the Gaussian from the middle on; both sides add up to 1.
+pub(crate) fn weights(section: &SharpeningSection) -> Vec<f64> {
+    let bell = |k: usize| (-0.5 * (k as f64 / section.radius_px).powi(2)).exp();
+    let bells: Vec<f64> = (0..=reach(section)).map(bell).collect();
+    let sum = 2.0 * bells.iter().sum::<f64>() - 1.0;
+    bells.iter().map(|bell| bell / sum).collect()
 }
 
-/// Unsharp masking.
-pub(crate) struct Unsharp {
-    amount: f32,
+/// Part of itself that a pixel does not keep in the blurred picture: the mask changes a picture of values between 0 and
+/// `b` by at most `amount` times this times `b`, and a difference of two pictures grows to at most
+/// `1 + 2 amount` times this.
+pub(crate) fn given_away(section: &SharpeningSection) -> f64 {
+    1.0 - weights(section).first().map_or(0.0, |middle| middle * middle)
+}
+
+/// Work of a pixel of a plane, for the given reach.
+pub(crate) fn pixel_units(reach: usize) -> u64 {
+    2 + reach as u64
+}
+
+/// The mask of a camera.
+pub(crate) struct UnsharpMask {
     weights: Vec<f32>,
+    amount: f32,
 }
 
-impl Unsharp {
-    /// The sharpening of a camera.
-    pub fn of(sharpening: &SharpeningSection) -> Self {
-        Self { amount: sharpening.amount as f32, weights: weights(sharpening.radius_px) }
+impl UnsharpMask {
+    /// As a scene's camera has it.
+    pub fn of(section: &SharpeningSection) -> Self {
+        Self { weights: weights(section).iter().map(|w| *w as f32).collect(), amount: section.amount as f32 }
+    }
+
+    /// The weighted sum of a place and its neighbours at equal distances on both sides.
+    fn blur(&self, at: impl Fn(isize) -> f32) -> f32 {
+        let (middle, sides) = self.weights.split_first().map_or((1.0, &[][..]), |(m, s)| (*m, s));
+        let pairs = sides.iter().zip(1..).map(|(weight, k)| weight * (at(-k) + at(k)));
+        middle * at(0) + pairs.sum::<f32>()
     }
 }
 
-/// Weighted values about a place of a line of `count`, beyond whose ends its last values go on.
-#[inline]
-fn blurred(weights: &[f32], at: usize, count: usize, value: impl Fn(usize) -> f32) -> f32 {
-    let mut sum = 0.0;
-    for (k, weight) in weights.iter().enumerate() {
-        let both = if k == 0 {
-            value(at)
-        } else {
-            value(at.saturating_sub(k)) + value((at + k).min(count.saturating_sub(1)))
-        };
-        sum += weight * both;
-    }
-    sum
-}
-
-impl CodedPass for Unsharp {
+impl Pass for UnsharpMask {
     fn effect(&self) -> EffectName {
         EffectName::Sharpening
     }
 
-    fn is_lossy(&self) -> bool {
-        false
+    fn stage(&self) -> Stage {
+        Stage::Sharpening
     }
 
-    fn run(&self, image: &mut Image8, _context: &PassContext, work: &mut Work) {
-        let (width, height, channels) = (image.width, image.height, image.channels);
-        let row = width * channels;
-        if row == 0 || height == 0 {
-            return;
+    fn run(&self, frame: &mut Frame, _context: &PassContext, work: &mut Work) {
+        let (width, height) = (frame.width(), frame.height());
+        let mut blurred = vec![0.0_f32; width * height];
+        for plane in &mut frame.planes {
+            plane.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+            let source: &[f32] = plane;
+            blurred.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
+                let row = source.get(y * width..(y + 1) * width).unwrap_or_default();
+                let value =
+                    |x: isize| row.get(x.clamp(0, width as isize - 1) as usize).copied().unwrap_or(0.0);
+                for (x, out) in out.iter_mut().enumerate() {
+                    *out = self.blur(|k| value(x as isize + k));
+                }
+            });
+            plane.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+                for (x, value) in row.iter_mut().enumerate() {
+                    let down = |k: isize| {
+                        let y = (y as isize + k).clamp(0, height as isize - 1) as usize;
+                        blurred.get(y * width + x).copied().unwrap_or(0.0)
+                    };
+                    *value += self.amount * (*value - self.blur(down));
+                }
+            });
+            work.add(EffectName::Sharpening, (width * height) as u64 * pixel_units(self.weights.len()));
         }
-        let mut along = vec![0.0_f32; image.bytes.len()];
-        along.par_chunks_mut(row).zip(image.bytes.par_chunks(row)).for_each(|(out, bytes)| {
-            for (i, out) in out.iter_mut().enumerate() {
-                let (x, c) = (i / channels, i % channels);
-                *out = blurred(&self.weights, x, width, |x| f32::from(bytes[x * channels + c]));
-            }
-        });
-        image.bytes.par_chunks_mut(row).enumerate().for_each(|(y, bytes)| {
-            for (i, value) in bytes.iter_mut().enumerate() {
-                let smooth = blurred(&self.weights, y, height, |y| along[y * row + i]);
-                let sharp = f32::from(*value) + self.amount * (f32::from(*value) - smooth);
-                *value = sharp.round().clamp(0.0, 255.0) as u8;
-            }
-        });
-        let each = 2 * (2 * self.weights.len() as u64 - 1) * WEIGHT_UNITS;
-        work.add(EffectName::Sharpening, image.bytes.len() as u64 * each);
     }
 }
 
@@ -98,50 +101,45 @@ impl CodedPass for Unsharp {
 mod tests {
     use super::*;
 
-    fn sharpened(image: &Image8, amount: f64, radius_px: f64) -> Image8 {
-        let mut out = image.clone();
-        let pass = Unsharp::of(&SharpeningSection { amount, radius_px });
-        pass.run(&mut out, &PassContext { frame: 0, seed: 0 }, &mut Work::default());
-        out
-    }
-
-    /// A step from 80 to 160 between two columns.
-    fn step() -> Image8 {
-        let bytes = (0..40 * 60).map(|i| if i % 60 < 30 { 80 } else { 160 }).collect();
-        Image8 { width: 60, height: 40, channels: 1, bytes }
+    fn sharpened(section: &SharpeningSection, frame: &mut Frame) {
+        let context = PassContext::default();
+        UnsharpMask::of(section).run(frame, &context, &mut Work::default());
     }
 
     #[test]
-    fn a_step_overshoots_by_the_gaussians_tail() {
-        let found = sharpened(&step(), 0.5, 1.5);
-        let raw: Vec<f64> = (-9..=9).map(|k| (-0.5 * (f64::from(k) / 1.5).powi(2)).exp()).collect();
-        let tail = |from: i32| {
-            let beyond: f64 = (from..=9).map(|k| (-0.5 * (f64::from(k) / 1.5).powi(2)).exp()).sum();
-            beyond / raw.iter().sum::<f64>()
-        };
-        for away in 0..5_usize {
-            let over = 0.5 * 80.0 * tail(away as i32 + 1);
-            let at = |x: usize| f64::from(found.bytes[20 * 60 + x]);
-            assert!((at(30 + away) - 160.0 - over).abs() <= 0.6, "{away}: {} {over}", at(30 + away));
-            assert!((80.0 - at(29 - away) - over).abs() <= 0.6, "{away}: {} {over}", at(29 - away));
+    fn an_even_picture_stays_and_an_edge_overshoots_as_the_error_function_says() {
+        let section = SharpeningSection { radius_px: 4.0, amount: 0.8, why: None };
+        let (width, height) = (81, 9);
+        let mut frame = Frame::new(width, height, 1);
+        for (i, value) in frame.planes[0].iter_mut().enumerate() {
+            *value = if i % width < 40 { 0.3 } else { 0.6 };
+        }
+        let before = frame.planes[0].clone();
+        sharpened(&section, &mut frame);
+        // Far from the edge nothing changes; pixel 40 + k is k + 1/2 from the edge: the Gaussian takes erfc of it.
+        for x in [0, 20, 60, 80] {
+            assert!((frame.planes[0][4 * width + x] - before[4 * width + x]).abs() < 1e-3);
+        }
+        // Phi(-(k + 1/2) / 4) for k = 0, 2, 5, from tables of the normal distribution.
+        for (k, other_side) in [(0, 0.450_26), (2, 0.265_99), (5, 0.084_57)] {
+            let expected = 0.6 + 0.8 * 0.3 * other_side;
+            let found = frame.planes[0][4 * width + 40 + k];
+            assert!((f64::from(found) - expected).abs() < 1.5e-3, "{k}: {found} {expected}");
         }
     }
 
     #[test]
-    fn what_is_even_stays_and_differences_grow_by_no_more_than_the_gain() {
-        let even = Image8 { width: 9, height: 7, channels: 3, bytes: vec![77; 9 * 7 * 3] };
-        assert_eq!(sharpened(&even, 2.0, 1.0), even);
-        let a = step();
-        let mut b = a.clone();
-        for (i, value) in b.bytes.iter_mut().enumerate() {
-            *value = value.saturating_add(if (i * 7919) % 35 == 0 { 4 } else { 0 });
-        }
-        for amount in [0.3, 1.0, 2.5] {
-            let gain = gain(&SharpeningSection { amount, radius_px: 1.2 });
-            let (a, b) = (sharpened(&a, amount, 1.2), sharpened(&b, amount, 1.2));
-            let largest = a.bytes.iter().zip(&b.bytes).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
-            assert!(f64::from(largest) <= 4.0 * gain + 1.0, "{amount}: {largest}");
-            assert!(f64::from(largest) > 0.4 * 4.0 * gain, "{amount}: {largest}");
+    fn no_change_passes_what_is_stated() {
+        for (radius_px, amount) in [(0.3, 1.0), (1.0, 0.5), (3.0, 2.0)] {
+            let section = SharpeningSection { radius_px, amount, why: None };
+            // The worst picture of values from 0 to 1: one bright pixel.
+            let mut frame = Frame::new(41, 41, 1);
+            frame.planes[0][20 * 41 + 20] = 1.0;
+            sharpened(&section, &mut frame);
+            let found = f64::from(frame.planes[0][20 * 41 + 20] - 1.0);
+            assert!((found - amount * given_away(&section)).abs() < 1e-5, "{found}");
+            let sum: f32 = frame.planes[0].iter().sum();
+            assert!((sum - 1.0).abs() < 1e-4, "{sum}");
         }
     }
 }

@@ -46,6 +46,12 @@ pub fn grey_of_level(gamma: f64, level: f64) -> f64 {
     255.0 * level.clamp(0.0, 1.0).powf(1.0 / gamma)
 }
 
+/// The largest fall of a code, in grey levels, where light that is at most `brightest` full scales loses the part `part`
+/// of itself. Above full scale more light is no more code, so nothing there falls by more than full scale does.
+pub fn grey_of_loss(gamma: f64, brightest: f64, part: f64) -> f64 {
+    grey_of_level(gamma, brightest) * (1.0 - (1.0 - part.clamp(0.0, 1.0)).powf(1.0 / gamma))
+}
+
 /// Light at a place, by one channel.
 #[derive(Debug, Clone, Copy, Default)]
 struct Light {
@@ -179,8 +185,8 @@ impl CoarseLight {
         if used.fresnel { leaves(&self.optics[c], momentum, sample.beside.is_some()) } else { 1.0 }
     }
 
-    /// A bound on the change of any pixel, grey levels, between two sets of effects of the light.
-    pub fn change_grey(&self, with: &LightUse, without: &LightUse) -> f64 {
+    /// A bound on the change of any pixel, grey levels of a code of some gamma, between two sets of effects of the light.
+    pub fn change_grey(&self, with: &LightUse, without: &LightUse, gamma: f64) -> f64 {
         let (a_light, b_light) = (self.light(with), self.light(without));
         let mut largest = 0.0_f64;
         for (i, sample, view) in self.seen() {
@@ -191,7 +197,7 @@ impl CoarseLight {
                     let [pa, pb] = [with, without].map(|used| self.passed(used, sample, c, momentum));
                     let by_code = if sample.normal.is_some() {
                         let code = |light: Light, passed: f64| {
-                            (gain * (light.still + light.own) * passed + self.stray).powf(1.0 / self.gamma)
+                            (gain * (light.still + light.own) * passed + self.stray).powf(1.0 / gamma)
                         };
                         255.0 * (code(a, pa) - code(b, pb)).abs()
                     } else {
@@ -202,7 +208,7 @@ impl CoarseLight {
                             (None, None) => (a.still * pa - b.still * pb).abs(),
                         };
                         let change = gain * (direct + (a.own * pa - b.own * pb).abs());
-                        grey_of_change_from(self.gamma, self.stray, change)
+                        grey_of_change_from(gamma, self.stray, change)
                     };
                     largest = largest.max(by_code);
                 }

@@ -13,10 +13,12 @@ pub mod direct;
 pub mod dome_map;
 pub mod field;
 pub mod fresnel;
+pub(crate) mod gloss;
 pub mod lobe;
 pub mod parts;
 pub mod quadrature;
 pub mod radiosity;
+pub mod random_field;
 mod rest;
 pub mod setup;
 pub mod shade;
@@ -25,6 +27,7 @@ mod shelf;
 pub mod tables;
 #[cfg(test)]
 mod tests;
+pub(crate) mod uneven;
 
 pub use cavity::Cavities;
 pub use parts::{LightUse, is_lit_by_leds};

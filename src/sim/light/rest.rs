@@ -49,6 +49,7 @@ impl RestLight {
             let (_, inside) = optics.trace_continued(image_px).ok()?;
             let sample = SurfaceSample {
                 point_mm: hit.surface_mm.as_vec3a(),
+                material_mm: hit.surface_mm.as_vec3a(),
                 normal: hit.normal.as_vec3a(),
                 to_camera: Vec3A::from(-inside.as_vec3()),
                 is_moved: false,

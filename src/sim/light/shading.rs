@@ -10,6 +10,8 @@ use crate::work::Work;
 pub struct SurfaceSample {
     /// Where the point is.
     pub point_mm: Vec3A,
+    /// Where the point lies on the undeformed dome.
+    pub material_mm: Vec3A,
     /// Unit normal out of the elastomer there, of the deformed surface.
     pub normal: Vec3A,
     /// Unit direction inside the elastomer from the point towards the camera.

@@ -5,7 +5,7 @@ use std::io;
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 
 use crate::electronics::deviation::CodingDeviation;
-use crate::output::render::Drawn;
+use crate::output::drawn::Drawn;
 use crate::output::truth::FrameTruth;
 use crate::raster::frame::Image8;
 use crate::scene::Scene;

@@ -4,7 +4,10 @@
 //! are solved, and one thread writes them in their order.
 
 mod coded;
+mod develop;
+pub(crate) mod drawn;
 mod error;
+mod in_order;
 mod parts;
 pub(crate) mod render;
 mod timing;
@@ -22,7 +25,9 @@ use domecast_files::{OutputRules, StagedFolder};
 use crate::SimError;
 use crate::contact::between::Around;
 use crate::contact::stepper::Touch;
-use crate::output::render::{Renderer, Scratch};
+use crate::output::drawn::{Drawn, Scratch};
+use crate::output::in_order::{InOrder, Ready};
+use crate::output::render::Renderer;
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::work::Work;
@@ -101,6 +106,7 @@ fn draw_all(
     let mut work = Work::default();
     let mut stepper = renderer.stepper()?;
     let buffers: Mutex<Vec<Scratch>> = Mutex::new(Vec::new());
+    let order = Mutex::new(InOrder::new(&renderer.pipeline().metering));
     let max_ahead = AHEAD_PER_THREAD * rayon::current_num_threads().max(1) as u32;
     let mut reported = 0;
     let mut wait = |until: u32| {
@@ -135,13 +141,25 @@ fn draw_all(
                 break;
             }
             state.begun.store(number + 1, Ordering::Release);
-            let (buffers, send) = (&buffers, send.clone());
+            let (buffers, order, send) = (&buffers, &order, send.clone());
             scope.spawn(move |_| {
                 let mut scratch = lock(buffers).pop().unwrap_or_default();
-                let coded = coded(scene, renderer, number, around.as_ref(), &mut scratch);
+                let ready: Vec<Result<Ready, (u32, SimError)>> =
+                    match renderer.expose(number, around.as_ref(), &mut scratch) {
+                        Ok(exposed) => lock(order).ready(number, exposed).into_iter().map(Ok).collect(),
+                        Err(error) => vec![Err((number, error))],
+                    };
+                for exposed in ready {
+                    // The writer that is gone has met a fault of its own.
+                    let _ = match exposed {
+                        Ok((number, exposed, gains)) => {
+                            let drawn = renderer.develop(exposed, &gains, &mut scratch);
+                            send.send((number, coded(scene, drawn, &mut scratch)))
+                        }
+                        Err((number, error)) => send.send((number, Err(error))),
+                    };
+                }
                 lock(buffers).push(scratch);
-                // The writer that is gone has met a fault of its own.
-                let _ = send.send((number, coded));
             });
         }
         Ok(())
@@ -151,19 +169,13 @@ fn draw_all(
     solved.map(|()| work)
 }
 
-/// A buffer that a thread left in a panic is only memory to reuse.
-fn lock(buffers: &Mutex<Vec<Scratch>>) -> std::sync::MutexGuard<'_, Vec<Scratch>> {
-    buffers.lock().unwrap_or_else(PoisonError::into_inner)
+/// What a thread left in a panic is memory to reuse, or frames that nobody waits for any more.
+fn lock<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn coded(
-    scene: &Scene,
-    renderer: &Renderer<'_>,
-    number: u32,
-    around: Option<&Around>,
-    scratch: &mut Scratch,
-) -> Result<CodedFrame, SimError> {
-    let drawn = renderer.frame_around(number, around, scratch)?;
+fn coded(scene: &Scene, drawn: Drawn, scratch: &mut Scratch) -> Result<CodedFrame, SimError> {
+    let number = drawn.truth.frame;
     let (coded, image) = CodedFrame::new(scene, drawn).map_err(|problem| SimError::Frame {
         frame: number,
         problem: format!("its files cannot be coded: {problem}"),

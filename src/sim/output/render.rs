@@ -1,7 +1,7 @@
 //! From a scene and its plan to frames and their truth.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::Mutex;
 
 use crate::SimError;
 use crate::contact::between::Around;
@@ -11,15 +11,16 @@ use crate::contact::stepper::Stepper;
 use crate::effect_name::EffectName;
 use crate::effects;
 use crate::effects::pipeline::Pipeline;
-use crate::electronics::deviation::CodingDeviation;
-use crate::electronics::pass::{PassContext, Stage, run_coded};
+use crate::electronics::exposure::{METER_UNITS, Meter};
+use crate::electronics::pass::{Gains, PassContext, Stage};
+use crate::output::drawn::{Drawn, Exposed, Scratch};
 use crate::output::timing::{exposure_s, rows_s};
 use crate::output::truth::{EffectTruth, FrameTruth, Seen, dot_truth, effects_of, marker_truth};
 use crate::plan::Plan;
 use crate::raster::edges::EDGE_GREY;
-use crate::raster::frame::{Frame, Image8};
+use crate::raster::frame::Frame;
 use crate::raster::lens_field::LensField;
-use crate::raster::picture::{Painter, Parts};
+use crate::raster::picture::Parts;
 use crate::raster::projector::Projector;
 use crate::raster::rolled::{Rolled, Slice};
 use crate::raster::sensor_state::{SensorState, count_points, units};
@@ -27,13 +28,12 @@ use crate::raster::settings::Timing;
 use crate::raster::spots::{Points, Spots};
 use crate::scene::Scene;
 use crate::work::Work;
-use domecast_contact::ContactState;
 use domecast_optics::numeric::Rigid;
 
 /// Draws the frames of a scene with the effects of a plan.
 pub struct Renderer<'a> {
-    scene: &'a Scene,
-    pipeline: Pipeline,
+    pub(super) scene: &'a Scene,
+    pub(super) pipeline: Pipeline,
     eye: Projector,
     points: Points,
     field: Option<LensField>,
@@ -41,37 +41,8 @@ pub struct Renderer<'a> {
     /// The most that any image moves from a frame's time to the first or last light that it gathers, px.
     moved_px: f64,
     setup: Work,
-}
-
-/// Room that a thread draws in; what it holds before does not matter.
-#[derive(Debug, Default)]
-pub struct Scratch {
-    painter: Painter,
-    frame: Option<Frame>,
-    part: Option<Frame>,
-    bytes: Vec<u8>,
-}
-
-impl Scratch {
-    /// Takes back a picture that is not needed any more: the next one is coded in its place.
-    pub fn give_back(&mut self, image: Image8) {
-        self.bytes = image.bytes;
-    }
-}
-
-/// A frame with its truth and the work that it took.
-#[derive(Debug, Clone)]
-pub struct Drawn {
-    /// The picture; `None` where the scene wants none.
-    pub image: Option<Image8>,
-    /// What is true of it.
-    pub truth: FrameTruth,
-    /// What touches the dome.
-    pub contact: Option<Arc<ContactState>>,
-    /// What the camera's lossy code made of the picture; `None` without one.
-    pub coding: Option<CodingDeviation>,
-    /// What it took.
-    pub work: Work,
+    /// Gains of the first frames, as far as they are known; the others follow them.
+    pub(super) gains: Mutex<Vec<Gains>>,
 }
 
 impl<'a> Renderer<'a> {
@@ -94,7 +65,17 @@ impl<'a> Renderer<'a> {
         let gathered_s =
             timing.exposure.map_or(0.0, |e| e.exposure_s) + timing.rolling.map_or(0.0, |r| r.readout_s);
         let moved_px = 0.5 * gathered_s * effects::speed::fastest_px_per_s(scene).unwrap_or(0.0);
-        Ok(Self { scene, pipeline, eye, points, field, effects: effects_of(plan), moved_px, setup })
+        Ok(Self {
+            scene,
+            pipeline,
+            eye,
+            points,
+            field,
+            effects: effects_of(plan),
+            moved_px,
+            setup,
+            gains: Mutex::default(),
+        })
     }
 
     /// What putting the effects together took.
@@ -178,17 +159,15 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// A frame whose load has no balance, or whose pose cannot be.
     pub fn frame(&self, number: u32) -> Result<Drawn, SimError> {
-        let mut around = None;
-        if let Some(mut stepper) = self.stepper()? {
-            let mut work = Work::default();
-            let mut touches = Vec::new();
-            let last = number.saturating_add(1).min(self.scene.frame_count().saturating_sub(1)).max(number);
-            for k in 0..=last {
-                touches.push(stepper.next(k, self.scene.time_s(k), &mut work)?);
+        let mut drawn = None;
+        self.each_around(number, &mut |k, around| {
+            if k == number {
+                drawn = Some(self.frame_around(k, around, &mut Scratch::default())?);
             }
-            around = Around::of(&touches, number as usize);
-        }
-        self.frame_around(number, around.as_ref(), &mut Scratch::default())
+            Ok(())
+        })?;
+        // Each number up to the last one is seen.
+        drawn.map_or_else(|| self.frame_around(number, None, &mut Scratch::default()), Ok)
     }
 
     /// [`Renderer::frame`] with the touched dome about it, in room that is there.
@@ -201,24 +180,45 @@ impl<'a> Renderer<'a> {
         around: Option<&Around>,
         scratch: &mut Scratch,
     ) -> Result<Drawn, SimError> {
+        let exposed = self.expose(number, around, scratch)?;
+        Ok(self.develop(exposed, &self.gains(number)?, scratch))
+    }
+
+    /// Draws a frame as light falls on the sensor, before gains, noise and code.
+    ///
+    /// # Errors
+    /// As [`Renderer::frame`].
+    pub(super) fn expose(
+        &self,
+        number: u32,
+        around: Option<&Around>,
+        scratch: &mut Scratch,
+    ) -> Result<Exposed, SimError> {
         let mut work = Work::default();
         let now = self.instant(number, around, &mut work)?;
         self.count(&mut work);
         let spots = self.points.see(self.scene, &now);
-        let mut coding = None;
-        let (image, parts) = match &self.field {
+        let (frame, parts) = match &self.field {
             Some(field) => {
-                let (mut image, parts) =
+                let (frame, parts) =
                     self.picture(field, number, (&now, &spots), around, scratch, &mut work)?;
-                let context = PassContext { frame: number, seed: self.scene.file().seed };
-                coding = run_coded(&self.pipeline.coded_passes, &mut image, &context, &mut work);
-                (Some(image), parts)
+                (Some(frame), parts)
             }
             None => (None, Vec::new()),
         };
+        let metering = &self.pipeline.metering;
+        let meter = frame.as_ref().filter(|_| metering.is_used()).map(|frame| {
+            let owner = match metering.exposure {
+                Some(_) => EffectName::AutoExposure,
+                None => EffectName::WhiteBalance,
+            };
+            let values = frame.width() * frame.height() * frame.planes.len();
+            work.add(owner, values as u64 * METER_UNITS);
+            Meter::of(frame)
+        });
         let truth = self.truth(number, &now, &spots, &parts, around);
         let contact = around.and_then(|around| around.now.contact.clone());
-        Ok(Drawn { image, truth, contact, coding, work })
+        Ok(Exposed { frame, meter, truth, contact, work })
     }
 
     fn count(&self, work: &mut Work) {
@@ -231,7 +231,7 @@ impl<'a> Renderer<'a> {
         self.pipeline.timing == Timing::default()
     }
 
-    /// The picture, and what was seen in each part of the exposure; empty where all is at the frame's time.
+    /// The picture in linear light, and what was seen in each part of the exposure; empty where all is at the frame's time.
     fn picture(
         &self,
         field: &LensField,
@@ -240,7 +240,7 @@ impl<'a> Renderer<'a> {
         around: Option<&Around>,
         scratch: &mut Scratch,
         work: &mut Work,
-    ) -> Result<(Image8, Vec<Spots>), SimError> {
+    ) -> Result<(Frame, Vec<Spots>), SimError> {
         let scene = self.scene;
         let parts = Parts {
             scene,
@@ -249,6 +249,8 @@ impl<'a> Renderer<'a> {
             tolerance: self.pipeline.fill_tolerance,
             points: &self.points,
             field,
+            gloss: self.pipeline.gloss.as_ref(),
+            dust: self.pipeline.dust.as_ref(),
         };
         let (width, height) = scene.image_size();
         let planes = scene.planes();
@@ -257,7 +259,7 @@ impl<'a> Renderer<'a> {
         };
         let mut frame =
             scratch.frame.take().filter(fits).unwrap_or_else(|| Frame::new(width, height, planes));
-        let context = PassContext { frame: number, seed: scene.file().seed };
+        let context = PassContext { frame: number, seed: scene.file().seed, ..PassContext::default() };
         let (exposure_s, rows_s) = (exposure_s(&self.pipeline), rows_s(&self.pipeline, height));
         let mut parts_seen = Vec::new();
         if self.is_at_once() {
@@ -296,11 +298,7 @@ impl<'a> Renderer<'a> {
             }
             scratch.part = Some(part);
         }
-        self.run_passes(&mut frame, &context, work, |stage| stage > Stage::Focus);
-        let bytes = std::mem::take(&mut scratch.bytes);
-        let image = frame.encode_into(scene.file().electronics.gamma, bytes);
-        scratch.frame = Some(frame);
-        Ok((image, parts_seen))
+        Ok((frame, parts_seen))
     }
 
     /// What is seen in one part of the exposure.
@@ -338,7 +336,7 @@ impl<'a> Renderer<'a> {
         Ok(states)
     }
 
-    fn run_passes(
+    pub(super) fn run_passes(
         &self,
         frame: &mut Frame,
         context: &PassContext,
@@ -382,6 +380,7 @@ impl<'a> Renderer<'a> {
                 .map(|index| marker_truth(scene, index, &seen))
                 .collect(),
             effects: self.effects.clone(),
+            exposure: None,
         }
     }
 }

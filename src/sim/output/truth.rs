@@ -54,6 +54,15 @@ pub struct EffectTruth {
     pub why: String,
 }
 
+/// The gains of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ExposureTruth {
+    /// What the converter's full scale is below that of the scene's levels: levels are multiplied by it.
+    pub gain: f64,
+    /// What red, green and blue are multiplied by after it.
+    pub white_balance: [f64; 3],
+}
+
 /// One line of `truth.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrameTruth {
@@ -77,6 +86,9 @@ pub struct FrameTruth {
     pub black_dots: Vec<DotTruth>,
     /// The white markers.
     pub white_markers: Vec<MarkerTruth>,
+    /// The gains that the camera has set; only where it sets them by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposure: Option<ExposureTruth>,
     /// The effects.
     pub effects: Vec<EffectTruth>,
 }

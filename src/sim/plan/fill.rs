@@ -1,7 +1,7 @@
 //! How far pixels of a lit membrane that are filled in between rays may be off.
 
-use crate::effect_name::{EffectChoice, EffectName};
-use crate::electronics::sharpening::gain;
+use crate::effect_name::EffectName;
+use crate::plan::growth::{growth, is_sharpened};
 use crate::scene::Scene;
 
 /// Part of a scene's grey tolerance that the filling takes; the rest is for the effects that are left out.
@@ -15,25 +15,17 @@ const DARKEST: f64 = 0.0004;
 /// tolerance, but so much less that both round to codes within the tolerance, and 3.6 at most; 0 where the tolerance is below
 /// one level, finer than which codes are not: then each pixel has its own ray.
 pub(crate) fn fill_grey(scene: &Scene) -> f64 {
-    let grey = grey_before_sharpening(scene);
-    if grey < 1.0 { 0.0 } else { (PART * grey).min(0.999 * grey.floor()).min(MAX_GREY) }
-}
-
-/// What of a scene's grey tolerance a picture may be off before the camera sharpens it, which makes differences larger and
-/// rounds once more.
-pub(crate) fn grey_before_sharpening(scene: &Scene) -> f64 {
     let grey = scene.file().tolerance.grey;
-    let sharpening = scene.file().electronics.sharpening.as_ref().filter(|s| s.amount > 0.0);
-    match sharpening.filter(|_| scene.choice(EffectName::Sharpening) != EffectChoice::Never) {
-        Some(sharpening) => ((grey - 1.0) / gain(sharpening)).max(0.0),
-        None => grey,
-    }
+    if grey < 1.0 { 0.0 } else { (PART * grey).min(0.999 * grey.floor()).min(MAX_GREY) }
 }
 
 /// So many grey levels in the light of a scene's picture, full scales, where its code is steepest: in the dark, of which
 /// the stray light is the end.
 pub(crate) fn fill_tolerance(scene: &Scene, grey: f64) -> f32 {
     let file = scene.file();
-    let darkest = file.light.leds.as_ref().map_or(0.0, |leds| leds.stray_level).max(DARKEST);
-    (grey / 255.0 / file.electronics.steepest_code(darkest)) as f32
+    // What is filled in is drawn before every effect that enlarges; sharpening may take stray light away as well.
+    let leds = file.light.leds.as_ref().filter(|_| !is_sharpened(scene, EffectName::LensDistortion));
+    let darkest = leds.map_or(0.0, |leds| leds.stray_level).max(DARKEST);
+    (grey / 255.0 / file.electronics.steepest_code(darkest) / growth(scene, EffectName::LensDistortion))
+        as f32
 }

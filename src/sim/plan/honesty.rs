@@ -42,6 +42,50 @@ fn touched(random: &mut SeededRandom, scene: &mut Value) {
     ]}]);
 }
 
+/// Each part of what real frames have besides now and then, from hardly any to a lot of it.
+fn worn(random: &mut SeededRandom, scene: &mut Value) {
+    let mut now = |share: f64| random.uniform() < share;
+    let [ink, membrane, dust, defects, sharpening, exposure, balance] =
+        [0.15, 0.12, 0.15, 0.1, 0.12, 0.06, 0.06].map(&mut now);
+    if ink {
+        let (reflectance, diameter) = (log_between(random, 1e-5, 0.1), log_between(random, 1e-5, 0.1));
+        scene["ink"]["uneven"] = json!({ "reflectance": reflectance, "diameter": diameter });
+    }
+    if membrane {
+        let (amplitude, correlation) = (log_between(random, 1e-4, 0.2), log_between(random, 0.5, 20.0));
+        scene["uneven_membrane"] = json!({ "amplitude": amplitude, "correlation_mm": correlation });
+    }
+    if dust {
+        let diameter = log_between(random, 1e-3, 0.3);
+        let (opacity, level) = (log_between(random, 1e-3, 1.0), random.uniform());
+        let on = if random.uniform() < 0.5 { json!("sheet") } else { json!({ "lens": 2.0 }) };
+        scene["dust"] = json!({
+            "specks": [{ "on": on, "diameter_mm": [diameter, diameter], "opacity": opacity, "level": level, "random": 5 }],
+            "scratches": [{ "width_mm": 0.3 * diameter, "opacity": opacity, "random": 2, "length_mm": [0.5, 4] }],
+        });
+    }
+    if defects {
+        let level = log_between(random, 1e-3, 1.0);
+        scene["electronics"]["defects"] = json!({ "hot_per_million": 300, "hot_level": [level, level] });
+    }
+    if sharpening {
+        let (radius, amount) = (log_between(random, 0.3, 5.0), log_between(random, 1e-3, 2.0));
+        scene["electronics"]["sharpening"] = json!({ "radius_px": radius, "amount": amount });
+    }
+    if exposure {
+        let (speed, gain) = (random.uniform(), random.between(0.5, 2.0));
+        let section = json!({ "target_level": random.between(0.1, 0.6), "speed": speed, "first_gain": gain });
+        scene["electronics"]["auto_exposure"] = section;
+    }
+    if balance {
+        let first = [random.between(0.5, 2.0), 1.0, random.between(0.5, 2.0)];
+        scene["electronics"]["white_balance"] = json!({ "speed": random.uniform(), "first": first });
+    }
+    if random.uniform() < 0.5 && scene["light"]["leds"].is_object() {
+        scene["light"]["leds"]["gloss"] = json!(true);
+    }
+}
+
 fn random_scene(random: &mut SeededRandom) -> Value {
     let images = random.uniform() < 0.8;
     let mut scene = json!({
@@ -86,6 +130,7 @@ fn random_scene(random: &mut SeededRandom) -> Value {
         scene["ink"]["broken"] =
             json!([{ "id": 5, "left": random.uniform(), "direction_deg": random.between(0.0, 360.0) }]);
     }
+    worn(random, &mut scene);
     scene
 }
 

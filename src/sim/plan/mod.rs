@@ -2,6 +2,7 @@
 
 mod entry;
 pub(crate) mod fill;
+mod growth;
 #[cfg(test)]
 mod honesty;
 #[cfg(test)]
@@ -20,7 +21,8 @@ use crate::effect_name::{EffectChoice, EffectName};
 use crate::effects;
 use crate::effects::geometry_bound::shift_px;
 use crate::effects::light_bound;
-use crate::plan::fill::{fill_grey, fill_tolerance, grey_before_sharpening};
+use crate::plan::fill::{fill_grey, fill_tolerance};
+use crate::plan::growth::{grown, growth};
 use crate::plan::search::{Candidate, best_set, closed, drop_orphans, effect_of};
 use crate::raster::settings::Geometry;
 use crate::scene::Scene;
@@ -101,7 +103,8 @@ impl Plan {
         // What a scene forbids takes with it what needs it.
         drop_orphans(&mut entries);
         let mut plan = Self { entries, left_out: Bound::default(), filled_grey: 0.0, contact_level: None };
-        if light::is_lit_by_leds(scene) && plan.uses(EffectName::DirectLight) {
+        let lit = light::is_lit_by_leds(scene) && plan.uses(EffectName::DirectLight);
+        if lit || plan.uses(EffectName::UnevenMembrane) {
             plan.filled_grey = fill_grey(scene);
         }
         if candidate {
@@ -126,7 +129,8 @@ impl Plan {
         };
         let mut steps = 1.0;
         if let (Some(_), Some(noise)) = (kept(EffectName::Noise), &scene.file().electronics.noise) {
-            steps += 255.0 / f64::from((1_u32 << noise.bits.min(31)) - 1);
+            let step = 255.0 / f64::from((1_u32 << noise.bits.min(31)) - 1);
+            steps += step * growth(scene, EffectName::Noise);
         }
         sum + steps
     }
@@ -143,7 +147,8 @@ impl Plan {
         }
         let sum: f64 = light.iter().map(|(_, grey)| grey).sum();
         let together = light_bound::change(scene, &|name| light.iter().any(|(member, _)| *member == name))?;
-        Ok((together.grey - sum).max(0.0))
+        let grown = light.iter().map(|(name, _)| grown(scene, *name, together.grey)).fold(0.0, f64::max);
+        Ok((grown - sum).max(0.0))
     }
 
     /// Whether the geometric effects of a set, and those of the light, left out together, stay within the tolerance: each
@@ -177,17 +182,18 @@ impl Plan {
 
     fn leave_out(&mut self, scene: &Scene) -> Result<(), SimError> {
         let mut tolerance = scene.file().tolerance;
-        tolerance.grey = grey_before_sharpening(scene) - self.filled_grey;
+        tolerance.grey -= self.filled_grey;
         let left = tolerance;
         let frames = u64::from(scene.frame_count());
         self.choose_level(scene, &mut tolerance)?;
         let mut candidates: Vec<Candidate> = Vec::new();
         for (index, entry) in self.entries.iter().enumerate() {
             let Some((bound, cost)) = entry.bound.filter(|_| entry.used).zip(entry.cost) else { continue };
-            if bound.px > tolerance.px || bound.grey > tolerance.grey {
+            let own = grown(scene, entry.effect, bound.grey);
+            if bound.px > tolerance.px || own > tolerance.grey {
                 continue;
             }
-            let (cost, grey) = (cost.total(frames), bound.grey + grey_of_shift(scene, bound.px)?);
+            let (cost, grey) = (cost.total(frames), own + grey_of_shift(scene, bound.px)?);
             let free = scene.choice(entry.effect) == EffectChoice::Plan;
             if grey <= tolerance.grey && free && cost > 0 {
                 candidates.push(Candidate { index, px: bound.px, grey, cost });
@@ -281,6 +287,9 @@ impl Plan {
         pipeline.passes.sort_by_key(|pass| pass.stage());
         pipeline.fill_tolerance = fill_tolerance(scene, self.filled_grey);
         pipeline.shading = light::shading_of(scene, &pipeline.light, work)?;
+        if let Some(uneven) = pipeline.unevenness.take() {
+            pipeline.shading = Some(uneven.over(pipeline.shading.take()));
+        }
         Ok(pipeline)
     }
 }
@@ -306,5 +315,7 @@ fn grey_of_shift(scene: &Scene, px: f64) -> Result<f64, SimError> {
     if px > MAX_SHIFT_PX {
         return Ok(255.0);
     }
-    light_bound::covered_grey(scene, 2.0 * std::f64::consts::SQRT_2 * px)
+    // What any geometric effect moves, all others may enlarge.
+    let grey = light_bound::covered_grey(scene, 2.0 * std::f64::consts::SQRT_2 * px)?;
+    Ok(grown(scene, EffectName::LensDistortion, grey))
 }

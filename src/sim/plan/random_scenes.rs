@@ -120,8 +120,9 @@ pub(super) fn lit_scene(random: &mut SeededRandom) -> Value {
             json!({ "amount": random.between(0.1, 1.5), "radius_px": random.between(0.5, 3.0) });
     }
     if random.uniform() < 0.15 {
-        scene["electronics"]["hot_pixels"] = json!({
-            "share": log_between(random, 1e-4, 1e-2), "level_per_s": log_between(random, 0.01, 30.0),
+        let level = log_between(random, 1e-3, 1.0);
+        scene["electronics"]["defects"] = json!({
+            "hot_per_million": log_between(random, 100.0, 1e4), "hot_level": [0.1 * level, level],
         });
     }
     let kind = random.uniform();

@@ -6,10 +6,11 @@ use std::path::Path;
 use domecast_optics::numeric::SeededRandom;
 
 use super::grey_of_shift;
+use super::growth::grown;
 use super::random_scenes::{apart, lit_designs, lit_scene, shipped};
 use crate::contact::between::Around;
 use crate::contact::stepper::Touch;
-use crate::output::render::{Drawn, Scratch};
+use crate::output::drawn::{Drawn, Scratch};
 use crate::scene::SceneFile;
 use crate::*;
 
@@ -101,7 +102,9 @@ fn measure(name: &str, scene: &Scene, numbers: &[u32], ratios: &mut Ratios) -> V
         };
         let (px, grey) = difference(scene, random, with, &frames(scene, &without, numbers, &touches));
         let by_px = bound.px / px.max(MIN_PX);
-        let whole = (bound.grey + grey_of_shift(scene, bound.px).unwrap()).min(255.0);
+        // What effects after it enlarge counts as in the plan.
+        let own = grown(scene, entry.effect, bound.grey);
+        let whole = (own + grey_of_shift(scene, bound.px).unwrap()).min(255.0);
         let by_grey = whole / grey.max(MIN_GREY);
         let ratio = if !scene.draws() || (bound.grey == 0.0 && px > MIN_PX) { by_px } else { by_grey };
         let line = format!(

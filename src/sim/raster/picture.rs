@@ -5,13 +5,16 @@ use std::ops::Range;
 use glam::DVec2;
 
 use crate::effect_name::EffectName;
+use crate::light::gloss::Gloss;
 use crate::light::shading::Shading;
 use crate::raster::coverage::{Coverage, clip, clip_to_image};
 use crate::raster::frame::Frame;
+use crate::raster::glints;
 use crate::raster::lattice::Lattice;
 use crate::raster::lens_field::{LensField, inside, rim_polygon};
 use crate::raster::rolled::Slice;
 use crate::raster::sensor_state::units;
+use crate::raster::specks::Specks;
 use crate::raster::spots::{Points, Spots};
 use crate::raster::surface::{ShadedSlice, ShadedSurface};
 use crate::scene::Scene;
@@ -32,6 +35,10 @@ pub struct Parts<'a> {
     pub points: &'a Points,
     /// The columns that the lens shows.
     pub field: &'a LensField,
+    /// The lights mirrored in the sheet.
+    pub gloss: Option<&'a Gloss>,
+    /// Dust before the sensor.
+    pub dust: Option<&'a Specks>,
 }
 
 /// Draws instants of a scene; what it keeps is room to work in.
@@ -59,6 +66,12 @@ impl Painter {
             self.dots(parts, spots, frame, work);
         }
         self.markers(parts, spots, frame, work);
+        if let Some(gloss) = parts.gloss {
+            glints::lay(gloss, slices, frame, &mut self.coverage, work);
+        }
+        if let Some(dust) = parts.dust {
+            dust.lay(slices, parts.field, frame, work);
+        }
     }
 
     /// Surround and membrane.
@@ -184,10 +197,11 @@ impl Painter {
 
     fn dots(&mut self, parts: Parts<'_>, spots: &Spots, frame: &mut Frame, work: &mut Work) {
         let (width, height) = (frame.width(), frame.height());
-        let taken = 1.0 - parts.scene.file().ink.reflectance as f32;
+        let even = parts.scene.file().ink.reflectance as f32;
         let channels = spots.channels();
         for index in 0..parts.scene.dots().len() {
             let rings = parts.points.rings(index);
+            let taken = 1.0 - parts.points.ink(index).unwrap_or(even);
             for (channel, plane) in frame.planes.iter_mut().enumerate() {
                 if channel < channels {
                     let Some(spot) = spots.dot(index, channel) else {

@@ -45,6 +45,8 @@ pub struct Ink {
     pub dots: bool,
     /// Whether they fade out at the edge.
     pub soft_edge: bool,
+    /// Whether each has its own diameter and ink.
+    pub uneven: bool,
 }
 
 /// When the rows gather light.

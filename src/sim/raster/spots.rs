@@ -3,12 +3,14 @@
 use glam::{DVec2, DVec3};
 
 use crate::effect_name::EffectName;
+use crate::light::random_field::PLACE_UNITS;
 use crate::raster::coverage::{area_moment, clip, clip_to_image};
 use crate::raster::outline::RimFit;
+use crate::raster::printed::printed_dots;
 use crate::raster::projector::{Apparent, Projector};
 use crate::raster::sensor_state::{SensorState, units};
 use crate::raster::settings::{Geometry, Ink};
-use crate::scene::{RIM_POINTS, Scene};
+use crate::scene::{RIM_POINTS, Scene, SceneDot};
 use crate::work::Work;
 
 /// A centre and its outline.
@@ -27,6 +29,8 @@ pub struct Points {
     apparent: Vec<Vec<Followed<Option<Apparent>>>>,
     /// Scales of the nested outlines that make up the soft edge, by dot; one outline, of scale 1, without it.
     rings: Vec<Vec<f64>>,
+    /// Reflectance of the ink by dot; empty where all are alike.
+    inks: Vec<f32>,
 }
 
 /// The image of a dot or marker in one channel.
@@ -90,8 +94,14 @@ impl Points {
         let with_center = |center: DVec3, rim: [DVec3; RIM_POINTS]| -> Followed<DVec3> {
             std::array::from_fn(|k| k.checked_sub(1).map_or(center, |k| rim[k]))
         };
-        let mut items: Vec<_> =
-            scene.dots().iter().map(|dot| with_center(dot.center_mm, dot.rim_mm)).collect();
+        let printed = if ink.uneven { printed_dots(scene) } else { Vec::new() };
+        work.add(EffectName::UnevenInk, printed.len() as u64 * PLACE_UNITS);
+        let dot_points = |(index, dot): (usize, &SceneDot)| {
+            let scale = printed.get(index).map_or(1.0, |printed| printed.scale);
+            let rim = dot.rim_mm.map(|place| scaled_on_dome(dot.center_mm, place, scale));
+            with_center(dot.center_mm, rim)
+        };
+        let mut items: Vec<_> = scene.dots().iter().enumerate().map(dot_points).collect();
         for marker in scene.markers() {
             let rim = std::array::from_fn(|k| {
                 let (sin, cos) = (std::f64::consts::TAU * k as f64 / RIM_POINTS as f64).sin_cos();
@@ -110,11 +120,13 @@ impl Points {
             work.add(EffectName::Refraction, count as u64 * units::BEND);
         }
         let edge_mm = scene.file().ink.edge_mm;
-        let rings = scene.layout().dots.iter().map(|dot| {
+        let rings = scene.layout().dots.iter().enumerate().map(|(index, dot)| {
             if !ink.soft_edge {
                 return vec![1.0];
             }
-            let half = (edge_mm / dot.diameter_mm).min(1.0);
+            // The ink's edge is as wide on a smaller dot.
+            let scale = printed.get(index).map_or(1.0, |printed| printed.scale);
+            let half = (edge_mm / (dot.diameter_mm * scale)).min(1.0);
             let ring = |k: u32| 1.0 + half * ((f64::from(k) + 0.5) * 2.0 / f64::from(EDGE_RINGS) - 1.0);
             (0..EDGE_RINGS).map(ring).collect()
         });
@@ -122,6 +134,7 @@ impl Points {
             fit: RimFit::new(widths.fold(1.0, f64::max), edge_tolerance_px),
             dots: scene.dots().len(),
             rings: rings.collect(),
+            inks: printed.iter().map(|printed| printed.reflectance as f32).collect(),
             items,
             apparent,
         }
@@ -130,6 +143,11 @@ impl Points {
     /// Number of followed points.
     pub fn count(scene: &Scene) -> u64 {
         ((scene.dots().len() + scene.markers().len()) * (RIM_POINTS + 1)) as u64
+    }
+
+    /// Reflectance of a dot's ink, where dots differ.
+    pub fn ink(&self, dot: usize) -> Option<f32> {
+        self.inks.get(dot).copied()
     }
 
     /// Scales of a dot's nested outlines, each with an equal share of its ink.
@@ -261,6 +279,14 @@ impl Points {
         let centroid_px = if area > 1e-9 { moment / area } else { center_px };
         Some(Spot { center_px, polygon, area_px2: area, centroid_px })
     }
+}
+
+/// A point of a dot's outline where the dot is larger by a factor.
+fn scaled_on_dome(center_mm: DVec3, place_mm: DVec3, scale: f64) -> DVec3 {
+    if scale == 1.0 {
+        return place_mm;
+    }
+    (center_mm + (place_mm - center_mm) * scale).normalize_or_zero() * place_mm.length()
 }
 
 /// Area of a polygon inside a picture, positive, and its first moment.

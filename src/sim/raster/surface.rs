@@ -86,7 +86,13 @@ impl<'a> ShadedSurface<'a> {
         let (rest_mm, inside) = (place_mm.as_vec3a(), inside.as_vec3a());
         let dome = seen.optics.dome();
         let normal = dome.outward_mm(place_mm).as_vec3a() * (1.0 / dome.radius_mm() as f32);
-        let mut sample = SurfaceSample { point_mm: rest_mm, normal, to_camera: -inside, is_moved: false };
+        let mut sample = SurfaceSample {
+            point_mm: rest_mm,
+            material_mm: rest_mm,
+            normal,
+            to_camera: -inside,
+            is_moved: false,
+        };
         if let Some(map) = seen.map {
             // Where a ray may meet the membrane more than once, what it shows may not depend on a neighbour.
             let near_mm = if map.may_fold() { Vec3A::ZERO } else { traced.near_mm };
@@ -96,6 +102,7 @@ impl<'a> ShadedSurface<'a> {
                 && deformed.displacement_mm.length_squared() > STILL_MM * STILL_MM
             {
                 sample.point_mm = undeformed_mm + deformed.displacement_mm;
+                sample.material_mm = undeformed_mm;
                 sample.normal = deformed.normal;
                 sample.is_moved = true;
             }

@@ -5,6 +5,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::camera::{AutoExposureSection, DefectsSection, SharpeningSection, WhiteBalanceSection};
 use domecast_design::sections::Why;
 
 /// From light on the image plane to bytes.
@@ -26,13 +27,19 @@ pub struct ElectronicsSection {
     /// Colour filters over the pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bayer: Option<BayerPattern>,
-    /// Pixels of the sensor that fill in the dark.
+    /// An exposure that the camera sets by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub hot_pixels: Option<HotPixelsSection>,
+    pub auto_exposure: Option<AutoExposureSection>,
+    /// Hot and dead pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub defects: Option<DefectsSection>,
     /// Shot, read and quantisation noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseSection>,
-    /// How the camera sharpens edges, after reading and before its lossy code.
+    /// A white balance that the camera sets by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub white_balance: Option<WhiteBalanceSection>,
+    /// Sharpening by the camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sharpening: Option<SharpeningSection>,
     /// Quality of the JPEG code that the camera sends, 1 to 100; left out: no loss.
@@ -54,8 +61,10 @@ impl Default for ElectronicsSection {
             focus: None,
             shutter: None,
             bayer: None,
-            hot_pixels: None,
+            auto_exposure: None,
+            defects: None,
             noise: None,
+            white_balance: None,
             sharpening: None,
             jpeg_quality: None,
             jpeg_chroma: JpegChroma::HalfWidth,
@@ -134,34 +143,6 @@ pub enum BayerPattern {
     Grbg,
     /// Green blue / red green.
     Gbrg,
-}
-
-/// Pixels that gather electrons without light.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct HotPixelsSection {
-    /// Share of the sensor's pixels that are hot.
-    #[schemars(range(min = 0.0, max = 0.1))]
-    pub share: f64,
-    /// Level that they gather in the mean, full scales a second of exposure (`shutter.exposure_s`; without a shutter a
-    /// frame's time). Each has a rate of its own, by an exponential law.
-    #[schemars(range(min = 0.0, max = 1e4))]
-    pub level_per_s: f64,
-    /// Which sensor it is: another number has other hot pixels. The run's `seed` does not move them.
-    #[serde(default)]
-    pub seed: u64,
-}
-
-/// Unsharp masking: `code + amount * (code - blurred code)`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SharpeningSection {
-    /// How often what the blur takes is added.
-    #[schemars(range(min = 0.0, max = 10.0))]
-    pub amount: f64,
-    /// Standard deviation of the blur, px.
-    #[schemars(range(min = 0.3, max = 20.0))]
-    pub radius_px: f64,
 }
 
 /// Noise of the sensor.

@@ -3,9 +3,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::dust::DustSection;
 use super::electronics::ElectronicsSection;
 use super::light::LightSection;
 use super::objects::ObjectSection;
+use super::uneven::{UnevenInkSection, UnevenMembraneSection};
 use crate::effect_name::EffectChoices;
 use domecast_design::sections::Why;
 
@@ -58,6 +60,12 @@ pub struct SceneFile {
     /// The printed dots as they came out.
     #[serde(default)]
     pub ink: InkSection,
+    /// A membrane whose reflectance varies from place to place; left out: it is even.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uneven_membrane: Option<UnevenMembraneSection>,
+    /// Dust and scratches on sheet and lens; left out: they are clean.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dust: Option<DustSection>,
     /// Effects that shall be used, or not, whatever the plan says.
     #[serde(default)]
     pub effects: EffectChoices,
@@ -215,6 +223,9 @@ pub struct InkSection {
     /// Width over which the ink fades out at a dot's edge, mm on the dome.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub edge_mm: f64,
+    /// How unlike the dots are; left out: all alike.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uneven: Option<UnevenInkSection>,
     /// Dots that came out broken or not at all.
     #[schemars(length(max = 10000))]
     pub broken: Vec<BrokenDot>,
@@ -222,7 +233,7 @@ pub struct InkSection {
 
 impl Default for InkSection {
     fn default() -> Self {
-        Self { reflectance: 0.05, edge_mm: 0.0, broken: Vec::new() }
+        Self { reflectance: 0.05, edge_mm: 0.0, uneven: None, broken: Vec::new() }
     }
 }
 

@@ -52,6 +52,9 @@ pub struct LedLight {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub stray_level: f64,
+    /// Whether the camera sees the lights mirrored in the sheet's faces.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub gloss: bool,
     /// What a channel of the camera takes of the neighbouring colour of light (red of green, green of red and blue,
     /// blue of green), of what it takes of its own.
     #[serde(default)]

@@ -1,5 +1,8 @@
 //! What happens: from a scene file to a resolved, validated [`Scene`].
 
+pub mod camera;
+mod check_camera;
+pub mod dust;
 pub mod electronics;
 pub mod file;
 pub mod light;
@@ -8,6 +11,7 @@ mod motion;
 pub mod object;
 pub mod objects;
 mod resolve;
+pub mod uneven;
 
 pub use file::SceneFile;
 pub use model::{RIM_POINTS, Scene, SceneDot};

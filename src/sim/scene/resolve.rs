@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
+use super::check_camera;
 use super::file::{MotionSection, SceneFile};
 use super::model::{RIM_POINTS, Scene, SceneDot};
 use super::motion::Motion;
@@ -63,6 +64,8 @@ fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
 
 fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimError> {
     check(&file)?;
+    let lens = design.optics().lens().spec();
+    check_camera::check(&file, [lens.width, lens.height])?;
     let layout = Layout::of_design(&design)?;
     if design.is_rigid() && file.motion.is_some() {
         let allowed = "no `motion`: objects may press on the dome, or a design with mount.kind = \"springs\"";

@@ -120,6 +120,7 @@ fn the_sensor_is_lit_from_three_sides() {
     // A point that was not moved has the same light by either table.
     let sample = |direction: DVec3, deformed| SurfaceSample {
         point_mm: (direction * 10.0).as_vec3a(),
+        material_mm: (direction * 10.0).as_vec3a(),
         normal: direction.as_vec3a(),
         to_camera: Vec3A::NEG_Z,
         is_moved: deformed,
@@ -170,6 +171,7 @@ fn largest_change(scene: &crate::Scene, a: &ShadedDome, b: &ShadedDome, moved: b
             if moved { direction.any_orthonormal_vector() * 0.5 * (i as f64).sin() } else { DVec3::ZERO };
         let sample = SurfaceSample {
             point_mm: point.as_vec3a(),
+            material_mm: (direction * scene.optics().dome_radius_mm()).as_vec3a(),
             normal: (direction + tilt).normalize().as_vec3a(),
             to_camera: Vec3A::from(-inside.as_vec3()),
             is_moved: moved,
@@ -207,7 +209,7 @@ fn no_effects_of_light_pass_their_bound() {
                 platform_shadow: keeps(3),
                 interreflection: keeps(4),
             };
-            let bound = coarse.change_grey(&ALL, &used);
+            let bound = coarse.change_grey(&ALL, &used, scene.file().electronics.gamma);
             let found = largest_change(&scene, &all, &lit(used), moved);
             println!("{set:05b}: {found:.1} of {bound:.1}");
             assert!(found <= bound, "{used:?}: {found} {bound}");

@@ -1,9 +1,10 @@
-//! How far an object goes until it touches.
+//! An approach: whether it can be pressed along, how far an object goes until it touches, and how far it was.
 
 use glam::DVec3;
 
+use super::pressed::Pressed;
 use crate::elastomer::Indenter;
-use crate::error::ContactError;
+use crate::error::{ContactError, positive};
 use crate::object::{Placed, deepest, deepest_from};
 use domecast_optics::numeric::Rigid;
 
@@ -43,4 +44,24 @@ pub(super) fn touch_mm(
         }
     }
     Err(ContactError::BadPose(format!("the object does not meet the dome along {way}")))
+}
+
+/// The unit direction of an approach, and its force, both fit to be pressed with from that pose.
+pub(super) fn checked_press(
+    rest_from_object: &Rigid,
+    approach: DVec3,
+    force_n: f64,
+) -> Result<(DVec3, f64), ContactError> {
+    let way = approach
+        .try_normalize()
+        .ok_or_else(|| ContactError::BadPose(format!("{approach} is no direction of approach")))?;
+    let force_n = positive("force_n", force_n)?;
+    rest_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
+    Ok((way, force_n))
+}
+
+/// How far the object had gone along a way when it last touched, mm.
+pub(super) fn gone_before_mm(before: Option<&Pressed>, rest_from_object: &Rigid, way: DVec3) -> Option<f64> {
+    let pressed = before.filter(|pressed| !pressed.state.nodes.is_empty())?;
+    Some((pressed.rest_from_object.translation_mm - rest_from_object.translation_mm).dot(way))
 }

@@ -6,11 +6,11 @@
 
 use glam::DVec3;
 
-use super::approach::touch_mm;
+use super::approach::{checked_press, gone_before_mm, touch_mm};
 use super::pressed::{PressStatus, Pressed};
 use crate::contact::Contact;
 use crate::elastomer::Indenter;
-use crate::error::{ContactError, positive};
+use crate::error::ContactError;
 use crate::state::ContactState;
 use domecast_optics::numeric::Rigid;
 
@@ -111,11 +111,7 @@ impl Contact {
         force_n: f64,
         before: Option<&Pressed>,
     ) -> Result<Pressed, ContactError> {
-        let way = approach
-            .try_normalize()
-            .ok_or_else(|| ContactError::BadPose(format!("{approach} is no direction of approach")))?;
-        let force_n = positive("force_n", force_n)?;
-        rest_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
+        let (way, force_n) = checked_press(rest_from_object, approach, force_n)?;
         let radius_mm = self.elastomer().dome_radius_mm;
         let touch_mm = touch_mm(radius_mm, indenter, &Rigid::identity(), rest_from_object, way)?;
         let mut bracket = Bracket {
@@ -125,13 +121,7 @@ impl Contact {
             touch_mm,
             was_low: None,
         };
-        let mut gone_mm = match before {
-            // Where the object was, as far as it lies on this way.
-            Some(pressed) if !pressed.state.nodes.is_empty() => {
-                (pressed.rest_from_object.translation_mm - rest_from_object.translation_mm).dot(way)
-            }
-            _ => touch_mm,
-        };
+        let mut gone_mm = gone_before_mm(before, rest_from_object, way).unwrap_or(touch_mm);
         if gone_mm - touch_mm < 1e-6 * radius_mm {
             gone_mm = touch_mm + self.first_depth_mm(indenter, force_n);
         }

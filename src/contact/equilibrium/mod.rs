@@ -14,8 +14,8 @@ use nalgebra::DVector;
 
 use crate::contact::Contact;
 use crate::elastomer::Indenter;
-use crate::error::{ContactError, positive};
-use approach::touch_mm;
+use crate::error::ContactError;
+use approach::{checked_press, gone_before_mm, touch_mm};
 use domecast_optics::numeric::Rigid;
 use domecast_springs::{Displacement, Suspension};
 pub use pressed::{PressStatus, Pressed};
@@ -75,11 +75,7 @@ impl Contact {
         force_n: f64,
         before: Option<&Pressed>,
     ) -> Result<Pressed, ContactError> {
-        let way = approach
-            .try_normalize()
-            .ok_or_else(|| ContactError::BadPose(format!("{approach} is no direction of approach")))?;
-        let force_n = positive("force_n", force_n)?;
-        rest_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
+        let (way, force_n) = checked_press(rest_from_object, approach, force_n)?;
         let mut task = Task {
             contact: self,
             indenter,
@@ -90,12 +86,9 @@ impl Contact {
         };
         let mut x = start(suspension, before, 7);
         let platform = before.map_or(Rigid::identity(), |pressed| pressed.rest_from_platform);
-        x[6] = match before {
-            // Where the object was, as far as it lies on this way.
-            Some(pressed) if !pressed.state.nodes.is_empty() => {
-                (pressed.rest_from_object.translation_mm - rest_from_object.translation_mm).dot(way)
-            }
-            _ => {
+        x[6] = match gone_before_mm(before, rest_from_object, way) {
+            Some(gone_mm) => gone_mm,
+            None => {
                 touch_mm(self.elastomer().dome_radius_mm, indenter, &platform, rest_from_object, way)?
                     + self.first_depth_mm(indenter, force_n)
             }

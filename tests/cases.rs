@@ -161,10 +161,10 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// The page's chapter of warnings, as text.
+/// The page's verdict, which has its warnings, as text.
 fn page_warnings(page: &Path) -> String {
     let page = fs::read_to_string(page).expect("a page");
-    let start = page.find("id=\"warnings\"").expect("a chapter of warnings");
+    let start = page.find("id=\"verdict\"").expect("a verdict");
     page[start..].split("</section>").next().expect("its text").to_owned()
 }
 

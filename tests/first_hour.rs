@@ -53,6 +53,32 @@ fn a_new_design_builds_like_the_one_it_starts_from() {
 }
 
 #[test]
+fn a_sensor_of_ones_own_has_the_shape_that_is_asked_for_and_its_dots_in_the_light() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let start = |name: &str, flags: &[&str]| -> Value {
+        let own = ["new", name, "--camera", "picam2", "--out", "own.json", "--force"];
+        said(&[&own, flags].concat(), folder.path());
+        let text = fs::read_to_string(folder.path().join("own.json")).expect("written");
+        serde_json::from_str(&text).expect("JSON")
+    };
+    let cap = start("cap", &["--radius", "16", "--rim-angle", "70"]);
+    assert_eq!([&cap["dome"]["radius_mm"], &cap["dome"]["rim_angle_deg"]], [&json!(16.0), &json!(70.0)]);
+    let pillar = start("pillar", &["--radius", "10", "--cylinder-height", "3"]);
+    assert_eq!(pillar["dome"]["cylinder_height_mm"], json!(3.0));
+    // The outline follows the board.
+    assert_eq!(pillar["camera_body"]["kind"], json!("board"));
+    let wide = start("wide", &["--radius", "20"]);
+    let polar_deg = wide["pattern"]["polar_angle_deg"].as_f64().expect("inside of the shadows");
+    assert!((20.0..60.0).contains(&polar_deg), "{polar_deg}");
+    assert!(wide["pattern"]["why"].as_str().is_some_and(|why| why.contains("shadows")), "{wide}");
+    for wrong in [["--rim-angle", "120"], ["--rim-angle", "0"]] {
+        let own = ["new", "wrong", "--radius", "10", "--camera", "picam2", "--json"];
+        let refused = domecast(&[&own[..], &wrong].concat(), folder.path());
+        assert_eq!(refused.status.code(), Some(1), "{wrong:?}");
+    }
+}
+
+#[test]
 fn fields_are_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     let text = said(&["explain", "springs.wire_diameter_mm"], folder.path());
@@ -191,4 +217,29 @@ fn long_a_measurement_goes_into_the_report() {
     refused(&["build", DESIGN, "--accuracy", "nowhere"], "nowhere");
     fs::write(folder.path().join("measured/lens.svg"), "<svg/>").expect("written");
     refused(&["build", DESIGN, "--accuracy", "measured"], "lens.svg");
+}
+
+/// From a shipped design by its name alone: the program carries it. Fewer frames than the scene asks for show all of it.
+#[test]
+fn a_scene_of_ones_own_is_drawn_from_its_start_to_its_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    said(&["new", "mine", "--from", "endoscope-r5"], folder.path());
+    said(&["new", "press", "--scene", "mine.json"], folder.path());
+    let scene: Value =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("press.json")).expect("written"))
+            .expect("JSON");
+    assert_eq!(scene["design"], "mine.json");
+    let number = |field: &str| scene["frames"][field].as_f64().expect("a number");
+    let (count, rate_hz) = (number("count"), number("rate_hz"));
+    assert!(count > 3.0, "{scene}");
+    said(&["simulate", "press.json", "--frames", "3", "--out", "out"], folder.path());
+    let truth = fs::read_to_string(folder.path().join("out/truth.jsonl")).expect("truth");
+    let times_s: Vec<f64> = truth
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("JSON")["time_s"].as_f64().expect("s"))
+        .collect();
+    let last_s = (count - 1.0) / rate_hz;
+    let wanted_s = [0.0, 0.5 * last_s, last_s];
+    assert_eq!(times_s.len(), 3);
+    assert!(times_s.iter().zip(wanted_s).all(|(found, wanted)| (found - wanted).abs() < 1e-9), "{times_s:?}");
 }

@@ -82,6 +82,48 @@ fn markers_are_tracked_as_well_as_the_lit_frame_says() {
     }
 }
 
+/// A dome of 20 mm over a Raspberry Pi camera, left to rules, whose dots end at a polar angle.
+fn over_picam(polar_deg: f64) -> Design {
+    let design = json!({
+        "version": 1, "name": "over-picam", "camera": { "from": "picam2" }, "camera_body": { "from": "picam2" },
+        "dome": { "radius_mm": 20 }, "pattern": { "polar_angle_deg": polar_deg },
+    });
+    design.to_string().parse().expect("a design by rules")
+}
+
+/// Markers of 1.6 mm are 40 px wide there; dots on the edges of the lights' shadows were tracked up to 0.75 px off.
+#[test]
+fn wide_markers_and_dots_inside_of_the_shadows_are_tracked() {
+    let wide = LightCheck::of(&over_picam(60.0)).unwrap();
+    let edges = wide.report.edges.unwrap();
+    let polar_deg = edges.from_polar_deg.unwrap().floor();
+    assert!(edges.dots > 5 && polar_deg > 20.0, "{edges:?}");
+    assert!(wide.warnings.iter().any(|(field, _)| field == "pattern.polar_angle_deg"), "{:?}", wide.warnings);
+    let design = over_picam(polar_deg);
+    let check = LightCheck::of(&design).unwrap();
+    assert_eq!(check.report.edges.map(|edges| edges.dots), Some(0));
+    let file: SceneFile = serde_json::from_value(json!({
+        "version": 1, "name": "rest", "design": "", "frames": { "count": 1, "rate_hz": 30 },
+        "tolerance": { "px": 0.05, "grey": 1 },
+        "light": { "surround_level": 0.02, "leds": {
+            "level_per_mw_mm2": check.report.level_per_mw_mm2, "stray_level": 0.005, "crosstalk": 0.08 } },
+    }))
+    .unwrap();
+    let constants = domecast::constants::of(&design, &design.layout().unwrap()).unwrap();
+    let scene = Scene::new(file, &designs(), design).unwrap();
+    let renderer = Renderer::new(&scene, &Plan::everything(&scene).unwrap()).unwrap();
+    let drawn = renderer.frame_around(0, None, &mut Scratch::default()).unwrap();
+    let image = drawn.image.unwrap();
+    let frame = CameraFrame::new(image.width, image.height, image.channels, &image.bytes).unwrap();
+    let mut tracker = Tracker::new(&constants, TrackOptions::default()).unwrap();
+    let tracked = tracker.track(0, &frame);
+    assert!(tracked.white_markers.iter().all(|marker| marker.centroid_px.is_some()), "{}", tracked.status());
+    for (dot, truth) in tracked.black_dots.iter().zip(&drawn.truth.black_dots) {
+        let off_px = dot.centroid_px.map(|at| at.distance(truth.centroid_px.unwrap().into()));
+        assert!(off_px.is_some_and(|off| off < 0.3), "dot {}: {off_px:?}", dot.id);
+    }
+}
+
 /// The tracker follows the dim scene, and says of every frame of one with less than half of its light that it does not.
 #[test]
 fn the_dim_scene_is_tracked_and_the_one_that_is_too_dim_is_named() {

@@ -42,7 +42,9 @@ fn a_scene_becomes_frames_video_and_truth() {
     let output = domecast(&["simulate", "scene.json", "--out", "out", "--json"], folder.path());
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!((output.status.code(), &told["frames"]), (Some(0), &json!(2)), "{told}");
-    assert_eq!(told["contact"], json!([]), "nothing to say of its contact");
+    let said = told["contact"].as_array().expect("a list");
+    let is_estimate = |fault: &Value| fault["status"] == "beyond_tolerance";
+    assert!(said.iter().all(is_estimate), "nothing else to say of its contact: {said:?}");
     let out = folder.path().join("out");
     let mut names: Vec<String> = domecast::build::list_files(&out).expect("listed");
     names.sort();
@@ -109,7 +111,8 @@ fn a_contact_that_its_level_does_not_cover_is_named() {
     assert!(message.contains("contact not_applicable in 1 of 2 frames, first in frame 1: "), "{message}");
     let output = domecast(&[&more[..], &["--json"]].concat(), folder.path());
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let fault = &told["contact"][0];
+    let said = told["contact"].as_array().expect("a list");
+    let fault = said.iter().find(|fault| fault["status"] == "not_applicable").unwrap_or(&Value::Null);
     assert_eq!((&fault["status"], &fault["first"]), (&json!("not_applicable"), &json!(1)), "{told}");
     assert_eq!(fault["frames"], json!(1), "{told}");
 }

@@ -2,5 +2,6 @@
 
 mod accuracy;
 mod commands;
+mod touch_scene;
 
 pub use commands::run;

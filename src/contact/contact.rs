@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::deviation::deviation;
 use crate::elastomer::{Elastomer, Indenter};
 use crate::error::ContactError;
 use crate::estimate::{Estimate, estimate};
@@ -38,12 +39,22 @@ impl Contact {
         elastomer.check()?;
         let prepared = match level {
             Level::Geometric | Level::ClosedForm => Prepared::Nothing,
+            Level::FiniteStrain { across } if (4..=16).contains(&across) => Prepared::Nothing,
+            Level::FiniteStrain { across } => {
+                let (field, allowed) = ("level.across", "4 to 16");
+                return Err(ContactError::Dimension { field, value: across as f64, allowed });
+            }
             Level::Linear { element_mm } => {
                 let elements = elements_of(&elastomer, element_mm)?;
                 Prepared::Compliance(Arc::new(Compliance::new(&elastomer, elements)?))
             }
         };
         Ok(Self { elastomer, level, prepared })
+    }
+
+    /// The same dome with other tables.
+    pub(crate) fn with_prepared(&self, prepared: Prepared) -> Self {
+        Self { prepared, ..self.clone() }
     }
 
     /// The elastomer.
@@ -66,7 +77,7 @@ impl Contact {
     ///
     /// # Errors
     /// [`ContactError`] for constants or poses without meaning, an object that reaches into the sheet, or deeper
-    /// than the model goes. Iterations that reach their bound are not an error: see [`ContactState::status`].
+    /// than the model goes, and for a dome that is no hemisphere at another level than the linear one. Iterations that reach their bound are not an error: see [`ContactState::status`].
     pub fn solve(
         &self,
         indenter: &Indenter,
@@ -75,14 +86,21 @@ impl Contact {
     ) -> Result<ContactState, ContactError> {
         let history = before.map(|state| &state.history);
         let elastomer = &self.elastomer;
-        self.checked(indenter, sensor_from_object, || match &self.prepared {
-            Prepared::Compliance(compliance) => {
+        if !elastomer.dome().is_hemisphere() && matches!(self.prepared, Prepared::Nothing) {
+            let (level, kind) = (self.level.name(), elastomer.dome().kind());
+            return Err(ContactError::HemisphereOnly { level, kind });
+        }
+        self.checked(indenter, sensor_from_object, || match (&self.prepared, self.level) {
+            (Prepared::Compliance(compliance), _) => {
                 linear::linear(elastomer, compliance, indenter, sensor_from_object, before)
             }
-            Prepared::Nothing if self.level == Level::Geometric => {
+            (Prepared::Nothing, Level::Geometric) => {
                 levels::geometric(elastomer, indenter, sensor_from_object, history)
             }
-            Prepared::Nothing => levels::closed_form(elastomer, indenter, sensor_from_object, history),
+            (Prepared::Nothing, Level::FiniteStrain { across }) => {
+                levels::finite_strain(elastomer, across, indenter, sensor_from_object, before)
+            }
+            (Prepared::Nothing, _) => levels::closed_form(elastomer, indenter, sensor_from_object, history),
         })
     }
 
@@ -96,14 +114,15 @@ impl Contact {
         indenter.check()?;
         sensor_from_object.check().map_err(|error| ContactError::BadPose(error.to_string()))?;
         self.above_sheet(indenter, sensor_from_object)?;
-        let state = solve()?;
+        let mut state = solve()?;
         // Nothing touches the surface: then the object is outside, or all of it within.
         let any = sensor_from_object.point(indenter.solid.support(glam::DVec3::Z));
-        let inside_mm = self.elastomer.dome_radius_mm - any.length();
+        let inside_mm = -self.elastomer.dome().distance_mm(any);
         if state.status == Status::Free && inside_mm > 1e-9 * self.elastomer.dome_radius_mm {
-            let limit_mm = DEEPEST * self.elastomer.dome_radius_mm;
+            let limit_mm = DEEPEST * self.elastomer.depth_scale_mm();
             return Err(ContactError::TooDeep { depth_mm: inside_mm, limit_mm });
         }
+        state.deviation = deviation(self.level, &self.elastomer, indenter, &state);
         Ok(state)
     }
 

@@ -2,12 +2,19 @@
 
 use crate::error::{ContactError, positive};
 use crate::object::ContactSolid;
+use domecast_optics::DomeShape;
 
-/// The dome as an elastic body: a solid hemisphere, bonded to the rigid sheet by its base.
+/// Heights of domes over the radius of their sphere: flatter ones have no elements, and higher ones are no domes.
+const HEIGHTS: std::ops::RangeInclusive<f64> = 0.05..=3.0;
+
+/// The dome as an elastic body: a solid hemisphere, cap, or hemisphere on a cylinder, bonded to the rigid sheet by its base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Elastomer {
-    /// Radius of the hemisphere, mm.
+    /// Radius of the dome's sphere, mm.
     pub dome_radius_mm: f64,
+    /// Height of that sphere's centre above the base, mm: 0 for a hemisphere, negative for a cap, the cylinder's height for a
+    /// hemisphere on one.
+    pub center_z_mm: f64,
     /// Young's modulus at small strain, MPa.
     pub young_mpa: f64,
     /// Poisson's ratio.
@@ -20,10 +27,15 @@ impl Elastomer {
     /// Whether the constants describe a solid.
     ///
     /// # Errors
-    /// [`ContactError::Dimension`]: radius and modulus must be positive, Poisson's ratio from 0 to 0.4999 (beyond, the
-    /// displacement alone no longer says the pressure), friction from 0 to 10.
+    /// [`ContactError::Dimension`]: radius and modulus must be positive, the dome's height from a twentieth of the radius to
+    /// three of them, Poisson's ratio from 0 to 0.4999 (beyond, the displacement alone no longer says the pressure),
+    /// friction from 0 to 10.
     pub fn check(&self) -> Result<(), ContactError> {
-        positive("elastomer.dome_radius_mm", self.dome_radius_mm)?;
+        let radius_mm = positive("elastomer.dome_radius_mm", self.dome_radius_mm)?;
+        if !HEIGHTS.contains(&(1.0 + self.center_z_mm / radius_mm)) {
+            let (field, allowed) = ("elastomer.center_z_mm", "-0.95 to 2 of the dome's radius");
+            return Err(ContactError::Dimension { field, value: self.center_z_mm, allowed });
+        }
         positive("elastomer.young_mpa", self.young_mpa)?;
         poisson("elastomer.poisson", self.poisson)?;
         if !(0.0..=10.0).contains(&self.friction) {
@@ -35,6 +47,16 @@ impl Elastomer {
             });
         }
         Ok(())
+    }
+
+    /// The dome's face.
+    pub fn dome(&self) -> DomeShape {
+        DomeShape::new(self.dome_radius_mm, self.center_z_mm)
+    }
+
+    /// What depths are measured by: the radius, or the height of a cap, mm.
+    pub fn depth_scale_mm(&self) -> f64 {
+        self.dome_radius_mm + self.center_z_mm.min(0.0)
     }
 
     /// Shear modulus, MPa.

@@ -61,6 +61,46 @@ pub enum ContactError {
         /// Distance of the level's nodes, mm.
         spacing_mm: f64,
     },
+    /// Another contact is so near that a level which takes contacts one by one would be wrong about this one.
+    TooNear {
+        /// What the others move the dome under the object, less their mean shift, mm.
+        moved_mm: f64,
+        /// How deep the object lies in the dome, mm.
+        depth_mm: f64,
+    },
+    /// Two objects lie in each other.
+    ObjectsMeet {
+        /// Their numbers.
+        objects: [usize; 2],
+        /// How deep at least, mm.
+        depth_mm: f64,
+    },
+    /// One of several objects, by its number, is at fault.
+    OfObject {
+        /// Its number.
+        object: usize,
+        /// What is wrong.
+        error: Box<Self>,
+    },
+    /// A level that a slow gel cannot be computed with.
+    NoSlowGel {
+        /// The level's name.
+        level: &'static str,
+    },
+    /// A level that knows hemispheres only, and a dome of another shape.
+    HemisphereOnly {
+        /// The level's name.
+        level: &'static str,
+        /// What the dome is.
+        kind: &'static str,
+    },
+    /// Newton's method ended on the way, though its steps were halved.
+    NotConverged {
+        /// How far the undeformed dome reaches into the object at its pose, mm.
+        depth_mm: f64,
+        /// The part of the way that was solved.
+        reached: f64,
+    },
     /// The springs have no force at the pose that was asked for.
     Springs(MechanicsError),
     /// The stiffness matrix has no factors: the elastomer's constants make it singular.
@@ -104,6 +144,29 @@ impl fmt::Display for ContactError {
             Self::Unseen { depth_mm, spacing_mm } => write!(
                 f,
                 "the object reaches {depth_mm:.3} mm into the dome between the surface's nodes, which are {spacing_mm:.3} mm apart"
+            ),
+            Self::TooNear { moved_mm, depth_mm } => write!(
+                f,
+                "the other contacts move the dome under the object unevenly, by {moved_mm:.4} mm where it lies {depth_mm:.4} mm \
+                 deep, and the level takes contacts one by one"
+            ),
+            Self::ObjectsMeet { objects: [a, b], depth_mm } => {
+                write!(f, "objects {a} and {b} lie at least {depth_mm:.4} mm in each other")
+            }
+            Self::OfObject { object, error } => write!(f, "object {object}: {error}"),
+            Self::NoSlowGel { level } => {
+                write!(f, "a slow gel is computed by the linear level only, not by the {level} one")
+            }
+            Self::HemisphereOnly { level, kind } => {
+                write!(
+                    f,
+                    "the dome is {kind}, and the {level} level computes hemispheres only: take the linear one"
+                )
+            }
+            Self::NotConverged { depth_mm, reached } => write!(
+                f,
+                "the contact {depth_mm:.3} mm deep does not converge: {:.1} % of the way to it was solved",
+                100.0 * reached
             ),
             Self::Springs(error) => write!(f, "{error}"),
             Self::Factorisation(why) => write!(f, "the dome's stiffness has no factors: {why}"),

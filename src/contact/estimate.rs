@@ -49,6 +49,13 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
             setup_work: 0.0,
             applies: !indenter.solid.is_mesh(),
         },
+        Level::FiniteStrain { across } => Estimate {
+            displacement_mm: 0.01 * depth,
+            force_part: 0.03,
+            work: 60.0 * 3e7 * (across as f64).powi(4),
+            setup_work: 0.0,
+            applies: true,
+        },
         Level::Linear { element_mm } => {
             let elements = elements_of(elastomer, element_mm).unwrap_or(MAX_ELEMENTS) as f64;
             let h = std::f64::consts::FRAC_PI_2 * radius / elements;

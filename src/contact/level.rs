@@ -10,6 +10,11 @@ pub enum Level {
     Geometric,
     /// Hertz and kin.
     ClosedForm,
+    /// Neo-Hookean finite elements of second order at large strain, laid out about where the object touches.
+    FiniteStrain {
+        /// Elements across the fine patch, 4 to 16.
+        across: usize,
+    },
     /// Linear finite elements.
     Linear {
         /// Length of an element on the dome's surface, mm.
@@ -30,6 +35,7 @@ impl Level {
             Self::Geometric => "geometric",
             Self::ClosedForm => "closed_form",
             Self::Linear { .. } => "linear",
+            Self::FiniteStrain { .. } => "finite_strain",
         }
     }
 }
@@ -37,7 +43,7 @@ impl Level {
 /// Elements along the meridian for a length: 4 times a power of two, no element longer than asked for.
 pub(crate) fn elements_of(elastomer: &Elastomer, element_mm: f64) -> Result<usize, ContactError> {
     let element_mm = positive("level.element_mm", element_mm)?;
-    let arc_mm = std::f64::consts::FRAC_PI_2 * elastomer.dome_radius_mm;
+    let arc_mm = elastomer.dome().meridian_end_rad() * elastomer.dome_radius_mm;
     let mut elements = 8;
     // A millionth of slack for lengths that were computed from a count.
     while arc_mm / elements as f64 > element_mm * (1.0 + 1e-6) {
@@ -53,5 +59,5 @@ pub(crate) fn elements_of(elastomer: &Elastomer, element_mm: f64) -> Result<usiz
 /// Elements along the meridian that memory allows: the tables grow with their cube.
 pub(crate) const MAX_ELEMENTS: usize = 64;
 
-/// Deepest push-out that is modelled, as a part of the radius: beyond, an object would near the sheet.
+/// Deepest push-out that is modelled, as a part of [`Elastomer::depth_scale_mm`]: beyond, an object would near the sheet.
 pub(crate) const DEEPEST: f64 = 0.8;

@@ -22,6 +22,7 @@ const MAX_ELEMENTS: usize = 1024;
 #[derive(Debug)]
 pub struct OnPole {
     revolved: Revolved,
+    /// On the dome at rest, by ring.
     forces_n: Vec<DVec3>,
     /// The force on the dome along the axis, N; downwards is negative.
     pub force_n: f64,
@@ -49,37 +50,39 @@ impl OnPole {
         elastomer.check()?;
         let dome_mm = elastomer.dome_radius_mm;
         let depth_mm = positive("depth_mm", depth_mm)?;
-        if depth_mm > DEEPEST * dome_mm {
-            return Err(ContactError::TooDeep { depth_mm, limit_mm: DEEPEST * dome_mm });
+        let limit_mm = DEEPEST * elastomer.depth_scale_mm();
+        if depth_mm > limit_mm {
+            return Err(ContactError::TooDeep { depth_mm, limit_mm });
         }
         if !(8..=MAX_ELEMENTS).contains(&elements) || !elements.is_power_of_two() {
             let (field, allowed) = ("elements", "a power of two from 8 to 1024");
             return Err(ContactError::Dimension { field, value: elements as f64, allowed });
         }
         let solid = ContactSolid::sphere(radius_mm)?;
-        let center_mm = DVec3::Z * (dome_mm + radius_mm - depth_mm);
+        let apart_mm = dome_mm + radius_mm - depth_mm;
+        let center_mm = elastomer.dome().center_mm() + DVec3::Z * apart_mm;
         let placed = Placed::new(solid.clone(), Rigid::from_translation(center_mm));
         // A rigid ball touches nothing that it did not overlap: the two spheres' circle.
-        let up = (center_mm.z * center_mm.z + dome_mm * dome_mm - radius_mm * radius_mm)
-            / (2.0 * center_mm.z * dome_mm);
+        let up =
+            (apart_mm * apart_mm + dome_mm * dome_mm - radius_mm * radius_mm) / (2.0 * apart_mm * dome_mm);
         let revolved = Revolved::new(elastomer, elements, up.clamp(-1.0, 1.0).acos())?;
         let rigid = Indenter { solid, young_mpa: None, poisson: 0.3 };
         let mut touch = Touch::new(elastomer, placed, 1.0 + rigid.yield_ratio(elastomer));
-        let way = Way::new(&touch.placed, None, DVec3::Z * dome_mm, -depth_mm);
+        let way = Way::new(&touch.placed, elastomer.dome(), None, (elastomer.dome().pole_mm(), -depth_mm));
         for (number, ring) in revolved.rings().into_iter().enumerate() {
             let parts = Parts::whole(number);
             let (at_mm, area_mm2, spread_mm) = (ring.at_mm, ring.area_mm2, ring.spread_mm);
             let spot = Spot { node: number, parts, at_mm, area_mm2, spread_mm };
-            touch.candidates.push(Candidate::new(spot, &touch.placed, &way, touch.sharing)?);
+            touch.candidates.push(Candidate::new(spot, elastomer, &touch.placed, &way, touch.sharing)?);
         }
         touch.blocks = blocks(&revolved, touch.candidates.len());
         let ended = touch.run(0.0);
         let mut state = ContactState::free(&touch.placed.sensor_from_object());
         touch.finish(&mut state, ended);
-        let forces_n: Vec<DVec3> = touch.candidates.iter().map(|candidate| candidate.force_n).collect();
+        let forces_n: Vec<DVec3> = touch.candidates.iter().map(Candidate::rest_force_n).collect();
         let peak = touch.candidates.first().map_or(0.0, |c| c.force_n.dot(c.normal) / c.area_mm2);
         Ok(Self {
-            force_n: forces_n.iter().map(|force| force.z).sum(),
+            force_n: touch.candidates.iter().map(|candidate| candidate.force_n.z).sum(),
             revolved,
             forces_n,
             peak_pressure_mpa: peak,
@@ -118,7 +121,13 @@ mod tests {
 
     #[test]
     fn the_linear_level_nears_the_ball_on_the_pole() {
-        let elastomer = Elastomer { dome_radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, friction: 0.6 };
+        let elastomer = Elastomer {
+            dome_radius_mm: 10.0,
+            center_z_mm: 0.0,
+            young_mpa: 0.56,
+            poisson: 0.49,
+            friction: 0.6,
+        };
         let ball = Indenter { solid: ContactSolid::sphere(5.0).unwrap(), young_mpa: None, poisson: 0.3 };
         let depth_mm = 0.5;
         let at = Rigid::from_translation(DVec3::Z * (15.0 - depth_mm));

@@ -1,8 +1,11 @@
 //! Parts of what a solve answers: how it ended, the nodes that bear a force, where the dome moves, and what the next
 //! frame must know.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
+use crate::finite_strain::Deformed;
 use domecast_optics::numeric::Rigid;
 use domecast_springs::Wrench;
 
@@ -17,6 +20,16 @@ pub enum Status {
     BoundReached,
     /// The level's formulas do not cover this contact; the state is that of the geometric level.
     NotApplicable(&'static str),
+}
+
+/// How far a solved contact may be from that of a dome at large strain: the truth that it is compared with is
+/// [`Level::FiniteStrain`](crate::Level::FiniteStrain). Not what the elastomer's own constants leave open.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Deviation {
+    /// Of the dome's surface, the largest, mm.
+    pub displacement_mm: f64,
+    /// Of the contact's force, N.
+    pub force_n: f64,
 }
 
 /// A node of the dome's surface that bears a force.
@@ -37,7 +50,7 @@ pub struct TouchedNode {
 /// Where the dome moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
-    /// Direction from the base's centre to the middle of the touched region.
+    /// Direction from the centre of the dome's sphere to the middle of the touched region.
     pub direction: DVec3,
     /// Half angle of a cap about it, rad.
     pub angle_rad: f64,
@@ -55,6 +68,8 @@ pub(crate) struct History {
     pub torsion_nmm: f64,
     /// Unknowns of the last solve, by node of the level's grid: force in the node's frame, tangential displacement.
     pub nodes: Vec<NodeMemory>,
+    /// The deformed body of the finite-strain level.
+    pub body: Option<Arc<Deformed>>,
 }
 
 /// One node's part of [`History`].

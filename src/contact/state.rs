@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use crate::field::Field;
-use crate::outcome::{Extent, History, Status, TouchedNode};
+use crate::outcome::{Deviation, Extent, History, Status, TouchedNode};
+use domecast_optics::DomeShape;
 use domecast_optics::numeric::{LengthMismatch, Rigid, batch};
 use domecast_springs::Wrench;
 
@@ -12,7 +13,8 @@ use domecast_springs::Wrench;
 pub struct ContactState {
     /// How the solve ended.
     pub status: Status,
-    /// What the object puts on the dome, about the base's centre, sensor frame.
+    /// What the object puts on the dome, about the base's centre, sensor frame; its forces act where the levels of finite
+    /// elements have the dome now, the others where it is at rest.
     pub wrench: Wrench,
     /// The nodes that bear it.
     pub nodes: Vec<TouchedNode>,
@@ -27,9 +29,14 @@ pub struct ContactState {
     pub residual_mm: f64,
     /// Iterations of the outer loop.
     pub iterations: u32,
+    /// How far it may be from the truth.
+    pub deviation: Deviation,
     /// Counted work, multiplications.
     pub work: f64,
+    /// The dome's own field under this contact's forces.
     pub(crate) field: Field,
+    /// What moved the dome besides.
+    pub(crate) beside: Field,
     pub(crate) history: History,
 }
 
@@ -45,10 +52,48 @@ impl ContactState {
             penetration_mm: 0.0,
             residual_mm: 0.0,
             iterations: 0,
+            deviation: Deviation::default(),
             work: 0.0,
             field: Field::Still,
+            beside: Field::Still,
             history: History { sensor_from_object: Some(*sensor_from_object), ..Default::default() },
         }
+    }
+
+    /// The dome under several contacts, and what moved it besides: forces, wrench and field are sums, the status is the
+    /// worst, and the radius that of a disc of the same area as all.
+    pub(crate) fn of_all<'s>(states: impl Iterator<Item = &'s Self> + Clone, beside: &Field) -> Self {
+        let mut all = Self::free(&Rigid::identity());
+        all.history = History::default();
+        let rank = |status: &Status| match status {
+            Status::Free => 0,
+            Status::Solved => 1,
+            Status::NotApplicable(_) => 2,
+            Status::BoundReached => 3,
+        };
+        let mut area = 0.0;
+        for state in states.clone() {
+            if rank(&state.status) > rank(&all.status) {
+                all.status = state.status;
+            }
+            all.nodes.extend(&state.nodes);
+            area += state.contact_radius_mm * state.contact_radius_mm;
+            all.peak_pressure_mpa = all.peak_pressure_mpa.max(state.peak_pressure_mpa);
+            all.penetration_mm = all.penetration_mm.max(state.penetration_mm);
+            all.residual_mm = all.residual_mm.max(state.residual_mm);
+            all.iterations = all.iterations.max(state.iterations);
+            all.work += state.work;
+            all.wrench = all.wrench + state.wrench;
+        }
+        all.contact_radius_mm = area.sqrt();
+        let fields = std::iter::once(beside).chain(states.map(|state| &state.field));
+        all.field = Field::sum(&fields.map(|field| (1.0, field)).collect::<Vec<_>>());
+        all
+    }
+
+    /// Whether the dome is out of its shape.
+    pub fn is_moved(&self) -> bool {
+        self.field != Field::Still
     }
 
     /// Displacement of a point of the undeformed dome (sensor frame, mm); zero if the point is not finite.
@@ -71,18 +116,20 @@ impl ContactState {
         self.field.extent()
     }
 
-    /// Heights of the deformed membrane over the base's square [-R, R]^2, row by row from -y, `side` by `side`
-    /// samples at the cells' middles, mm; 0 beside the dome.
+    /// Heights of the deformed membrane over the base's square [-R, R]^2 about the rim, row by row from -y, `side` by
+    /// `side` samples at the cells' middles, mm; 0 beside the dome.
     ///
     /// Each sample is the dome's point over it, moved: its height is that point's z after the motion.
-    pub fn height_map_mm(&self, dome_radius_mm: f64, side: usize) -> Vec<f64> {
-        let at = |i: usize| ((2 * i + 1) as f64 / side as f64 - 1.0) * dome_radius_mm;
+    pub fn height_map_mm(&self, dome: &DomeShape, side: usize) -> Vec<f64> {
+        let (radius_mm, rim_mm) = (dome.radius_mm(), dome.rim_radius_mm());
+        let at = |i: usize| ((2 * i + 1) as f64 / side as f64 - 1.0) * rim_mm;
         let mut points = Vec::with_capacity(side * side);
         for row in 0..side {
             for column in 0..side {
                 let (x, y) = (at(column), at(row));
-                let z2 = dome_radius_mm * dome_radius_mm - x * x - y * y;
-                points.push(if z2 > 0.0 { DVec3::new(x, y, z2.sqrt()) } else { DVec3::ZERO });
+                let flat2 = x * x + y * y;
+                let z = dome.center_z_mm() + (radius_mm * radius_mm - flat2).max(0.0).sqrt();
+                points.push(if flat2 < rim_mm * rim_mm { DVec3::new(x, y, z) } else { DVec3::ZERO });
             }
         }
         self.field.prepare(points.len());

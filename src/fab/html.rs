@@ -12,6 +12,9 @@
 
 use std::fmt::{self, Write as _};
 
+/// The style of every page: light, dark, print, phone.
+pub const STYLE: &str = include_str!("report/style.css");
+
 /// A piece of HTML.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Html(String);
@@ -148,7 +151,12 @@ pub use crate::html;
 
 /// A table; the first column names the row. An empty caption is left out.
 pub fn table(caption: &str, heads: &[&str], rows: &[Vec<Html>]) -> Html {
-    let heads: Html = heads.iter().map(|head| html!("<th scope=\"col\">{}</th>", head)).collect();
+    let head = |head: &&str| match *head {
+        "" => Html::trusted("<td></td>"),
+        head => html!("<th scope=\"col\">{}</th>", head),
+    };
+    let heads_text = heads.join(", ");
+    let heads: Html = heads.iter().map(head).collect();
     let cells = |row: &Vec<Html>| -> Html {
         let cell = |(index, cell): (usize, &Html)| match index {
             0 => html!("<th scope=\"row\">{}</th>", cell),
@@ -156,9 +164,12 @@ pub fn table(caption: &str, heads: &[&str], rows: &[Vec<Html>]) -> Html {
         };
         html!("<tr>{}</tr>\n", row.iter().enumerate().map(cell).collect::<Html>())
     };
+    // what scrolls sideways on a phone must be reached by keys too, and then have a name
+    let name = if caption.is_empty() { heads_text } else { caption.to_owned() };
     let caption = if caption.is_empty() { Html::default() } else { html!("<caption>{}</caption>", caption) };
     html!(
-        "<div class=\"scroll\"><table>{}<thead><tr>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
+        "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"{}\"><table>{}<thead><tr>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
+        name,
         caption,
         heads,
         rows.iter().map(cells).collect::<Html>(),
@@ -170,9 +181,10 @@ pub fn figure(content: &Html, caption: &str) -> Html {
     html!("<figure>{}<figcaption>{}</figcaption></figure>\n", content, caption)
 }
 
-/// A picture that stands in the page itself.
-pub fn picture(mime: &str, bytes: &[u8], alt: &str) -> Html {
-    html!("<img src=\"data:{};base64,{}\" alt=\"{}\">", mime, base64(bytes), alt)
+/// A picture that stands in the page itself; `class` is of the style sheet, empty for none.
+pub fn picture(mime: &str, bytes: &[u8], alt: &str, class: &str) -> Html {
+    let class = if class.is_empty() { Html::default() } else { html!(" class=\"{}\"", class) };
+    html!("<img{} src=\"data:{};base64,{}\" alt=\"{}\">", class, mime, base64(bytes), alt)
 }
 
 /// Base64 (RFC 4648, section 4), padded.

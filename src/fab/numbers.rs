@@ -1,10 +1,11 @@
 //! Numbers as people read them.
 //!
 //! ```
-//! use domecast_fab::numbers::{duration, percent, significant, typeset};
+//! use domecast_fab::numbers::{dimension, duration, percent, significant, typeset};
 //!
 //! assert_eq!(significant(0.012346), "0.0123");
-//! assert_eq!(typeset(-0.012346), "−0.01235");
+//! assert_eq!(typeset(-0.012346), "−0.0123");
+//! assert_eq!(dimension(12.754), "12.75");
 //! assert_eq!(percent(0.5), "50 %");
 //! assert_eq!(duration(0.00123), "1.23 ms");
 //! ```
@@ -29,16 +30,26 @@ pub fn significant(value: f64) -> String {
     rounded(value, 3, -4..6)
 }
 
-/// Four significant digits as a page shows them: a true minus, a dash for what is not finite, 0 for what rounding leaves
-/// (below 1e-9).
+/// A result as a page shows it, to three significant digits: a true minus, a dash for what is not finite, 0 for what
+/// rounding leaves (below 1e-9).
 pub fn typeset(value: f64) -> String {
+    on_page(value, 3)
+}
+
+/// A size that a part has or that someone measures out, as a page shows it: four significant digits, so that a hundredth of
+/// a millimetre is seen.
+pub fn dimension(value: f64) -> String {
+    on_page(value, 4)
+}
+
+fn on_page(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return "–".into();
     }
     if value.abs() < 1e-9 {
         return "0".into();
     }
-    rounded(value, 4, -4..6).replace('-', "−")
+    rounded(value, digits, -4..6).replace('-', "−")
 }
 
 /// A share as percent, as a page shows it.
@@ -68,8 +79,8 @@ mod tests {
         let cases = [
             (0.0, "0"),
             (17.0, "17"),
-            (1.234567, "1.235"),
-            (-0.012346, "−0.01235"),
+            (1.234567, "1.23"),
+            (-0.012346, "−0.0123"),
             (1234.5678, "1235"),
             (100.0, "100"),
             (f64::NAN, "–"),

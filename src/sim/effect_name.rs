@@ -38,7 +38,7 @@ macro_rules! effect_names {
         /// Number of effects.
         const EFFECT_COUNT: usize = [$(stringify!($name),)*].len();
 
-        /// Effects that shall be used, or not, whatever the plan says.
+        /// Effects that must be used, or not, whatever the plan says.
         #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields, default)]
         pub struct EffectChoices { $($(#[$doc])* pub $name: EffectChoice,)* }
@@ -67,6 +67,8 @@ effect_names! {
     GapChange = gap_change,
     /// Objects deform the dome.
     Contact = contact,
+    /// The elastomer yields slowly, and recovers slowly.
+    SlowGel = slow_gel,
     /// The dots, with the ink's soft edge.
     Dots = dots,
     /// The ink fades out at a dot's edge.

@@ -29,7 +29,7 @@ mod work;
 pub use bound::Bound;
 pub use contact::between::Around;
 pub use contact::elastomer::elastomer_of;
-pub use contact::record::ContactTruth;
+pub use contact::record::{ContactErrorTruth, ContactTruth, ObjectTruth};
 pub use contact::stepper::{Stepper, Touch};
 pub use effect_name::{EffectChoice, EffectChoices, EffectName};
 pub use effects::effect::{Cost, Effect};

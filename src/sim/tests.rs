@@ -267,7 +267,19 @@ fn truth_tells_how_the_contact_was_solved() {
         let (truth, faults) = contact_told(level, r#""kind": "sphere", "radius_mm": 4"#, &[16.0, 13.6, 13.2]);
         let status: Vec<_> = truth.iter().map(|line| line["contact"]["status"].as_str().unwrap()).collect();
         assert_eq!(status, ["free", "converged", "converged"], "{level}");
-        assert!(faults.is_empty(), "{level}: {faults:?}");
+        // Every level says how far it may be off, and that it is more than the tolerance.
+        let [fault] = &faults[..] else { panic!("{level}: {faults:?}") };
+        assert_eq!((fault.status, fault.frames, fault.first), ("beyond_tolerance", 2, 1), "{level}");
+        let errors: Vec<f64> = truth[1..]
+            .iter()
+            .map(|line| line["contact"]["estimated_error"]["px"].as_f64().unwrap())
+            .collect();
+        assert!(errors[0] > 0.1 && errors[1] > errors[0], "{level}: {errors:?}");
+        assert!(
+            fault.note.contains(&format!("frame 2 its level may be off by {:.2} px", errors[1])),
+            "{fault:?}"
+        );
+        assert!(truth[0]["contact"]["estimated_error"].is_null());
         assert!(truth[0]["contact"]["residual_mm"].is_null(), "{level}: no object was near");
         for line in &truth[1..] {
             assert!(line["contact"]["residual_mm"].as_f64().unwrap() < 1e-6, "{level}: {}", line["contact"]);
@@ -281,8 +293,8 @@ fn truth_tells_how_the_contact_was_solved() {
     let status: Vec<_> = truth.iter().map(|line| line["contact"]["status"].as_str().unwrap()).collect();
     assert_eq!(status, ["free", "free", "not_applicable", "free", "not_applicable"]);
     let reported: Vec<_> = faults.iter().map(|fault| (fault.status, fault.frames, fault.first)).collect();
-    assert_eq!(reported, [("not_applicable", 2, 2)]);
-    assert_eq!(truth[2]["contact"]["note"].as_str(), Some(faults[0].note.as_str()));
+    assert_eq!(reported, [("beyond_tolerance", 2, 2), ("not_applicable", 2, 2)]);
+    assert_eq!(truth[2]["contact"]["note"].as_str(), Some(faults[1].note.as_str()));
     // Without an object there is no contact to tell of.
     let still = scene("still.json");
     let renderer = Renderer::new(&still, &Plan::of(&still).unwrap()).unwrap();
@@ -301,12 +313,12 @@ fn a_contact_at_its_bound_is_told_with_what_is_left() {
     let mut pressed = contact.press(&ball, still.suspension().expect("springs"), &at, None).expect("pressed");
     pressed.state.status = Status::BoundReached;
     (pressed.state.residual_mm, pressed.state.penetration_mm) = (3.2e-3, 1.5e-2);
-    let reported = ContactTruth::of(&pressed);
+    let reported = ContactTruth::of(&pressed, 20.0);
     assert_eq!((reported.status, reported.residual_mm), ("not_converged", Some(3.2e-3)));
     let note = reported.note.expect("a note");
     assert!(note.contains("3.2e-3 mm") && note.contains("1.5e-2 mm"), "{note}");
     pressed.state.residual_mm = f64::INFINITY;
-    let reported = ContactTruth::of(&pressed);
+    let reported = ContactTruth::of(&pressed, 20.0);
     assert!(reported.residual_mm.is_none() && reported.note.is_some_and(|note| note.contains("no step")));
 }
 

@@ -205,7 +205,7 @@ fn the_wrench_is_unbiased_and_knows_its_spread_over_the_envelope() {
             drawn.code(2.0, 100 + seed);
             let tracked = tracker.track(seed, &frame(&drawn.bytes));
             let wrench = tracked.wrench.unwrap().to_array();
-            let sd = tracked.wrench_sd.unwrap().to_array();
+            let sd = tracked.wrench_sd_random.unwrap().to_array();
             for axis in 0..6 {
                 let miss = wrench[axis] - truth[axis];
                 mean[axis] += miss / SEEDS as f64;

@@ -118,7 +118,7 @@ fn frames_of_every_kind_come_in() {
     assert_eq!((&summary["frames"], &summary["status"]["ok"]), (&Value::from(5), &Value::from(2)));
     let text = std::fs::read_to_string(at("w.csv")).unwrap();
     let cells: Vec<usize> = text.lines().map(|l| l.split(',').count()).collect();
-    assert_eq!(cells, vec![21; 6]);
+    assert_eq!(cells, vec![27; 6]);
     run(
         folder.path(),
         &["seq", "--constants", "constants.json", "--format", "dots-csv", "--out", "d.csv"],

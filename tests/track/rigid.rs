@@ -185,7 +185,10 @@ fn lines_keep_their_names_with_nulls() {
     assert_eq!(told["black_dots"].as_array().unwrap().len(), constants.black_dots.len());
     let mut line = Vec::new();
     write_csv(&mut line, tracked, DVec3::ZERO).unwrap();
-    assert_eq!(String::from_utf8(line).unwrap(), format!("0,no_marks{},0\n", ",".repeat(18)));
+    assert_eq!(
+        String::from_utf8(line).unwrap(),
+        format!("0,no_marks{},0{}\n", ",".repeat(18), ",".repeat(6))
+    );
     // A fresh start forgets nothing that is fixed.
     tracker.restart();
     assert_eq!(tracker.track(0, &frame).status(), "no_marks");

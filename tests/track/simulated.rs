@@ -50,7 +50,7 @@ impl Told {
                 self.markers_px = self.markers_px.max(found.distance(DVec2::from_array(at)));
             }
         }
-        if let (Some(wrench), Some(sd)) = (tracked.wrench, tracked.wrench_sd) {
+        if let (Some(wrench), Some(sd)) = (tracked.wrench, tracked.wrench_sd_random) {
             let (wrench, sd) = (wrench.to_array(), sd.to_array());
             self.wrenches += 1.0;
             for axis in 0..6 {

@@ -142,7 +142,7 @@ pub fn of_force(design: &Design, constants: &Constants, sweeps: &[Sweep]) -> Opt
     let noise_px = marker_noise_px(design).ok()?;
     let at_mm = suspension.at_mm();
     let stiffness = matrix_of(&constants.springs.as_ref()?.stiffness);
-    // the gate is wide: what is off by a tolerance shall be read, not refused
+    // the gate is wide: what is off by a tolerance must be read, not refused
     let solver = PoseSolver::new(optics, &markers, PoseOptions::new(1.0, 10.0)).ok()?;
     let read = |optics: &SensorOptics, markers: &[Marker]| -> Option<Vector6<f64>> {
         let rest = solver.solve(&sightings(optics, markers, &Rigid::identity())?).ok()?.pose;

@@ -18,7 +18,7 @@ const QUICK_FINEST: usize = 256;
 /// Elements along the meridian of the linear samples.
 const ELEMENTS: [u32; 3] = [8, 16, 32];
 const QUICK_ELEMENTS: [u32; 2] = [8, 16];
-/// The ball and how deep it goes, in parts of the dome's radius: a fingertip on a pea.
+/// The ball, in parts of the dome's radius, and how deep it goes, in parts of the dome's height: a fingertip on a pea.
 const BALL: f64 = 0.5;
 const DEPTH: f64 = 0.05;
 
@@ -34,11 +34,12 @@ pub fn sweep(
     quick: bool,
 ) -> Result<Sweep, ContactError> {
     let elastomer = domecast_sim::elastomer_of(design);
-    let radius_mm = elastomer.dome_radius_mm;
+    let (dome, radius_mm) = (elastomer.dome(), elastomer.dome_radius_mm);
+    let depth_mm = DEPTH * elastomer.depth_scale_mm();
     let ball = Indenter { solid: ContactSolid::sphere(BALL * radius_mm)?, young_mpa: None, poisson: 0.3 };
-    let at = Rigid::from_translation(DVec3::Z * radius_mm * (1.0 + BALL - DEPTH));
+    let at = Rigid::from_translation(DVec3::Z * (dome.height_mm() + BALL * radius_mm - depth_mm));
     let places: Vec<DVec3> = layout.dots.iter().map(|dot| dot.surface_mm).collect();
-    let arc_mm = std::f64::consts::FRAC_PI_2 * radius_mm;
+    let arc_mm = dome.meridian_end_rad() * radius_mm;
     let linear = |elements: u32| Level::Linear { element_mm: arc_mm / f64::from(elements) };
     let moved = |state: &ContactState| -> Vec<DVec3> {
         places.iter().map(|place| state.displacement_mm(*place)).collect()
@@ -46,7 +47,7 @@ pub fn sweep(
     let (counts, finest): (&[u32], usize) =
         if quick { (&QUICK_ELEMENTS, QUICK_FINEST) } else { (&ELEMENTS, FINEST) };
     // Straight onto the pole everything is the same at every azimuth: there elements may be as fine as one likes.
-    let fine = |elements: usize| OnPole::new(&elastomer, BALL * radius_mm, DEPTH * radius_mm, elements);
+    let fine = |elements: usize| OnPole::new(&elastomer, BALL * radius_mm, depth_mm, elements);
     let (solved, coarser) = (fine(finest)?, fine(finest / 2)?);
     let truth: Vec<DVec3> = places.iter().map(|place| solved.displacement_mm(*place)).collect();
     let true_force_n = solved.force_n.abs();
@@ -55,8 +56,12 @@ pub fn sweep(
         places.iter().zip(&truth).map(|(place, fine)| coarser.displacement_mm(*place).distance(*fine));
     let (_, floor, _) = sizes(halved.map(|off| off / 3.0));
 
-    let mut levels = vec![(Level::Geometric, "pushed out of the object".to_owned(), 1.0)];
-    levels.push((Level::ClosedForm, "Hertz, with the bonded base".to_owned(), 2.0));
+    let mut levels = Vec::new();
+    // They know hemispheres only.
+    if dome.is_hemisphere() {
+        levels.push((Level::Geometric, "pushed out of the object".to_owned(), 1.0));
+        levels.push((Level::ClosedForm, "Hertz, with the bonded base".to_owned(), 2.0));
+    }
     for &count in counts {
         let size_mm = significant(arc_mm / f64::from(count));
         levels.push((linear(count), format!("linear elements of {size_mm} mm"), f64::from(count)));

@@ -4,8 +4,9 @@ use super::budget::{self, ErrorBudget};
 use super::clock::TimeLimit;
 use super::result::{Accuracy, AccuracyError, Machine, SettingRecord};
 use super::sweep::Sweep;
+use super::tracking;
 use super::{contact, frames, lens, light, meshes, monte_carlo, outline, placement, pose, supersampling};
-use super::{touch_scene, tracking};
+use crate::touch_scene;
 use domecast_design::layout::report::LayoutReport;
 use domecast_design::layout::{Layout, LayoutError, LayoutSpec};
 use domecast_design::parts::{Measures, Part, PartError, build};
@@ -159,7 +160,7 @@ impl Measurement<'_> {
         let scene = match scene {
             Some(scene) => Ok(scene),
             None => {
-                own = touch_scene::of(self.design);
+                own = touch_scene::scene(self.design);
                 own.as_ref().map_err(ToString::to_string)
             }
         };

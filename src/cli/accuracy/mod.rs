@@ -24,9 +24,9 @@ mod result;
 mod supersampling;
 mod sweep;
 mod sweep_chart;
+mod tenth;
 #[cfg(test)]
 mod tests;
-mod touch_scene;
 mod tracking;
 
 pub use files::accuracy_files;

@@ -1,45 +1,55 @@
 //! The page of a measurement: one file that opens from a disk.
 
-use super::budget::ErrorBudget;
+use super::budget::{ErrorBudget, ErrorShare};
 use super::result::Accuracy;
 use super::sweep::{Law, Sweep, SweepSample};
 use super::sweep_chart::sweep_chart;
-use domecast_fab::html::{Html, figure, html, table};
+use super::tenth;
+use domecast_fab::html::{Html, STYLE, bars, figure, html, table};
 use domecast_fab::numbers::{duration, significant};
 
-/// The page: the conclusions first, then the budgets, then a picture and a table for each sweep.
+/// The page: what a tenth of the error costs, the conclusions, the budgets, then a picture for each sweep; tables are folded.
 pub fn page(accuracy: &Accuracy) -> Html {
+    let link = |sweep: &Sweep| html!("<li><a href=\"#{}\">{}</a></li>\n", sweep.name, sweep.title);
     html!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
          content=\"width=device-width, initial-scale=1\">\n<title>What accuracy costs: {0}</title>\n<link \
-         rel=\"icon\" href=\"data:,\">\n<style>\n{1}</style>\n</head>\n<body>\n<main>\n<h1>What accuracy costs: \
-         {0}</h1>\n<p>{2}, {3} threads, {4}; domecast {5}{6}. Medians after a warm-up; bars from the lower to the \
-         upper quartile.</p>\n{7}{8}{9}{10}</main>\n</body>\n</html>\n",
+         rel=\"icon\" href=\"data:,\">\n<style>\n{1}</style>\n</head>\n<body>\n<header>\n<h1>What accuracy costs: \
+         {0}</h1>\n<p class=\"soft\">{2}, {3} threads, {4}; domecast {5}{6}. Times are medians after a warm-up; bars in the \
+         pictures reach from the lower to the upper quartile.</p>\n<nav aria-label=\"Settings\"><ul>\n{7}</ul></nav>\n\
+         </header>\n<main>\n{8}{9}{10}{11}</main>\n</body>\n</html>\n",
         accuracy.design,
-        Html::trusted(include_str!("page.css")),
+        Html::trusted(STYLE),
         accuracy.machine.processor,
         accuracy.machine.threads,
         accuracy.machine.system,
         accuracy.version,
         if accuracy.quick { "; a quick look with few runs" } else { "" },
+        accuracy.sweeps.iter().map(link).collect::<Html>(),
+        tenth::chapter(&accuracy.sweeps),
         summary(accuracy),
-        settings(accuracy),
         accuracy.budgets.iter().map(budget).collect::<Html>(),
         accuracy.sweeps.iter().map(chapter).collect::<Html>(),
     )
 }
 
+/// A table behind its name.
+fn folded(name: &str, table: &Html) -> Html {
+    html!("<details><summary>{}</summary>\n{}</details>\n", name, table)
+}
+
 fn summary(accuracy: &Accuracy) -> Html {
     let heads = [
-        "Sweep",
+        "What is computed",
         "In use",
         "Error",
         "Time",
         "Asked",
         "Fastest that is enough",
-        "Order, measured and by theory",
+        "Order of convergence, measured and by theory",
     ];
     let rows: Vec<Vec<Html>> = accuracy.sweeps.iter().map(row).collect();
+    let said = accuracy.sweeps.iter().filter(|sweep| !sweep.conclusion.is_empty());
     let conclusion = |sweep: &Sweep| html!("<li><b>{}.</b> {}</li>\n", sweep.title, sweep.conclusion);
     let frames = accuracy.frames_to_average.map(|frames| {
         html!(
@@ -51,11 +61,12 @@ fn summary(accuracy: &Accuracy) -> Html {
     });
     let left_out = accuracy.left_out.iter().map(|left| html!("<li>Not measured: {}</li>\n", left));
     html!(
-        "<h2>In short</h2>\n{}<ul>\n{}{}{}</ul>\n",
-        table("", &heads, &rows),
-        accuracy.sweeps.iter().map(conclusion).collect::<Html>(),
+        "<h2>In short</h2>\n<ul>\n{}{}{}</ul>\n{}{}",
+        said.map(conclusion).collect::<Html>(),
         frames.unwrap_or_default(),
         left_out.collect::<Html>(),
+        folded("All settings in a table", &table("", &heads, &rows)),
+        settings(accuracy),
     )
 }
 
@@ -92,7 +103,9 @@ fn row(sweep: &Sweep) -> Vec<Html> {
 
 fn chapter(sweep: &Sweep) -> Html {
     let picture = sweep_chart(sweep)
-        .map(|chart| figure(&Html::trusted(chart.to_svg()), "Error and time of each sample"))
+        .map(|chart| {
+            figure(&chart.to_html(), "Error and time of each sample: lower and further left is better.")
+        })
         .unwrap_or_default();
     let row = |(index, sample): (usize, &SweepSample)| {
         let per_item = |seconds: f64| duration(seconds * sample.per_item_s / sample.time.median_s);
@@ -116,10 +129,11 @@ fn chapter(sweep: &Sweep) -> Html {
     };
     let rows: Vec<Vec<Html>> = sweep.samples.iter().enumerate().map(row).collect();
     let error = format!("Largest error, {}", sweep.unit);
+    let rms = format!("Root mean square, {}", sweep.unit);
     let time = format!("Time per {}", sweep.item);
     html!(
-        "<section id=\"{}\">\n<h2>{}</h2>\n{}<p>Error: {}. Reference: {}. Errors below {} {} are the reference's own \
-         rounding.</p>\n{}</section>\n",
+        "<section id=\"{}\">\n<h2>{}</h2>\n{}<p>Error: {}. Compared with: {}. Errors below {} {} are rounding of what it is \
+         compared with.</p>\n{}</section>\n",
         sweep.name,
         sweep.title,
         picture,
@@ -127,30 +141,36 @@ fn chapter(sweep: &Sweep) -> Html {
         sweep.reference,
         significant(sweep.noise_floor()),
         sweep.unit,
-        table("", &["Sample", &error, "Root mean square", &time, "Quartiles", ""], &rows),
+        folded(
+            "All samples",
+            &table("", &["Sample", &error, &rms, &time, "Quartiles of the time", ""], &rows)
+        ),
     )
 }
 
 fn budget(budget: &ErrorBudget) -> Html {
-    let rows: Vec<Vec<Html>> = budget
-        .shares
-        .iter()
-        .map(|share| {
-            let part = 100.0 * (share.amount / budget.total.max(f64::MIN_POSITIVE)).powi(2);
-            vec![
-                format!("{}{}", share.step, if share.computed { " (computed)" } else { "" }).into(),
-                significant(share.amount).into(),
-                format!("{part:.1} %").into(),
-                html!("<code>{}</code>", share.source),
-            ]
-        })
-        .collect();
+    let part = |amount: f64| 100.0 * (amount / budget.total.max(f64::MIN_POSITIVE)).powi(2);
+    let bar = |share: &ErrorShare| {
+        let label = format!("{} {}", significant(share.amount), budget.unit);
+        (share.step.clone(), share.amount, label)
+    };
+    let row = |share: &ErrorShare| {
+        vec![
+            format!("{}{}", share.step, if share.computed { " (computed)" } else { "" }).into(),
+            format!("{} {}", significant(share.amount), budget.unit).into(),
+            format!("{:.1} %", part(share.amount)).into(),
+            html!("<code>{}</code>", share.source),
+        ]
+    };
+    let rows: Vec<Vec<Html>> = budget.shares.iter().map(row).collect();
     html!(
-        "<h2>{0}</h2>\n<p>In all {1} {2}. Of this, {3} {2} come from computing, which more time makes smaller.</p>\n{4}",
+        "<h2>{0}</h2>\n<p>In all {1} {2}. Of this, {3} {2} come from computing, which more time makes smaller; the rest is \
+         how the sensor is made.</p>\n{4}{5}",
         budget.title,
         significant(budget.total),
         budget.unit,
         significant(budget.computed),
-        table("", &["Step", budget.unit, "Share of the square", "From"], &rows),
+        bars(&budget.shares.iter().map(bar).collect::<Vec<_>>()),
+        folded("Where each comes from", &table("", &["Step", "Size", "Share of the square", "From"], &rows)),
     )
 }

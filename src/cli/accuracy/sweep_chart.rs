@@ -9,7 +9,7 @@ use domecast_fab::numbers::significant;
 const SIZE: DVec2 = DVec2::new(640.0, 430.0);
 /// Corners of the plot: left, top, right, bottom.
 const PLOT: [f64; 4] = [86.0, 62.0, 610.0, 366.0];
-const FAINT: ChartColor = ChartColor::new([222, 222, 222]);
+const FAINT: ChartColor = ChartColor { rgb: [222, 222, 222], class: "grid" };
 const DOMINATED: ChartColor = ChartColor::new([150, 150, 150]);
 const FRONT: ChartColor = ChartColor::new([0, 114, 178]);
 const IN_USE: ChartColor = ChartColor::new([213, 94, 0]);

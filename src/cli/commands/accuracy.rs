@@ -10,7 +10,7 @@ use crate::accuracy;
 use crate::accuracy::{Accuracy, AccuracyError};
 use domecast_design::DesignError;
 use domecast_fab::build::{DESIGN_NAME, DesignRecord, MANIFEST_NAME, Manifest, Tree, sha256_hex};
-use domecast_fab::numbers::significant;
+use domecast_fab::numbers::{duration, significant};
 use domecast_files::StagedFolder;
 use domecast_sim::{Scene, SimError};
 
@@ -57,7 +57,7 @@ pub fn run(
     tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
     let record =
         DesignRecord { name: design.name().to_owned(), sha256: sha256_hex(design.text().as_bytes()) };
-    let manifest = Manifest::new(record, Vec::new(), Vec::new(), tree.files());
+    let manifest = Manifest::new(record, Vec::new(), Vec::new(), Vec::new(), tree.files());
     let text =
         serde_json::to_string_pretty(&manifest).map_err(|error| Failure::Internal(error.to_string()))?;
     tree.add(MANIFEST_NAME, text.into_bytes());
@@ -83,13 +83,14 @@ pub fn run(
 fn summarize(output: &Output, measured: &Accuracy) -> Result<(), Failure> {
     for sweep in &measured.sweeps {
         let sample = |index: Option<usize>| index.and_then(|index| sweep.samples.get(index));
-        let used = sample(sweep.in_use).map_or_else(String::new, |sample| {
+        let missing = || "what is in use is not among the samples of a quick look".to_owned();
+        let used = sample(sweep.in_use).map_or_else(missing, |sample| {
             format!(
-                "{}: error {} {}, {:.3e} s per {}",
+                "{}: error {} {}, {} per {}",
                 sample.label,
                 significant(sample.max_error),
                 sweep.unit,
-                sample.per_item_s,
+                duration(sample.per_item_s),
                 sweep.item
             )
         });

@@ -122,6 +122,9 @@ fn summarize(output: &Output, result: &Build, out: &Path, took: Duration) -> Res
         bytes as f64 / 1e6,
         took.as_secs_f64(),
     ))?;
+    for left_out in &result.manifest.formats_left_out {
+        output.say(&format!("  not written: {left_out}"))?;
+    }
     for headline in &result.headlines {
         output.say(&format!("  {headline}"))?;
     }

@@ -15,7 +15,7 @@ use domecast_runtime::calibrate::Table;
 use domecast_runtime::calibrate::force::{
     ForceError, ForceFit, MotionNoise, Pair, examine_fit, examine_pairs, fit,
 };
-use domecast_runtime::constants::{Constants, POSE_AXES, StiffnessAt, WRENCH_AXES, matrix_of, rows};
+use domecast_runtime::constants::{Constants, POSE_AXES, WRENCH_AXES, matrix_of};
 use domecast_springs::Displacement;
 
 /// Ranges (mm, rad) above which an axis counts as moved: some times what one frame resolves.
@@ -46,13 +46,27 @@ pub fn motion_sd(text: &str) -> Result<[f64; 6], String> {
     }
 }
 
+/// A temperature in degrees C.
+pub fn celsius(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|v: &f64| (-100.0..=200.0).contains(v));
+    number.ok_or_else(|| "a number of degrees C from -100 to 200".into())
+}
+
+/// What is known of the measurement besides its table.
+pub struct Known {
+    /// Deviations of the motions' noise.
+    pub motion_sd: Option<[f64; 6]>,
+    /// Temperature of the springs.
+    pub temperature_c: Option<f64>,
+}
+
 /// Fits the springs to measured pairs and writes constants with `"source": "measured"`.
 pub fn run(
     output: &Output,
     measured: &Path,
     constants_path: &Path,
     out: Option<&Path>,
-    motion_sd: Option<[f64; 6]>,
+    known: &Known,
 ) -> Result<(), Failure> {
     let mut constants = read_constants(constants_path)?;
     if constants.springs.is_none() {
@@ -69,13 +83,16 @@ pub fn run(
         .map_err(|error| input_fault(measured, error.to_string(), "a table of displacements and wrenches"))?;
     output.step("reading the pairs");
     let Measured { mut pairs, lines, rejected, is_by_pixels } = pairs_of(&table, &constants, measured)?;
-    if let Some(sd) = motion_sd {
+    if let Some(sd) = known.motion_sd {
         let covariance = Matrix6::from_diagonal(&Vector6::from(sd.map(|v| v * v)));
         pairs.iter_mut().for_each(|pair| pair.displacement_covariance = covariance);
     }
-    let noise =
-        if motion_sd.is_some() || is_by_pixels { MotionNoise::Stated } else { MotionNoise::FromScatter };
-    let Some(springs) = constants.springs.as_mut() else {
+    let noise = if known.motion_sd.is_some() || is_by_pixels {
+        MotionNoise::Stated
+    } else {
+        MotionNoise::FromScatter
+    };
+    let Some(springs) = constants.springs.as_ref() else {
         return Err(input_fault(constants_path, "has no springs", "constants with springs"));
     };
     output.step("fitting the stiffness");
@@ -89,21 +106,12 @@ pub fn run(
     examine_pairs(&pairs, springs, &MOVED, &lines).map_err(fault)?;
     let found = fit(&pairs, &matrix_of(&springs.stiffness), &MOVED, noise).map_err(fault)?;
     examine_fit(&found, &pairs, springs).map_err(fault)?;
-    springs.stiffness = found.stiffness;
-    springs.source = "measured".into();
-    springs.offset = found.offset;
-    springs.stiffness_at = match &found.by_compression {
-        Some(growth) => {
-            let at = |compression_mm: f64| StiffnessAt {
-                compression_mm,
-                stiffness: rows(&(matrix_of(&found.stiffness) + matrix_of(growth) * compression_mm)),
-            };
-            let deepest = pairs.iter().map(|pair| -pair.displacement[2]).fold(0.0, f64::max);
-            [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| at(part * deepest)).to_vec()
-        }
-        None => Vec::new(),
-    };
-    constants.refit_plain_runtime();
+    found.write_into(&mut constants, &pairs, is_by_pixels);
+    if let Some((own, at_c)) =
+        constants.springs.as_mut().and_then(|s| s.temperature.as_mut()).zip(known.temperature_c)
+    {
+        own.at_c = at_c;
+    }
     constants.calibrations.push(json!({ "kind": "force", "pairs": pairs.len(), "fit": found }));
     file.write(constants.to_json().as_bytes())?;
     output.kept(file.commit()?);
@@ -183,7 +191,7 @@ fn pairs_of(table: &Table, constants: &Constants, path: &Path) -> Result<Measure
         }
         (None, None) => {
             let allowed = "columns tx,ty,tz,rx,ry,rz (mm, rad) or u0,v0,u1,v1,.. (px) for every white marker";
-            return Err(input_fault(path, "no displacements and no pixels", allowed));
+            return Err(input_fault(path, missing_columns(table), allowed));
         }
     };
     let at_mm = constants.springs.as_ref().map_or(DVec3::ZERO, |s| DVec3::from_array(s.at_mm));
@@ -232,10 +240,23 @@ fn pairs_of(table: &Table, constants: &Constants, path: &Path) -> Result<Measure
     Ok(Measured { pairs, lines, rejected, is_by_pixels: pixel_columns.is_some() && pose_columns.is_none() })
 }
 
+/// Which columns of the displacement a table lacks, in words.
+fn missing_columns(table: &Table) -> String {
+    let gaps: Vec<&str> = POSE_AXES.into_iter().filter(|name| table.column(name).is_none()).collect();
+    match gaps.as_slice() {
+        [one] => format!("the column {one} is missing"),
+        all if all.len() == POSE_AXES.len() => "no displacements and no pixels".to_owned(),
+        some => format!("the columns {} are missing", some.join(", ")),
+    }
+}
+
 /// Whether enough of a table's rows have a pose.
 fn has_enough(pairs: &[Pair], rejected: &[String], table: &Table, path: &Path) -> Result<(), Failure> {
+    if table.rows.is_empty() {
+        return Err(input_fault(path, "the table has a header and no rows", "a row for each measured load"));
+    }
     if pairs.is_empty() {
-        let first = rejected.first().cloned().unwrap_or_else(|| "the table has no rows".into());
+        let first = rejected.first().cloned().unwrap_or_else(|| "no row has numbers".into());
         return Err(input_fault(path, format!("no usable pair; {first}"), "at least one row"));
     }
     if rejected.len() as f64 > MAX_REJECTED * table.rows.len() as f64 {

@@ -65,8 +65,7 @@ pub fn run(
         }
         found
     } else {
-        let text = read_text(seen)?;
-        (observations_of(&text).map_err(|e| input_fault(seen, e.to_string(), COLUMNS))?, 0)
+        (table_in(seen)?, 0)
     };
     output.step("fitting the optics");
     let mut found = fit(&constants, &observations, &priors, rest_frames)
@@ -158,6 +157,21 @@ fn table_of(observations: &[Observation]) -> String {
         text += &format!("{frame},{kind},{id},{:.5},{:.5}\n", centroid_px.x, centroid_px.y);
     }
     text
+}
+
+/// The centroids of a table, which has at least one.
+fn table_in(path: &Path) -> Result<Vec<Observation>, Failure> {
+    if !path.exists() {
+        let allowed = "a folder of PNG frames, one frame, or a CSV of frame,kind,id,u,v";
+        return Err(input_fault(path, "there is no such file or folder", allowed));
+    }
+    let found = observations_of(&read_text(path)?).map_err(|e| input_fault(path, e.to_string(), COLUMNS))?;
+    match found.is_empty() {
+        true => {
+            Err(input_fault(path, "the table has a header and no rows", "a row for each mark of each frame"))
+        }
+        false => Ok(found),
+    }
 }
 
 fn observations_of(text: &str) -> Result<Vec<Observation>, TableError> {

@@ -11,6 +11,7 @@ mod explain;
 mod input;
 mod list;
 mod new;
+mod new_scene;
 mod output;
 mod points;
 mod schema;
@@ -77,12 +78,16 @@ enum Command {
     New {
         /// Name of the design.
         name: String,
-        /// The design to start from [default: the paper's sensor, thumb24].
+        /// The design to start from: a file, or the name of a shipped one [default: the paper's sensor, thumb24].
         #[arg(long, conflicts_with = "radius")]
         from: Option<PathBuf>,
+        /// Write a starting scene for this design instead: a ball pressed onto its dome, under its own lights.
+        #[arg(long, value_name = "DESIGN", conflicts_with_all = ["from", "radius"])]
+        scene: Option<PathBuf>,
         #[command(flatten)]
         own: new::OwnSensor,
-        /// Where to write [default: designs/<name>.json, or <name>.json where there is no such folder].
+        /// Where to write [default: designs/<name>.json, or <name>.json where there is no such folder; a scene: beside its
+        /// design].
         #[arg(long)]
         out: Option<PathBuf>,
     },
@@ -151,6 +156,9 @@ enum Command {
         /// constants' noise; else from what the readings scatter beyond a hundredth of their range].
         #[arg(long, value_parser = calibrate_force::motion_sd)]
         motion_sd: Option<[f64; 6]>,
+        /// Temperature of the springs while they were measured, degrees C [default: that of the constants].
+        #[arg(long, value_name = "C", allow_negative_numbers = true, value_parser = calibrate_force::celsius)]
+        temperature: Option<f64>,
     },
     /// Fit pupil, sheet, indices, markers and dots to what the built sensor sees.
     CalibrateOptics {
@@ -208,6 +216,21 @@ enum Command {
     },
 }
 
+/// Options whose old names are taken for one version more, each with the name that it has now.
+const RENAMED: [(&str, &str); 2] =
+    [("--most-residual-px", "--max-residual-px"), ("--most-misplaced", "--max-misplaced")];
+
+/// Says so where an option is given by its old name.
+fn note_old_names(output: &Output) {
+    for given in std::env::args_os().skip(1) {
+        let given = given.to_string_lossy();
+        let name = given.split('=').next().unwrap_or_default();
+        if let Some((old, new)) = RENAMED.iter().find(|(old, _)| *old == name) {
+            output.warn(&format!("{old} is now called {new}; the next version will not take the old name"));
+        }
+    }
+}
+
 /// Runs the program on the process's arguments.
 ///
 /// Exit codes: 0 done, 1 the input is at fault, 2 usage, 3 our fault.
@@ -223,6 +246,7 @@ pub fn run() -> ExitCode {
         }
     };
     let output = Output::new(arguments.json, arguments.quiet, arguments.force);
+    note_old_names(&output);
     domecast_files::tidy_on_signals();
     for note in domecast_files::recover(std::env::args_os().skip(1)) {
         output.note(&note);
@@ -250,7 +274,12 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::Accuracy { design, scene, out, quick } => {
             accuracy::run(output, design, scene.as_deref(), out.as_deref(), *quick)
         }
-        Command::New { name, from, own, out } => new::run(output, name, from.as_deref(), own, out.as_deref()),
+        Command::New { name, scene: Some(design), out, .. } => {
+            new_scene::run(output, name, design, out.as_deref())
+        }
+        Command::New { name, from, own, out, .. } => {
+            new::run(output, name, from.as_deref(), own, out.as_deref())
+        }
         Command::Explain { field, design } => explain::run(output, field, design.as_deref()),
         Command::List { kind, key } => list::run(output, *kind, key.as_deref()),
         Command::Compare { a, b } => compare::run(output, a, b),
@@ -259,8 +288,9 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::Check { dir } => check::run(output, dir),
         Command::Trace { design, pixels, pose } => points::trace(output, design, pixels, pose.as_deref()),
         Command::Project { design, points, pose } => points::project(output, design, points, pose.as_deref()),
-        Command::CalibrateForce { measured, constants, out, motion_sd } => {
-            calibrate_force::run(output, measured, constants, out.as_deref(), *motion_sd)
+        Command::CalibrateForce { measured, constants, out, motion_sd, temperature } => {
+            let known = calibrate_force::Known { motion_sd: *motion_sd, temperature_c: *temperature };
+            calibrate_force::run(output, measured, constants, out.as_deref(), &known)
         }
         Command::CalibrateOptics { seen, constants, out, rest_frames, centroids } => {
             let files = calibrate_optics::Files { out: out.as_deref(), centroids: centroids.as_deref() };

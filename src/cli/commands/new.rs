@@ -10,10 +10,19 @@ use super::output::{Failure, Output};
 use domecast_design::calibration::{CalibrationHints, CameraCalibration};
 use domecast_design::catalogue::{self, CatalogueKind};
 use domecast_design::{Design, DesignError};
+use domecast_fab::light::shadow_edges;
 use domecast_files::{OutputRules, StagedFile};
 
-/// The paper's sensor: every field is there, each with its reason.
-const START: &str = include_str!("../../../designs/thumb24.json");
+/// The shipped designs by name. The first is the paper's sensor: every field is there, each with its reason.
+const SHIPPED: [(&str, &str); 7] = [
+    ("thumb24", include_str!("../../../designs/thumb24.json")),
+    ("thumb24-fisheye", include_str!("../../../designs/thumb24-fisheye.json")),
+    ("thumb24-pinhole", include_str!("../../../designs/thumb24-pinhole.json")),
+    ("thumb24-wide", include_str!("../../../designs/thumb24-wide.json")),
+    ("endoscope-r5", include_str!("../../../designs/endoscope-r5.json")),
+    ("picam-r20", include_str!("../../../designs/picam-r20.json")),
+    ("digit-rigid", include_str!("../../../designs/digit-rigid.json")),
+];
 /// The schema's name beside the design; editors find it through `$schema`.
 const SCHEMA_NAME: &str = "domecast.schema.json";
 
@@ -23,6 +32,12 @@ pub struct OwnSensor {
     /// Radius of the dome, mm; the rest follows by rules.
     #[arg(long)]
     radius: Option<f64>,
+    /// Angle at which the dome ends, degrees: a spherical cap below 90 [default: a hemisphere].
+    #[arg(long, requires = "radius", conflicts_with = "cylinder_height")]
+    rim_angle: Option<f64>,
+    /// Height of a cylinder that a hemisphere stands on, mm [default: none].
+    #[arg(long, requires = "radius")]
+    cylinder_height: Option<f64>,
     /// The camera: a calibration file (OpenCV, ROS, Kalibr), or a key of `domecast list cameras` [default: that of --body].
     #[arg(long, requires = "radius")]
     camera: Option<PathBuf>,
@@ -71,7 +86,7 @@ impl OwnSensor {
         if self.mount.as_deref() == Some("rigid") {
             design["mount"] = json!({ "kind": "rigid", "why": "asked for with --mount" });
         }
-        design["dome"] = json!({ "radius_mm": radius_mm, "why": "asked for with --radius" });
+        design["dome"] = self.dome(radius_mm);
         let mut pattern = Map::new();
         let asked =
             [("kind", self.pattern.as_ref().map(|kind| json!(kind))), ("count", self.dots.map(|n| json!(n)))];
@@ -85,6 +100,36 @@ impl OwnSensor {
         Ok(design)
     }
 
+    /// The dome's section.
+    fn dome(&self, radius_mm: f64) -> Value {
+        let mut dome = json!({ "radius_mm": radius_mm });
+        let mut asked = "asked for with --radius".to_owned();
+        for (field, flag, value) in [
+            ("rim_angle_deg", "--rim-angle", self.rim_angle),
+            ("cylinder_height_mm", "--cylinder-height", self.cylinder_height),
+        ] {
+            if let Some(value) = value {
+                dome[field] = json!(value);
+                asked += " and ";
+                asked += flag;
+            }
+        }
+        dome["why"] = json!(asked);
+        dome
+    }
+
+    /// The calibration file, where one is named.
+    fn calibration_file(&self) -> Option<&Path> {
+        self.camera.as_deref().filter(|path| path.is_file() || path.extension().is_some())
+    }
+
+    /// What is unusual about the calibration.
+    fn warnings(&self) -> Vec<String> {
+        let found =
+            self.calibration_file().map(|path| CameraCalibration::load(path, &CalibrationHints::default()));
+        found.and_then(Result::ok).map_or_else(Vec::new, |found| found.warnings().to_vec())
+    }
+
     /// The key that stands for a camera of the catalogue; `None` for a calibration file.
     fn camera_key(&self) -> Option<String> {
         let path = self.camera.as_ref()?;
@@ -95,7 +140,7 @@ impl OwnSensor {
     fn camera(&self) -> Result<Value, DesignError> {
         let mut section = Map::new();
         let key = match &self.camera {
-            Some(path) if path.is_file() || path.extension().is_some() => {
+            Some(path) if self.calibration_file().is_some() => {
                 let found = CameraCalibration::load(path, &CalibrationHints::default())?;
                 section.extend(found.fields());
                 section.insert("why".into(), json!(format!("a calibration: {}", path.display())));
@@ -135,10 +180,7 @@ pub fn run(
     if let Some(radius_mm) = own.radius {
         return run_own(output, name, own, radius_mm, out);
     }
-    let text = match from {
-        None => START.to_owned(),
-        Some(path) => domecast_design::read_text(path)?,
-    };
+    let (text, from) = start(from)?;
     // a start that does not hold would be blamed on the new design
     let start = domecast_design::Design::from_str(&text).map_err(|error| match from {
         Some(path) => error.in_file(path),
@@ -148,13 +190,28 @@ pub fn run(
     domecast_design::Design::from_str(&fresh)?;
     let path = place(name, out);
     let inputs: Vec<&Path> = from.into_iter().collect();
-    let schema = write_both(output, &path, fresh.as_bytes(), &output.rules(&inputs))?;
+    let schema = write_both(output, &path, fresh.as_bytes(), design_schema(), &output.rules(&inputs))?;
     output.say(&format!("{}: a start, equal to {} but in its name", path.display(), start.name()))?;
     output.say(&format!("{}: lets an editor complete and check it", schema.display()))?;
     output.say("change it, then:")?;
     output.say(&format!("  domecast build {} --watch", path.display()))?;
     output.say("  domecast explain FIELD")?;
     output.result(&json!({ "design": path.display().to_string(), "schema": schema.display().to_string() }))
+}
+
+/// The text to start from, and the file that it is of: a file comes before a shipped design of that name, a folder of that
+/// name, such as a build, does not.
+fn start(from: Option<&Path>) -> Result<(String, Option<&Path>), Failure> {
+    let Some(path) = from else { return Ok((SHIPPED[0].1.to_owned(), None)) };
+    let shipped = SHIPPED.iter().find(|(name, _)| path.as_os_str() == *name);
+    if let Some((_, text)) = shipped.filter(|_| !path.is_file()) {
+        return Ok(((*text).to_owned(), None));
+    }
+    let text = domecast_design::read_text(path).map_err(|error| {
+        let names = SHIPPED.map(|(name, _)| name).join(", ");
+        if path.exists() { error } else { error.with_help(format!("shipped designs: {names}")) }
+    })?;
+    Ok((text, Some(path)))
 }
 
 /// Writes a design of one's own, after it was resolved and its dots laid out.
@@ -165,13 +222,17 @@ fn run_own(
     radius_mm: f64,
     out: Option<&Path>,
 ) -> Result<(), Failure> {
-    let text = format!("{:#}\n", own.design(name, radius_mm)?);
+    let asked = own.design(name, radius_mm)?;
+    let text = format!("{asked:#}\n");
     let design = Design::from_text_with_cures(&text, Path::new(""))?;
+    let (text, design) = off_shadows(&design, asked).unwrap_or((text, design));
     let laid_out = design.layout().map_err(DesignError::from)?.dots.len();
     let path = place(name, out);
     let inputs: Vec<&Path> = own.camera.as_deref().into_iter().collect();
-    let schema = write_both(output, &path, text.as_bytes(), &output.rules(&inputs))?;
+    let schema = write_both(output, &path, text.as_bytes(), design_schema(), &output.rules(&inputs))?;
     let derived = design.derived().len();
+    let warnings = own.warnings();
+    warnings.iter().for_each(|warning| output.warn(warning));
     output.say(&format!("{}: {laid_out} dots, {derived} fields left to rules", path.display()))?;
     if let Some(asked) = own.dots.filter(|asked| *asked as usize != laid_out) {
         output
@@ -185,7 +246,27 @@ fn run_own(
         "schema": schema.display().to_string(),
         "dots": laid_out,
         "derived": derived,
+        "warnings": warnings,
     }))
+}
+
+/// A pattern that ends nearer to the pole than this is none, degrees.
+const MIN_POLAR_DEG: f64 = 20.0;
+
+/// The design with its pattern inside of what its lights light evenly; `None` where it is already, or cannot be.
+fn off_shadows(design: &Design, mut asked: Value) -> Option<(String, Design)> {
+    let edges = shadow_edges(design).ok()??;
+    let polar_deg = edges.from_polar_deg.filter(|deg| edges.dots > 0 && *deg >= MIN_POLAR_DEG)?.floor();
+    let why = "dots lie inside of where the lights' shadows on the dome begin, by its lit frame at rest";
+    asked["pattern"]["polar_angle_deg"] = json!(polar_deg);
+    match &mut asked["pattern"]["why"] {
+        Value::String(whole) => *whole = format!("{whole}; {why}"),
+        other => *other = json!(why),
+    }
+    let text = format!("{asked:#}\n");
+    let changed = Design::from_text_with_cures(&text, Path::new("")).ok()?;
+    changed.layout().ok()?;
+    Some((text, changed))
 }
 
 /// Where a new design goes.
@@ -194,11 +275,17 @@ fn place(name: &str, out: Option<&Path>) -> PathBuf {
     out.map_or_else(|| Path::new(folder).join(format!("{name}.json")), Path::to_path_buf)
 }
 
-/// Writes the design, which must not be there yet, and the schema beside it.
-fn write_both(
+/// Name and content of the schema beside a design.
+fn design_schema() -> (&'static str, Value) {
+    (SCHEMA_NAME, domecast_design::design_schema().clone())
+}
+
+/// Writes a design or a scene, which must not be there yet, and the schema beside it.
+pub(super) fn write_both(
     output: &Output,
     path: &Path,
     bytes: &[u8],
+    (schema_name, schema): (&str, Value),
     rules: &OutputRules<'_>,
 ) -> Result<PathBuf, Failure> {
     if !rules.force && path.symlink_metadata().is_ok() {
@@ -208,17 +295,17 @@ fn write_both(
             .in_file(path)
             .into());
     }
-    let mut design = StagedFile::new(path, "new", rules)?;
-    design.write(bytes)?;
-    let schema = path.with_file_name(SCHEMA_NAME);
-    let text = format!("{:#}\n", domecast_design::design_schema());
-    if std::fs::read(&schema).ok().is_none_or(|earlier| earlier != text.as_bytes()) {
-        let mut file = StagedFile::new(&schema, "new", rules)?;
+    let mut written = StagedFile::new(path, "new", rules)?;
+    written.write(bytes)?;
+    let schema_path = path.with_file_name(schema_name);
+    let text = format!("{schema:#}\n");
+    if std::fs::read(&schema_path).ok().is_none_or(|earlier| earlier != text.as_bytes()) {
+        let mut file = StagedFile::new(&schema_path, "new", rules)?;
         file.write(text.as_bytes())?;
         output.kept(file.commit()?);
     }
-    output.kept(design.commit()?);
-    Ok(schema)
+    output.kept(written.commit()?);
+    Ok(schema_path)
 }
 
 /// The text with its name replaced and the schema named on top; layout and reasons stay as they are.

@@ -25,7 +25,7 @@ pub struct SimulateOptions {
     /// Use every effect that the scene calls for, whatever its tolerance.
     #[arg(long)]
     everything: bool,
-    /// Number of frames, instead of the scene's.
+    /// Number of frames, instead of the scene's: spread over the same time.
     #[arg(long)]
     frames: Option<u32>,
     /// Threads that draw [default: one for each core].
@@ -94,6 +94,11 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
         "frames": summary.frames,
         "notes": summary.notes,
         "contact": summary.contact,
+        "worst_contact": summary.worst_contact.map(|worst| json!({
+            "frame": worst.frame,
+            "px": worst.error.px,
+            "force_n": worst.error.force_n,
+        })),
         "coding": summary.coding.as_ref().map(CodingDeviation::figures),
         "work": summary.work.total(),
         "plan": plan,

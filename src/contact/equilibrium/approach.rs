@@ -6,19 +6,21 @@ use super::pressed::Pressed;
 use crate::elastomer::Indenter;
 use crate::error::{ContactError, positive};
 use crate::object::{Placed, deepest, deepest_from};
+use crate::state::ContactState;
+use domecast_optics::DomeShape;
 use domecast_optics::numeric::Rigid;
 
 /// An object counts as met when it is this near, as a part of the radius: closer than a search along its edges comes.
 const MET: f64 = 1e-4;
 /// How far the object goes along a way until it touches the dome at a platform's pose.
 pub(super) fn touch_mm(
-    dome_radius_mm: f64,
+    dome: DomeShape,
     indenter: &Indenter,
     platform: &Rigid,
     rest_from_object: &Rigid,
     way: DVec3,
 ) -> Result<f64, ContactError> {
-    let radius = dome_radius_mm;
+    let radius = dome.radius_mm();
     let (mut gone, mut near_mm) = (0.0, None);
     // The distance is a safe step forwards; from inside, its depth is one backwards.
     for _ in 0..64 {
@@ -27,8 +29,8 @@ pub(super) fn touch_mm(
         let placed = Placed::new(indenter.solid.clone(), platform.inverse().compose(&object));
         let (at_mm, distance_mm, _) = match near_mm {
             // From one step to the next the nearest place hardly moves; what it is taken for is checked at last.
-            Some(near_mm) => deepest_from(&placed, radius, near_mm),
-            None => deepest(&placed, radius),
+            Some(near_mm) => deepest_from(&placed, dome, near_mm),
+            None => deepest(&placed, dome),
         };
         gone += distance_mm;
         if distance_mm.abs() < MET * radius {
@@ -62,6 +64,17 @@ pub(super) fn checked_press(
 
 /// How far the object had gone along a way when it last touched, mm.
 pub(super) fn gone_before_mm(before: Option<&Pressed>, rest_from_object: &Rigid, way: DVec3) -> Option<f64> {
-    let pressed = before.filter(|pressed| !pressed.state.nodes.is_empty())?;
-    Some((pressed.rest_from_object.translation_mm - rest_from_object.translation_mm).dot(way))
+    let pressed = before?;
+    gone_on_mm(&pressed.state, &pressed.rest_from_object, rest_from_object, way)
+}
+
+/// The same of a contact and where its object was.
+pub(super) fn gone_on_mm(
+    state: &ContactState,
+    was_rest_from_object: &Rigid,
+    rest_from_object: &Rigid,
+    way: DVec3,
+) -> Option<f64> {
+    let touched = !state.nodes.is_empty();
+    touched.then(|| (was_rest_from_object.translation_mm - rest_from_object.translation_mm).dot(way))
 }

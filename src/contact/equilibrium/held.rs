@@ -113,7 +113,8 @@ impl Contact {
     ) -> Result<Pressed, ContactError> {
         let (way, force_n) = checked_press(rest_from_object, approach, force_n)?;
         let radius_mm = self.elastomer().dome_radius_mm;
-        let touch_mm = touch_mm(radius_mm, indenter, &Rigid::identity(), rest_from_object, way)?;
+        let touch_mm =
+            touch_mm(self.elastomer().dome(), indenter, &Rigid::identity(), rest_from_object, way)?;
         let mut bracket = Bracket {
             low: End { gone_mm: touch_mm, miss: -1.0 },
             high: None,
@@ -207,7 +208,13 @@ mod tests {
     use crate::{ContactSolid, Elastomer, Level};
 
     fn dome(level: Level) -> Contact {
-        let elastomer = Elastomer { dome_radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, friction: 0.6 };
+        let elastomer = Elastomer {
+            dome_radius_mm: 10.0,
+            center_z_mm: 0.0,
+            young_mpa: 0.56,
+            poisson: 0.49,
+            friction: 0.6,
+        };
         Contact::new(elastomer, level).unwrap()
     }
 

@@ -6,8 +6,11 @@
 
 mod approach;
 mod held;
+mod meeting;
 mod pressed;
+mod roots;
 mod search;
+mod together;
 
 use glam::DVec3;
 use nalgebra::DVector;
@@ -20,6 +23,7 @@ use domecast_optics::numeric::Rigid;
 use domecast_springs::{Displacement, Suspension};
 pub use pressed::{PressStatus, Pressed};
 use search::Task;
+pub use together::{PressedObject, PressedTogether, Push};
 
 /// The platform's displacement of the frame before, as a start.
 fn start(suspension: &Suspension, before: Option<&Pressed>, unknowns: usize) -> DVector<f64> {
@@ -89,7 +93,7 @@ impl Contact {
         x[6] = match gone_before_mm(before, rest_from_object, way) {
             Some(gone_mm) => gone_mm,
             None => {
-                touch_mm(self.elastomer().dome_radius_mm, indenter, &platform, rest_from_object, way)?
+                touch_mm(self.elastomer().dome(), indenter, &platform, rest_from_object, way)?
                     + self.first_depth_mm(indenter, force_n)
             }
         };
@@ -121,6 +125,6 @@ impl Contact {
         let modulus = elastomer.plane_strain_mpa() / (1.0 + indenter.yield_ratio(elastomer));
         let curvature = 1.0 / elastomer.dome_radius_mm + 1.0 / indenter.solid.bounding_sphere().1;
         let depth = (0.75 * force_n / modulus * curvature.sqrt()).powf(2.0 / 3.0);
-        depth.min(0.2 * elastomer.dome_radius_mm)
+        depth.min(0.2 * elastomer.depth_scale_mm())
     }
 }

@@ -14,6 +14,7 @@ use crate::elastomer::Indenter;
 use crate::error::ContactError;
 use crate::linear::Solver;
 use crate::state::ContactState;
+use domecast_optics::DomeShape;
 use domecast_optics::numeric::{Rigid, cross_matrix};
 use domecast_springs::{Displacement, MechanicsError, Suspension, Wrench};
 
@@ -142,8 +143,8 @@ impl Task<'_> {
         let mut jacobian = DMatrix::zeros(n, n);
         let mut stiffness = DMat3::ZERO;
         let mut arm = DVec3::ZERO;
-        if let Some((at, normal)) = middle(&trial.state) {
-            let elastomer = self.contact.elastomer();
+        let elastomer = self.contact.elastomer();
+        if let Some((at, normal)) = middle(&trial.state, elastomer.dome()) {
             let sharing = 1.0 + self.indenter.yield_ratio(elastomer);
             let a = trial.state.contact_radius_mm;
             let axial = 2.0 * a * elastomer.plane_strain_mpa() / sharing;
@@ -214,7 +215,7 @@ impl Task<'_> {
                     if let Some((way, _)) = self.force {
                         let rest = Rigid::identity();
                         let touch_mm = touch_mm(
-                            self.contact.elastomer().dome_radius_mm,
+                            self.contact.elastomer().dome(),
                             self.indenter,
                             &rest,
                             &self.rest_from_object,
@@ -348,8 +349,8 @@ impl Task<'_> {
 }
 
 /// Middle of the pressure and the dome's normal there, sensor frame.
-fn middle(state: &ContactState) -> Option<(DVec3, DVec3)> {
+fn middle(state: &ContactState, dome: DomeShape) -> Option<(DVec3, DVec3)> {
     let weight: f64 = state.nodes.iter().map(|n| n.pressure_mpa * n.area_mm2).sum();
     let at = state.nodes.iter().map(|n| n.at_mm * (n.pressure_mpa * n.area_mm2)).sum::<DVec3>() / weight;
-    (weight > 0.0 && at.is_finite()).then(|| (at, at.normalize_or(DVec3::Z)))
+    (weight > 0.0 && at.is_finite()).then(|| (at, dome.outward_mm(at).normalize_or(DVec3::Z)))
 }

@@ -90,24 +90,23 @@ impl Places {
     }
 
     /// The rows with their places.
-    pub fn rows(&self, grid: &Grid) -> impl Iterator<Item = Row> + '_ {
-        let (radius_mm, elements) = (grid.radius_mm, grid.elements);
+    pub fn rows<'g>(&'g self, grid: &'g Grid) -> impl Iterator<Item = Row> + 'g {
+        let band_mm = grid.spacing_mm() / FINER as f64;
         self.counts.iter().zip(&self.first).enumerate().map(move |(row, (&count, &first))| {
-            let polar = polar_of(row, elements);
-            let step_mm = if count > 0 { polar.sin() * radius_mm * TAU / count as f64 } else { 0.0 };
-            let band_mm = radius_mm * std::f64::consts::FRAC_PI_2 / (FINER * elements) as f64;
+            let around_mm = grid.dome.ring_radius_mm(meridian_rad(grid, row)) * TAU;
+            let step_mm = if count > 0 { around_mm / count as f64 } else { 0.0 };
             Row { first, count, step_mm, area_mm2: step_mm * band_mm }
         })
     }
 
-    /// Row, polar angle and azimuth of a number beyond the nodes'.
+    /// Row, length of the meridian over the radius and azimuth of a number beyond the nodes'.
     fn angles(&self, grid: &Grid, number: usize) -> (usize, f64, f64) {
         let row = self.first.partition_point(|first| *first <= number).saturating_sub(1);
         let count = self.counts.get(row).copied().unwrap_or(1).max(1) as f64;
         let along = (number - self.first.get(row).copied().unwrap_or(number)) as f64;
         // On a ring the nodes lie at the whole steps.
         let along = if row % FINER == 0 { along + 0.5 } else { along };
-        (row, polar_of(row, grid.elements), TAU * along / count)
+        (row, meridian_rad(grid, row), TAU * along / count)
     }
 
     /// Where a node or a place lies on the dome, mm.
@@ -115,9 +114,13 @@ impl Places {
         if number < grid.len() {
             return grid.place(grid.node(number));
         }
-        let (_, polar, azimuth) = self.angles(grid, number);
-        let ((sine, cosine), (s, c)) = (polar.sin_cos(), azimuth.sin_cos());
-        DVec3::new(sine * c, sine * s, cosine) * grid.radius_mm
+        let (_, meridian_rad, azimuth) = self.angles(grid, number);
+        let at_rest = grid.dome.point_mm(meridian_rad, azimuth);
+        if grid.offsets_mm.is_empty() {
+            return at_rest;
+        }
+        let parts = self.parts(grid, number);
+        at_rest + parts.as_slice().iter().map(|(node, share)| grid.offset(*node) * *share).sum::<DVec3>()
     }
 
     /// The nodes that tell what a place moves by, with their shares: bilinear, towards zero at the bonded rim. A force
@@ -141,6 +144,6 @@ impl Places {
     }
 }
 
-fn polar_of(row: usize, elements: usize) -> f64 {
-    std::f64::consts::FRAC_PI_2 * row as f64 / (FINER * elements) as f64
+fn meridian_rad(grid: &Grid, row: usize) -> f64 {
+    grid.dome.meridian_end_rad() * row as f64 / (FINER * grid.elements) as f64
 }

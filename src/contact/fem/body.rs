@@ -41,7 +41,7 @@ pub(super) struct Harmonic {
 impl Body {
     /// Assembles the dome.
     pub fn new(elastomer: &Elastomer, elements: usize) -> Result<Self, ContactError> {
-        let mesh = Meridian::new(elastomer.dome_radius_mm, elements);
+        let mesh = Meridian::new(elastomer.dome(), elements);
         let nodes = mesh.nodes_mm.len();
         let mut kinds = vec![Kind::Free; 3 * nodes];
         for &node in &mesh.axis {

@@ -1,6 +1,7 @@
 //! What a force on one contact node does to every other, and to the whole surface.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use faer::Mat;
 use glam::{DMat3, DVec3};
@@ -16,16 +17,16 @@ use crate::error::ContactError;
 const AXES: usize = 3;
 
 /// Compliance of the bonded dome between contact nodes, and its spectrum for the field.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Compliance {
     pub grid: Grid,
     /// Places between its nodes.
     pub places: Places,
     /// For ring pairs i >= j and azimuth steps 0..=azimuths/2: displacement at ring i for a force at ring j, the
     /// azimuth of i less that of j, row by row, mm/N.
-    table: Vec<[f64; 9]>,
+    table: Arc<Vec<[f64; 9]>>,
     /// For each harmonic, displacements of the surface nodes for forces on the rings.
-    spectrum: Vec<Spectrum>,
+    spectrum: Arc<Vec<Spectrum>>,
 }
 
 /// One harmonic's response.
@@ -40,7 +41,7 @@ pub(crate) struct Spectrum {
 impl Compliance {
     /// Factors the dome's stiffness for every harmonic and solves it for every ring.
     pub fn new(elastomer: &Elastomer, elements: usize) -> Result<Self, ContactError> {
-        let grid = Grid::new(elastomer.dome_radius_mm, elements);
+        let grid = Grid::new(elastomer.dome(), elements);
         let body = Body::new(elastomer, elements)?;
         let last = (0..grid.elements).map(|ring| grid.harmonics(ring)).max().unwrap_or(1);
         let hats: Vec<Vec<(usize, f64)>> = (0..grid.elements).map(|ring| grid.hat(ring)).collect();
@@ -52,9 +53,28 @@ impl Compliance {
             let (i, j) = rings_of(pair);
             fill_pair(&grid, &solved, i, j, entries);
         });
-        let spectrum = solved.into_iter().map(|(spectrum, _)| spectrum).collect();
+        let spectrum = Arc::new(solved.into_iter().map(|(spectrum, _)| spectrum).collect());
         let places = Places::new(&grid);
-        Ok(Self { grid, places, table, spectrum })
+        Ok(Self { grid, places, table: Arc::new(table), spectrum })
+    }
+
+    /// The same dome, its nodes moved by forces on others (number; force in the node's frame, N) where `is_near` is true
+    /// of their place at rest: there an object is looked at. The rest stays, for no node of it can be touched.
+    pub fn displaced(&self, forces: &[(usize, DVec3)], is_near: impl Fn(DVec3) -> bool) -> Self {
+        let mut grid = self.grid.clone();
+        grid.offsets_mm.clear();
+        let by: Vec<(GridNode, DVec3)> = forces.iter().map(|(number, f)| (grid.node(*number), *f)).collect();
+        grid.offsets_mm = (0..grid.len())
+            .map(|number| {
+                let node = grid.node(number);
+                if !is_near(grid.place(node)) {
+                    return DVec3::ZERO;
+                }
+                let moved: DVec3 = by.iter().map(|(by, force)| self.between(node, *by) * *force).sum();
+                grid.frame(node) * moved
+            })
+            .collect();
+        Self { grid, ..self.clone() }
     }
 
     /// Displacement at node `at` for a unit force at node `by`, each in its own frame (r, z, phi), mm/N.

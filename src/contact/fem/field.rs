@@ -1,6 +1,7 @@
 //! The surface's displacement under given forces on the grid, exactly as the elements have it.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
 
 use glam::{DMat3, DVec3};
@@ -26,12 +27,15 @@ struct Lazy {
     raster: OnceLock<Vec<DVec3>>,
 }
 
+/// Forces below this one move nothing that a number of ours could show, N.
+const MIN_FORCE_N: f64 = 1e-14;
+
 /// From this many points on, the raster pays.
 const RASTER_FROM: usize = 400;
 
 impl PartialEq for SurfaceField {
     fn eq(&self, other: &Self) -> bool {
-        self.compliance.grid.radius_mm == other.compliance.grid.radius_mm && self.forces == other.forces
+        self.compliance.grid.dome == other.compliance.grid.dome && self.forces == other.forces
     }
 }
 
@@ -39,6 +43,24 @@ impl SurfaceField {
     /// From forces on grid nodes in order, in their frames (r, z, phi), N.
     pub fn new(compliance: Arc<Compliance>, forces: Vec<(usize, DVec3)>) -> Self {
         Self { compliance, forces, lazy: Arc::default() }
+    }
+
+    /// The forces that it comes of: nodes in order, forces in their frames, N.
+    pub fn forces(&self) -> &[(usize, DVec3)] {
+        &self.forces
+    }
+
+    /// The field of some fields' forces together, each by its weight; `None` for none.
+    pub fn sum(parts: &[(f64, &Self)]) -> Option<Self> {
+        let (_, first) = parts.first()?;
+        let mut forces: BTreeMap<usize, DVec3> = BTreeMap::new();
+        for (weight, part) in parts {
+            for (number, force) in &part.forces {
+                *forces.entry(*number).or_insert(DVec3::ZERO) += *force * *weight;
+            }
+        }
+        let forces = forces.into_iter().filter(|(_, force)| force.length() > MIN_FORCE_N).collect();
+        Some(Self::new(Arc::clone(&first.compliance), forces))
     }
 
     fn surface(&self) -> usize {
@@ -124,7 +146,8 @@ impl SurfaceField {
             amplitudes.iter().map(|nodes| size(&nodes[p])).sum::<f64>()
         };
         let beyond_mm = (0..self.surface()).map(largest_beyond).fold(0.0, f64::max);
-        Extent { direction: DVec3::Z, angle_rad: FRAC_PI_2, beyond_mm }
+        let angle_rad = self.compliance.grid.dome.meridian_end_rad();
+        Extent { direction: DVec3::Z, angle_rad, beyond_mm }
     }
 
     /// Makes the raster where many points will be asked for.
@@ -137,12 +160,9 @@ impl SurfaceField {
     /// Displacement of a point of the dome, sensor frame, mm.
     pub fn at(&self, at_mm: DVec3) -> DVec3 {
         let flat = at_mm.truncate().length();
-        let polar = flat.atan2(at_mm.z).clamp(0.0, FRAC_PI_2);
         let azimuth = if flat > 0.0 { at_mm.y.atan2(at_mm.x) } else { 0.0 };
-        let elements = self.compliance.grid.elements;
-        let s = polar / FRAC_PI_2 * elements as f64;
-        let element = (s as usize).min(elements - 1);
-        let (n, _) = quadratic(2.0 * (s - element as f64) - 1.0);
+        let (element, along) = self.compliance.grid.element_at(at_mm);
+        let (n, _) = quadratic(along);
         if let Some(raster) = self.lazy.raster.get() {
             return self.interpolate(raster, element, n, azimuth);
         }

@@ -1,18 +1,19 @@
 //! Where the dome can be touched: rings of nodes about its axis.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{PI, TAU};
 
+use domecast_optics::DomeShape;
 use glam::{DMat3, DVec3};
 
 use super::element::{GAUSS, quadratic};
 
-/// The contact nodes: ring j lies at the polar angle j h, and carries evenly spaced nodes.
+/// The contact nodes: ring j lies j steps along the meridian, and carries evenly spaced nodes.
 ///
 /// A node's force is spread as a hat over its two neighbours' distance, along the ring and across it, and the gap
 /// is measured with the same hat: so the compliance is symmetric, and finite on any mesh.
 #[derive(Debug, Clone)]
 pub(crate) struct Grid {
-    pub radius_mm: f64,
+    pub dome: DomeShape,
     /// Elements along the meridian; ring `elements` would be the bonded rim, and is left out.
     pub elements: usize,
     /// Azimuths that the tables know: every ring's count divides it.
@@ -22,6 +23,8 @@ pub(crate) struct Grid {
     pub first: Vec<usize>,
     /// Surface that a node of each ring stands for, mm2.
     pub areas_mm2: Vec<f64>,
+    /// How far what else bears on the dome moves each node, sensor frame, mm; empty where nothing does.
+    pub offsets_mm: Vec<DVec3>,
 }
 
 /// A node by ring and azimuth step.
@@ -33,32 +36,35 @@ pub(crate) struct GridNode {
 }
 
 impl Grid {
-    pub fn new(radius_mm: f64, elements: usize) -> Self {
-        let around = 4 * elements;
+    pub fn new(dome: DomeShape, elements: usize) -> Self {
+        let (end_rad, radius_mm) = (dome.meridian_end_rad(), dome.radius_mm());
+        // Nodes as far apart along the widest ring as the rings are.
+        let around = |of_radius: f64| (TAU / end_rad * elements as f64 * of_radius).ceil() as usize;
         let mut azimuths = 12;
-        while azimuths < around {
+        while azimuths < around(dome.rim_radius_mm() / radius_mm) {
             azimuths *= 2;
         }
-        let h = FRAC_PI_2 / elements as f64;
         let mut grid = Self {
-            radius_mm,
+            dome,
             elements,
             azimuths,
             counts: Vec::new(),
             first: Vec::new(),
             areas_mm2: Vec::new(),
+            offsets_mm: Vec::new(),
         };
         let mut next = 0;
         for ring in 0..elements {
-            let wanted = (around as f64 * (h * ring as f64).sin()).ceil() as usize;
+            let wanted = around(dome.ring_radius_mm(grid.meridian_rad(ring)) / radius_mm);
             // The least divisor of the table's count that is fine enough; six at least, to turn alike.
             let count = if ring == 0 {
                 1
             } else {
                 (6..=azimuths).find(|n| azimuths % n == 0 && *n >= wanted).unwrap_or(azimuths)
             };
-            let band: f64 = grid.quadrature(ring).iter().map(|(angle, w, hat)| w * hat * angle.sin()).sum();
-            grid.areas_mm2.push(band * radius_mm * radius_mm * TAU / count as f64);
+            let band: f64 =
+                grid.quadrature(ring).iter().map(|(at, w, hat)| w * hat * dome.ring_radius_mm(*at)).sum();
+            grid.areas_mm2.push(band * radius_mm * TAU / count as f64);
             grid.counts.push(count);
             grid.first.push(next);
             next += count;
@@ -76,8 +82,21 @@ impl Grid {
         GridNode { ring, step: (number - self.first[ring]) * (self.azimuths / self.counts[ring]) }
     }
 
-    pub fn polar(&self, ring: usize) -> f64 {
-        FRAC_PI_2 * ring as f64 / self.elements as f64
+    /// Where a ring lies: length of the meridian from the pole over the sphere's radius.
+    pub fn meridian_rad(&self, ring: usize) -> f64 {
+        self.dome.meridian_end_rad() * ring as f64 / self.elements as f64
+    }
+
+    /// Distance of the rings, mm.
+    pub fn spacing_mm(&self) -> f64 {
+        self.dome.radius_mm() * self.dome.meridian_end_rad() / self.elements as f64
+    }
+
+    /// The element of the meridian under a point of the dome, and the place in it from -1 to 1.
+    pub fn element_at(&self, at_mm: DVec3) -> (usize, f64) {
+        let s = self.dome.meridian_rad(at_mm) / self.dome.meridian_end_rad() * self.elements as f64;
+        let element = (s as usize).min(self.elements - 1);
+        (element, 2.0 * (s - element as f64) - 1.0)
     }
 
     pub fn azimuth(&self, node: GridNode) -> f64 {
@@ -90,29 +109,39 @@ impl Grid {
         DMat3::from_cols(DVec3::new(cosine, sine, 0.0), DVec3::Z, DVec3::new(-sine, cosine, 0.0))
     }
 
+    /// A node by its number's parts.
+    pub fn number(&self, node: GridNode) -> usize {
+        self.first[node.ring] + node.step / (self.azimuths / self.counts[node.ring])
+    }
+
+    /// Where a node lies before the object that is looked at touches it, mm.
     pub fn place(&self, node: GridNode) -> DVec3 {
-        let (sine, cosine) = self.polar(node.ring).sin_cos();
-        let (s, c) = self.azimuth(node).sin_cos();
-        DVec3::new(sine * c, sine * s, cosine) * self.radius_mm
+        self.dome.point_mm(self.meridian_rad(node.ring), self.azimuth(node)) + self.offset(self.number(node))
+    }
+
+    /// How far what else bears on the dome moves a node, mm.
+    pub fn offset(&self, number: usize) -> DVec3 {
+        self.offsets_mm.get(number).copied().unwrap_or(DVec3::ZERO)
     }
 
     /// Standard deviations of a node's hat along the meridian and along the ring, as vectors, mm.
     pub fn spread(&self, node: GridNode) -> [DVec3; 2] {
-        let (sine, cosine) = self.polar(node.ring).sin_cos();
+        let meridian_rad = self.meridian_rad(node.ring);
+        let normal = self.dome.normal(self.dome.point_mm(meridian_rad, self.azimuth(node)));
         let (s, c) = self.azimuth(node).sin_cos();
-        let (south, east) = (DVec3::new(cosine * c, cosine * s, -sine), DVec3::new(-s, c, 0.0));
-        let spacing = self.radius_mm * FRAC_PI_2 / self.elements as f64;
+        let east = DVec3::new(-s, c, 0.0);
+        let (south, spacing) = (east.cross(normal), self.spacing_mm());
         if node.ring == 0 {
             // A cone over a disc: 3/20 of its radius squared.
             return [south * spacing * 0.15_f64.sqrt(), east * spacing * 0.15_f64.sqrt()];
         }
-        let along = self.radius_mm * sine * TAU / self.counts[node.ring] as f64;
+        let along = self.dome.ring_radius_mm(meridian_rad) * TAU / self.counts[node.ring] as f64;
         [south * spacing / 6.0_f64.sqrt(), east * along / 6.0_f64.sqrt()]
     }
 
-    /// Points (polar angle), weights and the hat's value over the ring's elements.
+    /// Points (as [`Grid::meridian_rad`]), weights and the hat's value over the ring's elements.
     fn quadrature(&self, ring: usize) -> Vec<(f64, f64, f64)> {
-        let h = FRAC_PI_2 / self.elements as f64;
+        let h = self.dome.meridian_end_rad() / self.elements as f64;
         let mut points = Vec::with_capacity(6);
         for element in ring.saturating_sub(1)..=ring {
             if (ring == 0 && element > 0) || element >= self.elements {
@@ -128,13 +157,13 @@ impl Grid {
 
     /// The hat as a load on the surface nodes (two per element and one more): number and part of the unit force.
     pub fn hat(&self, ring: usize) -> Vec<(usize, f64)> {
-        let h = FRAC_PI_2 / self.elements as f64;
+        let h = self.dome.meridian_end_rad() / self.elements as f64;
         let mut parts = vec![0.0; 2 * self.elements + 1];
         let mut total = 0.0;
         for (angle, weight, hat) in self.quadrature(ring) {
             let element = ((angle / h) as usize).min(self.elements - 1);
             let (n, _) = quadratic(2.0 * (angle / h - element as f64) - 1.0);
-            let load = weight * hat * angle.sin();
+            let load = weight * hat * self.dome.ring_radius_mm(angle);
             total += load;
             for (k, n) in n.into_iter().enumerate() {
                 parts[2 * element + k] += load * n;

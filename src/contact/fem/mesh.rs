@@ -1,11 +1,11 @@
 //! Quadrilaterals over the meridian half of the dome: fine at the surface, coarser towards the middle.
 //!
-//! The quarter disc (r, z) is laid out in rings of nine-node quadrilaterals. Two rings of nearly square elements
+//! The section (r, z), a quarter disc for a hemisphere, is laid out in rings of nine-node quadrilaterals, each a smaller
+//! copy of the surface about the base's centre. Two rings of nearly square elements
 //! share a count of elements; then the count halves, down to [`CORE`] about a core of two by two. Where it halves,
 //! the nodes of the finer side hang on the coarser edge and follow it exactly.
 
-use std::f64::consts::FRAC_PI_2;
-
+use domecast_optics::DomeShape;
 use glam::DVec2;
 
 /// Elements along the innermost ring.
@@ -61,24 +61,25 @@ impl Builder {
     }
 }
 
-/// Places along an arc from the axis to the base.
-fn arc(radius: f64, elements: usize) -> impl Iterator<Item = DVec2> {
+/// Places along the surface from the axis to the base, drawn in about the base's centre to a part of its size.
+fn arc(dome: DomeShape, part: f64, elements: usize) -> impl Iterator<Item = DVec2> {
+    let end_rad = dome.meridian_end_rad();
     (0..=2 * elements).map(move |p| {
         // The two ends lie on axis and base exactly.
         if p == 0 {
-            DVec2::new(0.0, radius)
+            DVec2::new(0.0, dome.height_mm()) * part
         } else if p == 2 * elements {
-            DVec2::new(radius, 0.0)
+            DVec2::new(dome.rim_radius_mm(), 0.0) * part
         } else {
-            let (sine, cosine) = (FRAC_PI_2 * p as f64 / (2 * elements) as f64).sin_cos();
-            DVec2::new(radius * sine, radius * cosine)
+            let at_mm = dome.point_mm(end_rad * p as f64 / (2 * elements) as f64, 0.0);
+            DVec2::new(at_mm.x, at_mm.z) * part
         }
     })
 }
 
 impl Meridian {
     /// The mesh with this many elements along the surface: [`CORE`] times a power of two.
-    pub fn new(radius_mm: f64, elements: usize) -> Self {
+    pub fn new(dome: DomeShape, elements: usize) -> Self {
         let mesh = Self {
             nodes_mm: Vec::new(),
             elements: Vec::new(),
@@ -88,16 +89,17 @@ impl Meridian {
             base: Vec::new(),
         };
         let mut builder = Builder { mesh };
-        let (mut count, mut radius) = (elements, radius_mm);
-        let mut outer = builder.line(arc(radius, count));
+        let end_rad = dome.meridian_end_rad();
+        let (mut count, mut part) = (elements, 1.0);
+        let mut outer = builder.line(arc(dome, part, count));
         builder.mesh.surface.clone_from(&outer);
         loop {
             for _ in 0..RINGS {
-                let next = radius * (1.0 - FRAC_PI_2 / count as f64).max(0.55);
-                let middle = builder.line(arc(0.5 * (radius + next), count));
-                let inner = builder.line(arc(next, count));
+                let next = part * (1.0 - end_rad / count as f64).max(0.55);
+                let middle = builder.line(arc(dome, 0.5 * (part + next), count));
+                let inner = builder.line(arc(dome, next, count));
                 builder.ring(&inner, &middle, &outer);
-                (radius, outer) = (next, inner);
+                (part, outer) = (next, inner);
             }
             if count == CORE {
                 break;
@@ -105,9 +107,9 @@ impl Meridian {
             count /= 2;
             outer = builder.halve(&outer);
         }
-        builder.core(radius, &outer);
+        builder.core(DVec2::new(dome.rim_radius_mm(), dome.height_mm()) * part, &outer);
         let mut mesh = builder.mesh;
-        let tiny = 1e-12 * radius_mm;
+        let tiny = 1e-12 * dome.radius_mm();
         for (node, at) in mesh.nodes_mm.iter().enumerate() {
             if at.x.abs() <= tiny {
                 mesh.axis.push(node as u32);
@@ -137,9 +139,9 @@ impl Builder {
         coarse
     }
 
-    /// Two by two squares about the centre, and one ring between them and the last arc.
-    fn core(&mut self, radius: f64, outer: &Line) {
-        let side = 0.5 * radius;
+    /// Two by two rectangles about the centre, and one ring between them and the last arc, of this width and height.
+    fn core(&mut self, size_mm: DVec2, outer: &Line) {
+        let side = 0.5 * size_mm;
         // The square's far corner is drawn in, which keeps the ring's elements even.
         let corner = 0.9;
         let square = |i: usize, j: usize| {

@@ -1,7 +1,5 @@
 //! The dome under loads that are the same at every azimuth: one harmonic, and so elements as fine as one likes.
 
-use std::f64::consts::FRAC_PI_2;
-
 use glam::{DMat3, DVec3};
 
 use super::body::Body;
@@ -31,10 +29,10 @@ pub(crate) struct Ring {
 }
 
 impl Revolved {
-    /// Solves the harmonic 0 for the rings up to a polar angle.
-    pub fn new(elastomer: &Elastomer, elements: usize, polar_rad: f64) -> Result<Self, ContactError> {
-        let grid = Grid::new(elastomer.dome_radius_mm, elements);
-        let rings = (0..elements).take_while(|ring| grid.polar(*ring) <= polar_rad).count().max(1);
+    /// Solves the harmonic 0 for the rings up to a length of the meridian over the radius.
+    pub fn new(elastomer: &Elastomer, elements: usize, meridian_rad: f64) -> Result<Self, ContactError> {
+        let grid = Grid::new(elastomer.dome(), elements);
+        let rings = (0..elements).take_while(|ring| grid.meridian_rad(*ring) <= meridian_rad).count().max(1);
         let hats: Vec<_> = (0..rings).map(|ring| grid.hat(ring)).collect();
         let (spectrum, own) = harmonic(&grid, &Body::new(elastomer, elements)?, &hats, 0)?;
         Ok(Self { grid, spectrum, own, rings })
@@ -75,11 +73,8 @@ impl Revolved {
     /// Displacement of the surface under forces on the rings (sensor frame, at the azimuth 0), at any place of it, mm.
     pub fn displacement_mm(&self, forces_n: &[DVec3], at_mm: DVec3) -> DVec3 {
         let flat = at_mm.truncate().length();
-        let polar = flat.atan2(at_mm.z).clamp(0.0, FRAC_PI_2);
-        let elements = self.grid.elements;
-        let s = polar / FRAC_PI_2 * elements as f64;
-        let element = (s as usize).min(elements - 1);
-        let (n, _) = quadratic(2.0 * (s - element as f64) - 1.0);
+        let (element, along) = self.grid.element_at(at_mm);
+        let (n, _) = quadratic(along);
         let (mut outwards, mut up) = (0.0, 0.0);
         for (ring, force) in forces_n.iter().enumerate() {
             for (axis, part) in [(0, force.x), (1, force.z)] {

@@ -11,7 +11,7 @@ use super::*;
 use crate::elastomer::Elastomer;
 
 fn silicone(poisson: f64) -> Elastomer {
-    Elastomer { dome_radius_mm: 10.0, young_mpa: 0.56, poisson, friction: 0.6 }
+    Elastomer { dome_radius_mm: 10.0, center_z_mm: 0.0, young_mpa: 0.56, poisson, friction: 0.6 }
 }
 
 /// A bent element away from the axis.
@@ -100,7 +100,7 @@ fn pressed(elements: usize) -> SurfaceField {
     let forces: Vec<(usize, DVec3)> = (0..grid.len())
         .filter_map(|number| {
             let node = grid.node(number);
-            let polar = grid.polar(node.ring);
+            let polar = grid.meridian_rad(node.ring);
             let wave = (polar / 0.8 * std::f64::consts::FRAC_PI_2).cos();
             let inward = DVec3::new(-polar.sin(), -polar.cos(), 0.0);
             (polar < 0.8).then(|| (number, inward * (0.05 * wave.powi(4) * grid.areas_mm2[node.ring])))

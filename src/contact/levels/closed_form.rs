@@ -23,7 +23,7 @@ pub(crate) fn closed_form(
 ) -> Result<ContactState, ContactError> {
     let approach = Approach::new(elastomer, indenter, sensor_from_object);
     let (radius, sharing, modulus) = (approach.radius_mm, approach.sharing, approach.modulus_mpa);
-    let (at_mm, distance_mm, queries) = deepest(&approach.placed, radius);
+    let (at_mm, distance_mm, queries) = deepest(&approach.placed, elastomer.dome());
     let depth_mm = -distance_mm;
     if depth_mm <= 0.0 {
         return Ok(ContactState { work: 30.0 * queries as f64, ..ContactState::free(sensor_from_object) });

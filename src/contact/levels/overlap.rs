@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
-use crate::object::{FIRST_LOOK, Placed, deepest, first_looks, look_spacing};
+use crate::object::{FIRST_LOOK, Placed, deepest, first_looks, look_spacing_mm};
 use crate::outcome::TouchedNode;
+use domecast_optics::DomeShape;
 
 /// The foundation's constant, 4 sqrt 2 / (3 pi): see the module.
 pub(crate) const FOUNDATION: f64 = 4.0 * std::f64::consts::SQRT_2 / (3.0 * std::f64::consts::PI);
@@ -32,7 +33,7 @@ const SPOKES: usize = 48;
 
 /// Samples the part of the dome that lies inside the object.
 pub(crate) fn overlap(placed: &Placed, radius: f64) -> Overlap {
-    let (deepest_mm, distance_mm, queries) = deepest(placed, radius);
+    let (deepest_mm, distance_mm, queries) = deepest(placed, DomeShape::hemisphere(radius));
     let mut found = Overlap { deepest_mm, distance_mm, queries, all_out: true, ..Default::default() };
     if distance_mm >= 0.0 {
         return found;
@@ -100,14 +101,15 @@ fn touched_edge_rad(
     // The cap that holds every touched look, then the same cap looked at closely.
     let (center, reach) = placed.solid.bounding_sphere();
     let center = placed.sensor_from_object().point(center);
-    let coarse = first_looks()
-        .filter(|d| (*d * radius).distance(center) < reach && placed.distance(*d * radius).0 < 0.0)
-        .chain([deepest_mm / radius])
-        .map(|d| d.dot(axis))
+    let dome = DomeShape::hemisphere(radius);
+    let coarse = first_looks(dome)
+        .filter(|at_mm| at_mm.distance(center) < reach && placed.distance(*at_mm).0 < 0.0)
+        .chain([deepest_mm])
+        .map(|at_mm| at_mm.dot(axis) / radius)
         .fold(1.0, f64::min)
         .clamp(-1.0, 1.0)
         .acos()
-        + 1.5 * look_spacing();
+        + 1.5 * look_spacing_mm(dome) / radius;
     let touched = |angle: f64| {
         let (sine, cosine) = angle.sin_cos();
         spokes.iter().step_by(2).any(|spoke| {
@@ -138,8 +140,9 @@ const STEEPEST: f64 = 4.0;
 fn pressed_middle(placed: &Placed, radius: f64) -> DVec3 {
     /// Depth over which a look loses its weight, as a part of the radius.
     const SOFTNESS: f64 = 0.02;
-    let looks: Vec<(f64, DVec3)> =
-        first_looks().map(|d| (placed.distance(d * radius).0 / (SOFTNESS * radius), d)).collect();
+    let looks: Vec<(f64, DVec3)> = first_looks(DomeShape::hemisphere(radius))
+        .map(|at_mm| (placed.distance(at_mm).0 / (SOFTNESS * radius), at_mm))
+        .collect();
     let smallest = looks.iter().map(|look| look.0).fold(f64::INFINITY, f64::min);
     let mean: DVec3 = looks.iter().map(|(value, d)| *d * (smallest - value).exp()).sum();
     mean.normalize_or(DVec3::Z) * radius

@@ -1,13 +1,15 @@
 //! A node that may touch: the plane that it may not pass, and where friction would carry it.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
+use crate::elastomer::Elastomer;
 use crate::error::ContactError;
 use crate::fem::Parts;
 use crate::level::DEEPEST;
 use crate::object::Placed;
 use crate::outcome::{History, NodeMemory};
 use crate::state::ContactState;
+use domecast_optics::DomeShape;
 use domecast_optics::numeric::Rigid;
 
 /// A node that may touch.
@@ -17,6 +19,8 @@ pub(crate) struct Candidate {
     /// The level's nodes that it moves with and hands its force to.
     pub parts: Parts,
     pub at_mm: DVec3,
+    /// Into the dome there.
+    pub inward: DVec3,
     pub area_mm2: f64,
     /// Standard deviations of its hat along the meridian and along the ring, mm; four places that have its moments.
     pub spread_mm: [DVec3; 2],
@@ -56,13 +60,19 @@ pub(crate) struct Way<'a> {
 }
 
 impl<'a> Way<'a> {
-    pub fn new(placed: &Placed, before: Option<&'a ContactState>, at_mm: DVec3, distance_mm: f64) -> Self {
+    /// Without a frame before, from where it touched the place of the dome that lies deepest in it, by its distance.
+    pub fn new(
+        placed: &Placed,
+        dome: DomeShape,
+        before: Option<&'a ContactState>,
+        (at_mm, distance_mm): (DVec3, f64),
+    ) -> Self {
         let history: Option<&History> = before.map(|state| &state.history);
         let then = match history.and_then(|history| history.sensor_from_object) {
             Some(pose) => pose,
             None => {
                 let mut pose = placed.sensor_from_object();
-                pose.translation_mm += at_mm.normalize_or(DVec3::Z) * -distance_mm;
+                pose.translation_mm += dome.outward_mm(at_mm).normalize_or(DVec3::Z) * -distance_mm;
                 pose
             }
         };
@@ -100,11 +110,12 @@ impl<'a> Way<'a> {
 }
 
 /// Four places of the dome that have the second moments of a node's hat.
-pub(crate) fn hat_places(at_mm: DVec3, spread_mm: [DVec3; 2]) -> [DVec3; 4] {
+pub(crate) fn hat_places(dome: DomeShape, at_mm: DVec3, spread_mm: [DVec3; 2]) -> [DVec3; 4] {
+    // A node that others have moved lies on a sphere of its own.
+    let moved = dome.with_radius_mm(dome.radius_mm() + dome.distance_mm(at_mm));
     [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]].map(|[u, v]| {
-        let beside = at_mm + spread_mm[0] * u + spread_mm[1] * v;
         // Back on the dome.
-        beside * (at_mm.length() / beside.length())
+        moved.onto(at_mm + spread_mm[0] * u + spread_mm[1] * v)
     })
 }
 
@@ -119,6 +130,19 @@ pub(crate) struct Face {
 }
 
 impl Candidate {
+    /// Turns a force on the node back to how the dome lay there at rest: where a face bears on the dome, the dome has turned
+    /// until it lies along it. No further than by a right angle, for no surface folds under.
+    pub fn back(&self) -> DMat3 {
+        let axis = self.normal.cross(self.inward);
+        let angle = axis.length().atan2(self.normal.dot(self.inward)).min(std::f64::consts::FRAC_PI_2);
+        axis.try_normalize().map_or(DMat3::IDENTITY, |axis| DMat3::from_axis_angle(axis, angle))
+    }
+
+    /// Its force on the dome at rest: what the compliance takes.
+    pub fn rest_force_n(&self) -> DVec3 {
+        self.back() * self.force_n
+    }
+
     /// Lays the plane of its face where the object is; the plane goes with the object.
     pub fn follow_face(&mut self, sensor_from_object: &Rigid) {
         let Some(face) = self.face else { return };
@@ -127,17 +151,25 @@ impl Candidate {
     }
 
     /// A node at rest, on its first plane: where a walk along the dome's inward normal leaves the object.
-    pub fn new(spot: Spot, placed: &Placed, way: &Way<'_>, sharing: f64) -> Result<Self, ContactError> {
+    pub fn new(
+        spot: Spot,
+        elastomer: &Elastomer,
+        placed: &Placed,
+        way: &Way<'_>,
+        sharing: f64,
+    ) -> Result<Self, ContactError> {
         let Spot { node, parts, at_mm, area_mm2, spread_mm } = spot;
-        let radius = at_mm.length();
+        let dome = elastomer.dome();
         let memory = way.memory(node as u32);
+        let inward = -dome.outward_mm(at_mm).normalize_or(DVec3::Z);
         let mut candidate = Self {
             node,
             parts,
             at_mm,
+            inward,
             area_mm2,
             spread_mm,
-            hat_mm: hat_places(at_mm, spread_mm),
+            hat_mm: hat_places(dome, at_mm, spread_mm),
             u_mm: DVec3::ZERO,
             // The old force turns with the object.
             force_n: memory.map_or(DVec3::ZERO, |memory| way.moved.vector(memory.force_n)),
@@ -154,10 +186,10 @@ impl Candidate {
             touched: memory.is_some(),
         };
         candidate.carried_mm = way.carried(placed, &candidate);
-        let inward = -at_mm / radius;
+        let (depth_mm, limit_mm) = (elastomer.depth_scale_mm(), DEEPEST * elastomer.depth_scale_mm());
         let (walked, outward) = placed
-            .walk_out(at_mm, inward, radius)
-            .ok_or(ContactError::TooDeep { depth_mm: radius, limit_mm: DEEPEST * radius })?;
+            .walk_out(at_mm, inward, dome.radius_mm())
+            .ok_or(ContactError::TooDeep { depth_mm, limit_mm })?;
         let (distance, nearest) = placed.distance(at_mm);
         (candidate.normal, candidate.rest_gap_mm) = if distance > 0.0 {
             (nearest, distance)

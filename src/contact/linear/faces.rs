@@ -51,7 +51,7 @@ fn near_places(placed: &Placed, compliance: &Compliance, ahead_mm: f64) -> (Vec<
             let (distance_mm, _) = placed.distance(at_mm);
             queries += 1.0;
             if distance_mm < 0.0 {
-                inward -= at_mm * row.area_mm2;
+                inward -= grid.dome.outward_mm(at_mm) * row.area_mm2;
             }
             if distance_mm < ahead_mm {
                 near.push((row.first + k, at_mm));
@@ -68,7 +68,7 @@ fn near_places(placed: &Placed, compliance: &Compliance, ahead_mm: f64) -> (Vec<
 /// The faces of an object over the dome, if it is finer than the nodes there; and the distances asked for.
 pub(crate) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, f64) {
     let (grid, places) = (&compliance.grid, &compliance.places);
-    let spacing_mm = grid.radius_mm * std::f64::consts::FRAC_PI_2 / grid.elements as f64;
+    let spacing_mm = grid.spacing_mm();
     if placed.ball().is_some_and(|(_, radius_mm)| radius_mm > ROUND * spacing_mm) {
         return (None, 0.0);
     }
@@ -77,7 +77,7 @@ pub(crate) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, 
     let Some(inward) = inward.try_normalize() else { return (None, queries) };
     let over = |at_mm: DVec3| -> Option<Over> {
         let start_mm = at_mm - inward * ahead_mm;
-        let (walked_mm, normal) = placed.walk_out(start_mm, inward, grid.radius_mm)?;
+        let (walked_mm, normal) = placed.walk_out(start_mm, inward, grid.dome.radius_mm())?;
         let exit_mm = start_mm + inward * walked_mm;
         (walked_mm > 0.0 && normal.dot(inward) >= FACING).then(|| Over {
             at_mm: exit_mm,
@@ -107,7 +107,7 @@ pub(crate) fn fine(placed: &Placed, compliance: &Compliance) -> (Option<Faces>, 
     for (number, seen) in nodes {
         let Some(seen) = seen else { continue };
         let node = grid.node(number);
-        let hat = hat_places(grid.place(node), grid.spread(node));
+        let hat = hat_places(grid.dome, grid.place(node), grid.spread(node));
         // What its hat tells of a node, a wall that runs over it does not show in.
         let interpolated_mm: f64 =
             hat.iter().map(|at_mm| over(*at_mm).map_or(0.25 * ahead_mm, |over| 0.25 * over.gap_mm)).sum();

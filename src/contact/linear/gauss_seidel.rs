@@ -4,7 +4,9 @@
 //! gap closes, or none; the friction so that the slip ends, or as large as Coulomb's disc lets it be. This is a
 //! projected Gauss-Seidel method (M. Jean, The non-smooth contact dynamics method, Comput. Methods Appl. Mech. Eng.
 //! 177, 1999). A compliance makes it quick: its smooth modes, which sweeps are slow on where a matrix is
-//! a stiffness, are its stiffest here, and the shortest ones are held by the hats that forces are spread over.
+//! a stiffness, are its stiffest here, and the shortest ones are held by the hats that forces are spread over. Forces that
+//! are turned back ([`Node::back`]) make the task unsymmetric where planes turn differently; then no theorem says that sweeps
+//! converge, and their bound holds.
 
 use glam::{DMat3, DVec3};
 
@@ -16,6 +18,8 @@ const RELAXATION: f64 = 0.9;
 pub(crate) struct Node {
     /// The plane's outward normal, and the distance from it.
     pub normal: DVec3,
+    /// Turns a force on the node back to how the dome lay there at rest.
+    pub back: DMat3,
     pub rest_gap_mm: f64,
     /// Displacement at which it sticks.
     pub carried_mm: DVec3,
@@ -120,7 +124,7 @@ fn own(rows: &[f64], width: usize, at: usize, normal: DVec3) -> Own {
 const SWEEPS_OF_FEW: u32 = 12;
 
 /// Sweeps over the nodes until one over all of them moves none by more than `wanted_mm`. `blocks` is the symmetric
-/// compliance, three rows and columns a node, row by row; `forces` starts and ends it, three numbers a node.
+/// compliance, three rows and columns a node, row by row; `forces` starts and ends it, three numbers a node, turned back.
 ///
 /// Most nodes bear no force for long: between two sweeps over all, only those that do are looked at, with the part of
 /// the compliance that couples them.
@@ -189,23 +193,24 @@ pub(crate) fn sweeps(
 }
 
 /// A node takes the force that its gap and slip ask for, the others held; how far that moves it, mm, if the force changes.
-/// `u` is its displacement by all forces.
+/// `u` is its displacement by all forces; `force` is its own, turned back.
 fn turn(mut u: DVec3, (node, own): (&Node, &Own), friction: f64, force: &mut [f64]) -> Option<f64> {
-    let old = DVec3::from_slice(force);
+    let (was, forth) = (DVec3::from_slice(force), node.back.transpose());
+    let old = forth * was;
     let pressed = old.dot(node.normal);
     let gap = node.rest_gap_mm + node.normal.dot(u);
     let press = (pressed - RELAXATION * gap / own.normal).max(0.0);
     let mut rub = DVec3::ZERO;
     if friction > 0.0 && press > 0.0 {
-        u += own.block * node.normal * (press - pressed);
+        u += own.block * (node.back * node.normal) * (press - pressed);
         let slip = u - node.carried_mm;
         let along = |v: DVec3| v - node.normal * v.dot(node.normal);
         rub = along(old - slip * (RELAXATION / own.along)).clamp_length_max(friction * press);
     }
-    let new = node.normal * press + rub;
-    if new == old {
+    let new = node.back * (node.normal * press + rub);
+    if new == was {
         return None;
     }
     force.copy_from_slice(&new.to_array());
-    Some((own.block * (new - old)).length())
+    Some((own.block * (new - was)).length())
 }

@@ -10,8 +10,9 @@ use super::candidate::Candidate;
 use super::gauss_seidel::{Node, SweepOutcome, displacement, sweeps};
 use crate::elastomer::Elastomer;
 use crate::object::Placed;
-use crate::outcome::{NodeMemory, Status, TouchedNode, sum};
+use crate::outcome::{NodeMemory, Status, TouchedNode};
 use crate::state::ContactState;
+use domecast_springs::Wrench;
 
 /// Rounds of planes and sweeps.
 const MAX_ROUNDS: u32 = 160;
@@ -70,8 +71,9 @@ impl<'a> Touch<'a> {
         moved
     }
 
+    /// Forces on the dome at rest, three numbers a candidate.
     fn forces(&self) -> Vec<f64> {
-        self.candidates.iter().flat_map(|c| c.force_n.to_array()).collect()
+        self.candidates.iter().flat_map(|c| c.rest_force_n().to_array()).collect()
     }
 
     /// Distances where the nodes are now, and planes there, turned from the last ones by a part of the way.
@@ -126,12 +128,17 @@ impl<'a> Touch<'a> {
         let nodes: Vec<Node> = self
             .candidates
             .iter()
-            .map(|c| Node { normal: c.normal, rest_gap_mm: c.rest_gap_mm, carried_mm: c.carried_mm })
+            .map(|c| Node {
+                normal: c.normal,
+                back: c.back(),
+                rest_gap_mm: c.rest_gap_mm,
+                carried_mm: c.carried_mm,
+            })
             .collect();
         let ended = sweeps(&self.blocks, &nodes, self.elastomer.friction, &mut forces, wanted_mm, MAX_SWEEPS);
         self.work += ended.work;
-        for (candidate, force) in self.candidates.iter_mut().zip(forces.chunks_exact(3)) {
-            candidate.force_n = DVec3::from_slice(force);
+        for ((candidate, node), force) in self.candidates.iter_mut().zip(&nodes).zip(forces.chunks_exact(3)) {
+            candidate.force_n = node.back.transpose() * DVec3::from_slice(force);
         }
         ended
     }
@@ -139,12 +146,17 @@ impl<'a> Touch<'a> {
     /// Writes what was found into a state, all but the field.
     pub fn finish(&self, state: &mut ContactState, ended: Rounds) {
         let radius = self.elastomer.dome_radius_mm;
+        let mut wrench = Wrench::default();
         for candidate in &self.candidates {
             state.penetration_mm = state.penetration_mm.max(-candidate.gap_mm);
             let pressure_n = candidate.force_n.dot(candidate.normal);
             if pressure_n <= 0.0 {
                 continue;
             }
+            // Where the dome bears it now.
+            let place_mm = candidate.at_mm + candidate.u_mm / self.sharing;
+            wrench.force_n += candidate.force_n;
+            wrench.moment_nmm += place_mm.cross(candidate.force_n);
             let friction_n = (candidate.force_n - candidate.normal * pressure_n).length();
             let max_n = self.elastomer.friction * pressure_n;
             state.nodes.push(TouchedNode {
@@ -160,7 +172,7 @@ impl<'a> Touch<'a> {
                 displacement_mm: candidate.u_mm,
             });
         }
-        state.wrench = sum(&state.nodes);
+        state.wrench = wrench;
         state.contact_radius_mm = self.radius_mm();
         state.peak_pressure_mpa = state.nodes.iter().map(|n| n.pressure_mpa).fold(0.0, f64::max);
         state.iterations = ended.count;
@@ -190,7 +202,8 @@ impl<'a> Touch<'a> {
             return 0.0;
         }
         let middle = loads().map(|(c, pressure)| c.at_mm * (pressure / load)).sum::<DVec3>();
-        let (u, v) = middle.normalize_or(DVec3::Z).any_orthonormal_pair();
+        let normal = self.elastomer.dome().outward_mm(middle).normalize_or(DVec3::Z);
+        let (u, v) = normal.any_orthonormal_pair();
         let (mut uu, mut vv, mut uv) = (0.0, 0.0, 0.0);
         for (candidate, pressure) in loads() {
             // A node without a hat of its own stands for a square.

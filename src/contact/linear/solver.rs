@@ -16,6 +16,7 @@ use crate::level::DEEPEST;
 use crate::object::{Placed, deepest, deepest_from};
 use crate::outcome::Status;
 use crate::state::ContactState;
+use domecast_optics::DomeShape;
 use domecast_optics::numeric::Rigid;
 
 /// Looks for nodes that no plane held back.
@@ -25,9 +26,13 @@ const MAX_LOOKS: u32 = 8;
 const MIN_SEEN: f64 = 0.5;
 
 /// Where no node bears a force, the object must not reach far into the dome between the nodes.
-fn check_seen(placed: &Placed, deepest_mm: DVec3, spacing_mm: f64) -> Result<(), ContactError> {
-    let radius = deepest_mm.length();
-    match placed.walk_out(deepest_mm, -deepest_mm / radius, radius) {
+fn check_seen(
+    placed: &Placed,
+    dome: DomeShape,
+    deepest_mm: DVec3,
+    spacing_mm: f64,
+) -> Result<(), ContactError> {
+    match placed.walk_out(deepest_mm, -dome.normal(deepest_mm), dome.radius_mm()) {
         Some((depth_mm, _)) if depth_mm > MIN_SEEN * spacing_mm => {
             Err(ContactError::Unseen { depth_mm, spacing_mm })
         }
@@ -137,7 +142,7 @@ impl<'a> Solver<'a> {
     /// Where nothing bears a force, the object must not reach far into the dome.
     fn check_seen(&self) -> Result<(), ContactError> {
         let Some((_, deepest_mm, spacing_mm)) = self.looked else { return Ok(()) };
-        check_seen(&self.touch.placed, deepest_mm, spacing_mm)
+        check_seen(&self.touch.placed, self.elastomer.dome(), deepest_mm, spacing_mm)
     }
 
     fn state(&self, mut state: ContactState, ended: Rounds, field: SurfaceField) -> ContactState {
@@ -158,14 +163,14 @@ impl<'a> Solver<'a> {
 
     /// Looks for the deepest point; false if nothing touches.
     fn look_anew(&mut self) -> Result<bool, ContactError> {
-        let radius = self.elastomer.dome_radius_mm;
         let placed = &self.touch.placed;
-        let (deepest_mm, distance_mm, queries) = deepest(placed, radius);
+        let (deepest_mm, distance_mm, queries) = deepest(placed, self.elastomer.dome());
         self.touch.work += 30.0 * queries as f64;
-        if -distance_mm > DEEPEST * radius {
-            return Err(ContactError::TooDeep { depth_mm: -distance_mm, limit_mm: DEEPEST * radius });
+        let limit_mm = DEEPEST * self.elastomer.depth_scale_mm();
+        if -distance_mm > limit_mm {
+            return Err(ContactError::TooDeep { depth_mm: -distance_mm, limit_mm });
         }
-        let spacing = radius * std::f64::consts::FRAC_PI_2 / self.compliance.grid.elements as f64;
+        let spacing = self.compliance.grid.spacing_mm();
         self.looked = Some((placed.sensor_from_object(), deepest_mm, spacing));
         if distance_mm >= 0.0 {
             self.looked = None;
@@ -176,16 +181,16 @@ impl<'a> Solver<'a> {
 
     /// How the object came. Without a frame before, along the normal where it is deepest.
     fn way(&mut self, near: bool) -> Way<'a> {
-        let radius = self.elastomer.dome_radius_mm;
+        let dome = self.elastomer.dome();
         let placed = &self.touch.placed;
-        let mut at_mm = self.looked.map_or(DVec3::Z * radius, |looked| looked.1);
+        let mut at_mm = self.looked.map_or(dome.pole_mm(), |looked| looked.1);
         let mut distance_mm = placed.distance(at_mm).0;
         if near && self.before.is_none() {
             let queries;
-            (at_mm, distance_mm, queries) = deepest_from(placed, radius, at_mm);
+            (at_mm, distance_mm, queries) = deepest_from(placed, dome, at_mm);
             self.touch.work += 30.0 * queries as f64;
         }
-        Way::new(placed, self.before, at_mm, distance_mm)
+        Way::new(placed, dome, self.before, (at_mm, distance_mm))
     }
 
     /// Candidates: nodes that touched before, and those that are likely to. Under an object that lies d deep, the
@@ -230,7 +235,8 @@ impl<'a> Solver<'a> {
         let mut near = Vec::new();
         for ring in 0..grid.elements {
             let count = grid.counts[ring];
-            let step_mm = grid.polar(ring).sin() * grid.radius_mm * std::f64::consts::TAU / count as f64;
+            let around_mm = grid.dome.ring_radius_mm(grid.meridian_rad(ring)) * std::f64::consts::TAU;
+            let step_mm = around_mm / count as f64;
             let mut k = 0;
             while k < count {
                 let number = grid.first[ring] + k;
@@ -264,7 +270,7 @@ impl<'a> Solver<'a> {
                 if number < grid.len() { grid.spread(grid.node(number)) } else { [DVec3::ZERO; 2] };
             let at_mm = self.compliance.places.place(grid, number);
             let spot = Spot { node: number, parts, at_mm, area_mm2, spread_mm };
-            let mut candidate = Candidate::new(spot, &touch.placed, way, touch.sharing)?;
+            let mut candidate = Candidate::new(spot, touch.elastomer, &touch.placed, way, touch.sharing)?;
             candidate.face = self.fine.as_ref().and_then(|fine| fine.get(&number)).copied();
             candidate.follow_face(&touch.placed.sensor_from_object());
             touch.candidates.push(candidate);
@@ -351,7 +357,7 @@ impl<'a> Solver<'a> {
         let mut forces: BTreeMap<usize, DVec3> = BTreeMap::new();
         for candidate in self.touch.candidates.iter().filter(|c| c.force_n != DVec3::ZERO) {
             for &(node, share) in candidate.parts.as_slice() {
-                let local = grid.frame(grid.node(node)).transpose() * (candidate.force_n * share);
+                let local = grid.frame(grid.node(node)).transpose() * (candidate.rest_force_n() * share);
                 *forces.entry(node).or_insert(DVec3::ZERO) += local;
             }
         }

@@ -7,7 +7,7 @@ mod mesh_distance;
 mod placed;
 mod solid;
 
-pub(crate) use deepest::{FIRST_LOOK, deepest, deepest_from, first_looks, look_spacing};
+pub(crate) use deepest::{FIRST_LOOK, deepest, deepest_from, first_looks, look_spacing_mm};
 pub use distance::Distance;
 pub(crate) use feature::{Feature, feature_at};
 pub(crate) use placed::Placed;

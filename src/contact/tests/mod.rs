@@ -1,7 +1,10 @@
 //! Contact against closed forms and itself.
 
+mod domes;
 mod faces;
+mod reference;
 mod tasks;
+mod together;
 
 use glam::DVec3;
 
@@ -12,7 +15,7 @@ use domecast_optics::numeric::Rigid;
 use domecast_springs::{EndType, Spring, SpringSpec, Suspension, SuspensionSpec};
 
 fn silicone() -> Elastomer {
-    Elastomer { dome_radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, friction: 0.6 }
+    Elastomer { dome_radius_mm: 10.0, center_z_mm: 0.0, young_mpa: 0.56, poisson: 0.49, friction: 0.6 }
 }
 
 fn above(z_mm: f64) -> Rigid {

@@ -105,6 +105,23 @@ pub enum Rule {
 }
 
 impl Reason {
+    /// What would keep the dot, in words.
+    pub fn cure(&self) -> &'static str {
+        match self {
+            Self::TooSmall { .. } => "larger dots, or a smaller pattern where only outer ones are too small",
+            Self::TooClose { .. } => "a larger pitch or smaller dots",
+            Self::HiddenByMarker { .. } => "white markers further out, or a smaller pattern",
+            Self::BeyondWrap { .. } => "a smaller pattern, or print.hits \"split\"",
+            Self::NotSmooth { .. } => "a larger print.outline_tolerance_mm, or a smaller pattern",
+            Self::Unseen(_)
+            | Self::OutsideImage
+            | Self::OutsideMask
+            | Self::HiddenByPlatform
+            | Self::KeepOut(_)
+            | Self::BeyondTransfer(_) => "a smaller pattern",
+        }
+    }
+
     /// The reason's name in files.
     pub fn as_str(&self) -> &'static str {
         match self {

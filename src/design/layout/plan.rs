@@ -26,6 +26,8 @@ use domecast_optics::DomeShape;
 const LATTICE_NEIGHBORS: f64 = 1.2;
 /// The same for patterns whose spacing varies.
 const UNEVEN_NEIGHBORS: f64 = 1.6;
+/// Dots about the key at least: a runtime asks for two of them, and one may be lost.
+const KEY_NEIGHBORS: usize = 3;
 
 /// The dots of a design.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,9 +141,8 @@ fn lay_out(spec: &LayoutSpec) -> Result<Layout, LayoutError> {
     }
     refuse_required(spec, &lost, dots.len() + lost.len())?;
     let key = take_key(spec, &frame, center_px, &mut dots, &mut warnings);
-    let lattice = matches!(spec.pattern.kind, PatternKind::Square | PatternKind::Hexagonal);
     let even: Vec<DVec2> = dots.iter().map(|dot| dot.even_px).collect();
-    let around = neighbors(&even, if lattice { LATTICE_NEIGHBORS } else { UNEVEN_NEIGHBORS });
+    let around = neighbors(&even, longest_neighbor(spec));
     for ((id, dot), list) in (0u32..).zip(&mut dots).zip(around) {
         dot.id = id;
         dot.neighbors = list;
@@ -208,11 +209,7 @@ fn take_key(
     };
     let mut dot = dots.remove(index);
     dot.id = u32::MAX;
-    let spacing = |other: &Dot| other.image_px.distance(dot.image_px);
-    let nearest = dots.iter().map(spacing).fold(f64::INFINITY, f64::min);
-    let near = dots.iter().enumerate().filter(|(_, other)| spacing(other) < LATTICE_NEIGHBORS * nearest);
-    let neighbors = near.map(|(index, _)| index as u32).collect();
-    dot.neighbors = neighbors;
+    dot.neighbors = beside_key(spec, dots, dot.image_px);
     // Dots after the one taken out moved up by one.
     let image = |(turned_rad, is_mirrored, at): (f64, bool, usize)| KeyImage {
         turned_rad,
@@ -220,6 +217,27 @@ fn take_key(
         dot: (at - usize::from(at > index)) as u32,
     };
     Some(PatternKey { dot, images: images.into_iter().map(image).collect() })
+}
+
+/// The dots about the key: as far as the neighbours of other dots of the pattern, and [`KEY_NEIGHBORS`] at least, for they are
+/// what leads a runtime to the gap.
+fn beside_key(spec: &LayoutSpec, dots: &[Dot], key_px: DVec2) -> Vec<u32> {
+    let mut near: Vec<(f64, u32)> =
+        (0_u32..).zip(dots).map(|(index, dot)| (dot.image_px.distance(key_px), index)).collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let nearest_px = near.first().map_or(0.0, |first| first.0);
+    let reach_px = longest_neighbor(spec) * nearest_px;
+    let (inside, beyond) = near.split_at(near.partition_point(|(apart_px, _)| *apart_px < reach_px));
+    let missing = KEY_NEIGHBORS.saturating_sub(inside.len());
+    let mut found: Vec<u32> = inside.iter().chain(beyond.iter().take(missing)).map(|near| near.1).collect();
+    found.sort_unstable();
+    found
+}
+
+/// How much farther than its nearest a dot's neighbour may be, by the pattern.
+fn longest_neighbor(spec: &LayoutSpec) -> f64 {
+    let lattice = matches!(spec.pattern.kind, PatternKind::Square | PatternKind::Hexagonal);
+    if lattice { LATTICE_NEIGHBORS } else { UNEVEN_NEIGHBORS }
 }
 
 /// The print passes that the dots of the pattern need, those that the lens does not see left out.
@@ -318,20 +336,25 @@ fn refuse_required(spec: &LayoutSpec, lost: &[LostDot], all: usize) -> Result<()
                 "dot {} at pixel {place} is required, but {}; so are {others} more of {all} dots",
                 first.id, first.reason
             ),
-            "a smaller pattern, or \"drop\" to lay out the rest without them",
+            format!("{}, or \"drop\" to lay out the rest without them", first.reason.cure()),
         ));
     }
     Ok(())
 }
 
+/// Where the pad wraps far it stretches. A film that a measured test print has corrected knows by how much.
 fn warn_of_wrap(spec: &LayoutSpec, dots: &[Dot], warnings: &mut Vec<String>) {
+    if spec.print.measured.is_some() {
+        return;
+    }
     let warn_rad = spec.print.wrap_warn_deg.to_radians();
     let beyond = dots.iter().filter(|dot| dot.wrap_rad > warn_rad);
     let furthest = beyond.clone().map(|dot| dot.wrap_rad).fold(0.0, f64::max);
     let count = beyond.count();
     if count > 0 {
         warnings.push(format!(
-            "{count} dots lie beyond print.wrap_warn_deg = {}, the furthest at {:.1} deg: expect them distorted",
+            "{count} dots lie beyond print.wrap_warn_deg = {}, the furthest at {:.1} degrees, where a pad stretches: print \
+             the test print first, and correct the film with `domecast calibrate-print`",
             spec.print.wrap_warn_deg,
             furthest.to_degrees()
         ));

@@ -9,10 +9,12 @@ use glam::{DAffine3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::assembly::{Body, affine};
+use super::bearing::behind_lip_mm;
 use super::error::infeasible;
 use super::measures::Measures;
 use super::view::sight_lines;
 use super::{Assembly, Part, PartError, Pose, process, purchased, undercut};
+use crate::spec::Cure;
 use domecast_mesh::{BoundingBox, Chord, MeshError, Piece, RayTarget, Solid, TriMesh};
 use domecast_optics::numeric::Rigid;
 
@@ -336,7 +338,14 @@ impl Scene {
                         from.x, from.y, from.z
                     );
                     let lip = m.leds.lip_top_z_mm;
-                    return Err(infeasible("upper_platform", place, lip, lip + h, "leds.lip_top_z_mm"));
+                    let fault = infeasible("upper_platform", place, lip, lip + h, "leds.lip_top_z_mm");
+                    // Without a lip before it no height of the lip hides it.
+                    let (radius_mm, needed_mm) = (m.leds.center_radius_mm, behind_lip_mm(m));
+                    if radius_mm < needed_mm {
+                        let cure = Cure::length("leds.center_radius_mm", radius_mm, needed_mm);
+                        return Err(PartError::Cured { fault: Box::new(fault), cure });
+                    }
+                    return Err(fault);
                 }
             }
         }

@@ -160,6 +160,16 @@ impl fmt::Display for PartError {
 
 impl std::error::Error for PartError {}
 
+/// How the limit that a value fails is said: at least where the value is too small, at most where it
+/// is too large.
+fn bound(value_mm: f64, limit_mm: f64) -> &'static str {
+    match value_mm.total_cmp(&limit_mm) {
+        std::cmp::Ordering::Less => "at least",
+        std::cmp::Ordering::Equal => "more than",
+        std::cmp::Ordering::Greater => "at most",
+    }
+}
+
 impl From<PartError> for DesignError {
     fn from(error: PartError) -> Self {
         match error {
@@ -167,7 +177,7 @@ impl From<PartError> for DesignError {
                 field,
                 "",
                 format!("{part}: {place}: {value_mm:.4} mm"),
-                format!("a limit of {limit_mm:.4} mm"),
+                format!("{} {limit_mm:.4} mm", bound(value_mm, limit_mm)),
             ),
             PartError::Blocked { part, when, angle_deg, shares, cure } => Self::at(
                 cure.field.clone(),
@@ -183,7 +193,7 @@ impl From<PartError> for DesignError {
                     "{part} and {by}: {problem}: {value_mm:.3} mm, {:.3} mm missing",
                     (limit_mm - value_mm).abs()
                 ),
-                format!("a limit of {limit_mm:.3} mm"),
+                format!("{} {limit_mm:.3} mm", bound(value_mm, limit_mm)),
             )
             .with_cure(cure),
             PartError::Several(faults) => {

@@ -72,7 +72,7 @@ pub use measures::Measures;
 pub use poses::Pose;
 pub use sight::{EdgeRay, MarkerView, markers_of};
 pub use traced::{PoseSight, RayCount, trace_sight};
-pub use verdict::{CheckedSensor, build_seated, check_sensor};
+pub use verdict::{CheckedSensor, build_seated, check_sensor, with_tried_cures};
 pub use view::ViewCone;
 
 use crate::layout::PrintPass;

@@ -8,12 +8,9 @@ use super::error::Cure;
 use super::measures::polar;
 use super::screws::{THREADS, Thread};
 use super::{Measures, PartError, mould};
-use crate::spec::sections::SpringPlaces;
+use crate::spec::sections::{MIN_BEND_DIAMETERS, SpringPlaces};
 use crate::spec::{Design, DesignWarning};
 
-/// A cable is bent to no less than this many of its diameters where the design gives no radius: the usual limit of
-/// thin flexible cables.
-const MIN_BEND_DIAMETERS: f64 = 2.0;
 /// A set screw may stand this many of its diameters below the face: the tap still cuts there, the key still finds it.
 const MAX_SUNK_DIAMETERS: f64 = 3.0;
 /// A pocket's floor holds its magnet if its push-out hole takes no more of the magnet's diameter.

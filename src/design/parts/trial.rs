@@ -69,9 +69,11 @@ fn cure_of(design: &Design, passes: &[PrintPass], fault: &PartError, tries_left:
     });
     let tried: Vec<Cure> = off.take(MAX_FIELDS).chain(moved).take(*tries_left).collect();
     *tries_left = tries_left.saturating_sub(tried.len());
-    // In pieces, so that the smallest change that helps ends the search.
+    // As many at once as there are threads, so that the smallest change that helps ends the search.
     let helps = |cure: &Cure| makes(design, cure, part, passes);
-    tried.chunks(8).find_map(|some| some.par_iter().find_first(|cure| helps(cure)).cloned())
+    tried
+        .chunks(rayon::current_num_threads())
+        .find_map(|some| some.par_iter().find_first(|cure| helps(cure)).cloned())
 }
 
 /// Whether the part can be made with a change.

@@ -31,8 +31,14 @@ pub fn build_seated(design: &Design, m: &Measures, passes: &[PrintPass]) -> Resu
         faults.extend(openings::faults(design, m));
         faults.push(fault.clone());
     }
-    PartError::all(trial::with_cures(design, passes, faults))?;
+    PartError::all(faults)?;
     made
+}
+
+/// The faults of [`build_seated`], each that names fields and no change with the first change that was tried and helps.
+pub fn with_tried_cures(design: &Design, passes: &[PrintPass], fault: PartError) -> PartError {
+    let cured = trial::with_cures(design, passes, vec![fault.clone()]);
+    PartError::all(cured).err().unwrap_or(fault)
 }
 
 /// Runs every check of the assembled sensor, the traced view among them.

@@ -15,7 +15,7 @@ use std::collections::HashSet;
 use glam::DVec3;
 
 use super::{Blueprint, Feature, Measures, PartError};
-use domecast_mesh::{Chord, Construction, MeshError, Piece, RayTarget, Shape, Solid, TriMesh};
+use domecast_mesh::{BoundingBox, Chord, Construction, MeshError, Piece, RayTarget, Shape, Solid, TriMesh};
 
 /// Walls are looked for on meshes this coarse, in parts of the limit.
 const CHORD_SHARE: f64 = 0.02;
@@ -95,22 +95,35 @@ fn distances(
         let bounds = inside.to_mesh().bounds();
         tools.push((feature, inside, bounds));
     }
+    let search = limit * (1.0 + 2.0 * CHORD_SHARE);
+    let mut fine = None;
     for (i, (one, solid, bounds)) in tools.iter().enumerate() {
         for (two, other, other_bounds) in &tools[i + 1..] {
             if meant_to_meet(b, one, two) {
                 continue;
             }
-            let search = limit * (1.0 + 2.0 * CHORD_SHARE);
-            if let (Some(p), Some(q)) = (bounds, other_bounds)
-                && ((p.min_mm - q.max_mm).max(q.min_mm - p.max_mm)).max_element() > search
-            {
+            let (Some(p), Some(q)) = (bounds, other_bounds) else { continue };
+            if apart_mm(p, q) > search || solid.gap_mm(other, search) >= search {
                 continue;
             }
-            let gap = solid.gap_mm(other, search);
-            if gap >= search {
-                continue;
-            }
-            let Some(gap) = measured(b, one, two, limit).map_err(failed)? else { continue };
+            let body = match &mut fine {
+                Some(body) => body,
+                unknown => unknown.insert(fine_solids(b.added.iter(), limit).map_err(failed)?),
+            };
+            // Only what lies between the two, or opens into them there, changes their distance.
+            let between = [within(p, q, search), within(q, p, search)];
+            let opened: Vec<&Feature> = tools
+                .iter()
+                .filter(|(f, ..)| ![one, two].iter().any(|x| x.piece.name == f.piece.name))
+                .filter(|(f, ..)| meant_to_meet(b, one, f) || meant_to_meet(b, two, f))
+                .filter(|(.., reach)| {
+                    let near =
+                        |space| reach.is_none_or(|reach| apart_mm(&reach, space) <= CHORD_SHARE * limit);
+                    between.iter().any(near)
+                })
+                .map(|(f, ..)| *f)
+                .collect();
+            let Some(gap) = measured(body, &opened, [one, two], limit).map_err(failed)? else { continue };
             if gap < limit * (1.0 - 2.0 * FINE_SHARE) {
                 let place = format!("wall between {} and {}", one.piece.name, two.piece.name);
                 thin.add([one.kind, two.kind], gap, b.infeasible(place, gap, limit, fields(one, two)));
@@ -120,32 +133,41 @@ fn distances(
     Ok(())
 }
 
+/// Distance of two boxes along the axis on which they are farthest apart, mm.
+fn apart_mm(p: &BoundingBox, q: &BoundingBox) -> f64 {
+    (p.min_mm - q.max_mm).max(q.min_mm - p.max_mm).max_element()
+}
+
+/// The part of a box that lies within a distance of another one.
+fn within(p: &BoundingBox, of: &BoundingBox, reach_mm: f64) -> BoundingBox {
+    BoundingBox { min_mm: p.min_mm.max(of.min_mm - reach_mm), max_mm: p.max_mm.min(of.max_mm + reach_mm) }
+}
+
+/// Features on fine meshes, as one solid.
+fn fine_solids<'f>(features: impl Iterator<Item = &'f Feature>, limit: f64) -> Result<Solid, MeshError> {
+    let fine = Chord::new(FINE_SHARE * limit)?;
+    features.map(|f| solid_of(&f.piece, fine)).collect::<Result<Vec<_>, _>>().and_then(Solid::union)
+}
+
 /// Distance between two cuts on fine meshes, of what is cut from material that no cut which they open into has
 /// taken away: a hole that starts inside a bore bounds no wall there. `None` if nothing is left of one.
-fn measured(b: &Blueprint, one: &Feature, two: &Feature, limit: f64) -> Result<Option<f64>, MeshError> {
+fn measured(
+    body: &Solid,
+    opened: &[&Feature],
+    [one, two]: [&Feature; 2],
+    limit: f64,
+) -> Result<Option<f64>, MeshError> {
     let fine = Chord::new(FINE_SHARE * limit)?;
-    let solids = |features: &[&Feature]| {
-        features
-            .iter()
-            .map(|f| solid_of(&f.piece, fine))
-            .collect::<Result<Vec<_>, _>>()
-            .and_then(Solid::union)
+    let away = match opened {
+        [] => None,
+        some => Some(fine_solids(some.iter().copied(), limit)?),
     };
-    let body = solids(&b.added.iter().collect::<Vec<_>>())?;
-    let opened: Vec<&Feature> = b
-        .cut
-        .iter()
-        .filter(|f| ![one, two].iter().any(|x| x.piece.name == f.piece.name))
-        .filter(|f| meant_to_meet(b, one, f) || meant_to_meet(b, two, f))
-        .collect();
     let left = |f: &Feature| {
-        let inside = solid_of(&f.piece, fine)?.intersection(&body)?;
-        match inside {
-            Some(inside) if !opened.is_empty() => match inside.difference(&solids(&opened)?) {
-                Err(MeshError::Empty { .. }) => Ok(None),
-                other => other.map(Some),
-            },
-            other => Ok(other),
+        let inside = solid_of(&f.piece, fine)?.intersection(body)?;
+        let (Some(inside), Some(away)) = (&inside, &away) else { return Ok(inside) };
+        match inside.difference(away) {
+            Err(MeshError::Empty { .. }) => Ok(None),
+            other => other.map(Some),
         }
     };
     let search = limit * (1.0 + 2.0 * CHORD_SHARE);

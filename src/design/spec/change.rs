@@ -88,6 +88,30 @@ impl Design {
         Self::from_text(&tree.to_string(), Path::new(""))
     }
 
+    /// The fault with changes that a file takes as they are: a field of an object that a rule gives whole is no field of the file
+    /// yet, so the change is that of the whole object.
+    #[must_use]
+    pub fn with_writable_cures(&self, mut fault: DesignError) -> DesignError {
+        let more = std::mem::take(&mut fault.more);
+        if let Some(cure) = fault.cure.as_deref()
+            && let Some(whole) = self.whole_object(cure)
+        {
+            fault.help = fault.help.map(|help| help.replace(&cure.to_string(), &whole.to_string()));
+            fault.cure = Some(Box::new(whole));
+        }
+        fault.with_more(more.into_iter().map(|one| self.with_writable_cures(one)).collect())
+    }
+
+    /// A change below an object that a rule gave, as a change of that object.
+    fn whole_object(&self, change: &Cure) -> Option<Cure> {
+        let below = |field: &str| change.field.strip_prefix(field).is_some_and(|rest| rest.starts_with('.'));
+        let above = self.derived().iter().find(|derived| below(derived.field))?;
+        let mut whole = serde_json::to_value(self.sections()).ok()?;
+        set(&mut whole, &Value::Null, &change.field, change.value.clone())?;
+        let value = look(&whole, above.field)?.clone();
+        Some(Cure { field: above.field.to_string(), value })
+    }
+
     /// The given fields that a rule would give another value, each with that value; those of purchased parts last.
     pub fn off_their_rules(&self) -> Vec<Cure> {
         let Ok(tree) = serde_json::from_str::<Value>(self.text()) else { return Vec::new() };
@@ -250,5 +274,62 @@ mod tests {
         let longer = design.scaled("camera.position_mm", 1.5);
         assert_eq!(longer.len(), 1);
         assert!(longer[0].value[2].as_f64().unwrap() < 1.49 * design.sections().camera.position_mm[2]);
+    }
+
+    #[test]
+    fn a_change_below_an_object_of_a_rule_is_one_of_the_whole_object() {
+        let text = json!({
+            "version": 1, "name": "small", "camera": { "from": "ov6946" }, "camera_body": { "from": "ov6946" },
+            "dome": { "radius_mm": 6 },
+        });
+        let design = Design::from_text(&text.to_string(), Path::new("")).unwrap();
+        let change = Cure::length("springs.places.ring.radius_mm", 5.0, 20.0);
+        let fault = |cure: &Cure| DesignError::at("springs.places", "", "narrow", "").with_cure(cure.clone());
+        let said = design.with_writable_cures(fault(&change).with_more(vec![fault(&change)]));
+        for said in [&said, &said.more[0]] {
+            let cure = said.cure.as_deref().unwrap();
+            assert_eq!(
+                (cure.field.as_str(), &cure.value["ring"]["radius_mm"]),
+                ("springs.places", &json!(20.0))
+            );
+            assert!(said.help.as_deref().unwrap().contains(&cure.to_string()), "{said}");
+            // As a person enters it.
+            let mut entered = text.clone();
+            entered["springs"] = json!({ "places": cure.value.clone() });
+            Design::from_text(&entered.to_string(), Path::new("")).unwrap();
+        }
+        // What the file has already is changed where it stands.
+        let mut given = text.clone();
+        given["springs"] =
+            json!({ "places": { "ring": { "count": 6, "radius_mm": 9, "first_azimuth_deg": 30 } } });
+        let given = Design::from_text(&given.to_string(), Path::new("")).unwrap();
+        assert_eq!(given.with_writable_cures(fault(&change)).cure.as_deref(), Some(&change));
+    }
+
+    #[test]
+    fn faults_against_the_schema_name_a_value_that_takes_them_away() {
+        let thumb24: Value = serde_json::from_str(include_str!("../../../designs/thumb24.json")).unwrap();
+        let wrong = [
+            ("dome.radius_m", json!(10)),
+            ("dome.radius_mm", json!(-1)),
+            ("dome.radius_mm", json!("10,5")),
+            ("leds.tilt_deg", json!("85")),
+            ("pattern.kind", json!("hexagon")),
+            ("springs.active_coils", json!(0)),
+            ("springs.ends", json!("closed_grund")),
+            ("white_markers.reflectance", json!(1.5)),
+            ("leds.lobe_exponent", json!(-3)),
+        ];
+        for (field, value) in wrong {
+            let mut tree = thumb24.clone();
+            set(&mut tree, &Value::Null, field, value.clone()).unwrap();
+            let error = tree.to_string().parse::<Design>().expect_err(field);
+            assert_eq!(error.field, field, "{error}");
+            let cure = error.cure.clone().unwrap_or_else(|| panic!("no cure: {error}"));
+            set(&mut tree, &Value::Null, &cure.field, cure.value.clone()).unwrap();
+            let left = tree.to_string().parse::<Design>().err();
+            let kinds = left.map(|error| error.kinds()).unwrap_or_default();
+            assert!(!kinds.contains(&error.kind()), "{field} = {value}: {cure} leaves {kinds:?}");
+        }
     }
 }

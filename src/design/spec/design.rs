@@ -28,6 +28,7 @@ pub struct Design {
     pub(super) text: String,
     pub(super) optics: SensorOptics,
     pub(super) warnings: Vec<DesignWarning>,
+    pub(super) notes: Vec<String>,
     pub(super) lints: Vec<DesignWarning>,
     pub(super) settings: Settings,
     pub(super) derived: Vec<DerivedField>,
@@ -53,6 +54,11 @@ impl Design {
     /// What the maker should know.
     pub fn warnings(&self) -> &[DesignWarning] {
         &self.warnings
+    }
+
+    /// Facts about the design that ask its maker for nothing.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// A fault found later, with the design's lints as help.

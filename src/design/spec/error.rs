@@ -131,6 +131,13 @@ impl DesignError {
         self
     }
 
+    /// The same fault, with a value for its own field that takes it away, for programs: what it says to people is enough.
+    #[must_use]
+    pub(super) fn with_cure_data(mut self, value: Value) -> Self {
+        self.cure = Some(Box::new(Cure { field: self.field.clone(), value }));
+        self
+    }
+
     /// What the fault is about, without its numbers: the same before and after a change that does not take it away.
     pub fn kind(&self) -> String {
         let text: String =

@@ -14,6 +14,7 @@ mod design;
 mod error;
 mod explain;
 mod fill;
+mod kind;
 mod lens;
 mod lints;
 mod mount_rules;
@@ -39,6 +40,7 @@ pub use design::{Design, DesignWarning};
 pub use error::{Cure, DesignError};
 pub use explain::{Explained, explain};
 pub use fill::{Filled, Filling, fill, read_filled};
+pub use kind::FileKind;
 pub use schema::{design_schema, schema_of};
 pub use sections::DesignFile;
 pub use source::{parse as parse_json, read_text, read_text_from, read_up_to};
@@ -87,7 +89,7 @@ type Unresolved = (DesignError, Option<Value>);
 fn filled_design(text: &str, folder: Option<&Path>) -> Result<Design, Box<Unresolved>> {
     let plain = |error| Box::new((error, None));
     let mut value = parse_json(text).map_err(plain)?;
-    check_version(&value).map_err(plain)?;
+    check_kind(&value).map_err(plain)?;
     let filling = fill(&mut value, folder).map_err(plain)?;
     let filled = if filling.fields.is_empty() { None } else { Some(format!("{value:#}\n")) };
     schema::check(schema::open_schema(), &value, "").map_err(plain)?;
@@ -128,6 +130,7 @@ pub fn optics_from_text(text: &str) -> Result<SensorOptics, DesignError> {
 
 fn filled_optics(text: &str, folder: Option<&Path>) -> Result<SensorOptics, DesignError> {
     let mut value = parse_json(text)?;
+    FileKind::Design.expect(&value)?;
     // where the camera stands may follow from the whole design
     let is_whole = |path: &str| value.pointer(path).is_some();
     let given = ["/camera/position_mm", "/optics/layers"].into_iter().all(is_whole);
@@ -156,8 +159,9 @@ pub fn from_value<T: DeserializeOwned + schemars::JsonSchema>(value: &Value) -> 
         .map_err(|error| DesignError::at("", "", error.to_string(), "what `domecast schema` describes"))
 }
 
-/// A file of another version would be full of unknown keys: say the real reason first.
-fn check_version(value: &Value) -> Result<(), DesignError> {
+/// A file of another version or kind would be full of unknown keys: say the real reason first.
+fn check_kind(value: &Value) -> Result<(), DesignError> {
+    FileKind::Design.expect(value)?;
     match value.get("version") {
         Some(Value::Number(number)) if number.as_u64() != Some(1) => Err(DesignError::at(
             "version",

@@ -58,8 +58,16 @@ pub(super) fn resolve(
     let optics = optics(&sections.camera, &sections.optics, &sections.dome)
         .map_err(|fault| with_lints(fault, &lints(&sections, None)))?;
     let lints = lints(&sections, Some(&optics));
-    let warnings =
-        field_of_view_warning(&sections.camera, &optics).into_iter().chain(lints.clone()).collect();
+    let short = short_lens_model(&sections.camera, &optics);
+    // the runtime reads nothing beyond its mask: a model that holds as far is no fault of the design
+    let ends_in_mask =
+        optics.lens().max_field_angle_rad() < sections.runtime.mask_field_angle_deg.to_radians();
+    let notes = short.clone().filter(|_| !ends_in_mask).into_iter().collect();
+    let warnings = short.filter(|_| ends_in_mask).map(|message| {
+        let cure = "a kannala_brandt calibration reaches further";
+        DesignWarning { field: "camera.distortion".into(), message: format!("{message}; {cure}") }
+    });
+    let warnings = warnings.into_iter().chain(lints.clone()).collect();
     let settings = Settings::of(&sections, &optics).map_err(|fault| with_lints(fault, &lints))?;
     sections.print.outline_tolerance_mm = Some(settings.outline_tolerance_mm.value);
     sections.mesh.chord_tolerance_mm = Some(settings.chord_tolerance_mm.value);
@@ -67,31 +75,24 @@ pub(super) fn resolve(
     sections.tolerances.samples = Some(settings.samples.value);
     mount_rules::check(&sections).map_err(|fault| with_lints(fault, &lints))?;
     body_rules::check(&sections).map_err(|fault| with_lints(fault, &lints))?;
-    let design = Design { sections, text: text.to_owned(), optics, warnings, lints, settings, derived };
+    let design =
+        Design { sections, text: text.to_owned(), optics, warnings, notes, lints, settings, derived };
     rules::check(&design).map_err(|fault| design.with_lints(fault))?;
     Ok(design)
 }
 
-/// A warning about a field of view that the lens model cannot reach, with the fold that ends it.
-fn field_of_view_warning(camera: &CameraSection, optics: &SensorOptics) -> Option<DesignWarning> {
+/// What a lens model that ends inside of the camera's field of view reaches, with the fold that ends it.
+fn short_lens_model(camera: &CameraSection, optics: &SensorOptics) -> Option<String> {
     let wanted_deg = camera.field_of_view_deg / 2.0;
     let reached_deg = optics.lens().max_field_angle_rad().to_degrees();
     if reached_deg >= wanted_deg * (1.0 - 1e-9) {
         return None;
     }
-    let fold = match optics.lens().fold_angle_rad() {
-        Some(fold_rad) => format!("folds at {:.2} degrees of field angle", fold_rad.to_degrees()),
-        None => "ends short of it".to_owned(),
-    };
-    Some(DesignWarning {
-        field: "camera.distortion".into(),
-        message: format!(
-            "the lens model {fold}, but the field of view asks for {wanted_deg:.2} (half of \
-             camera.field_of_view_deg); max_field_angle_rad is what can be reached, {:.4} rad = {reached_deg:.2} \
-             degrees; a kannala_brandt calibration reaches further",
-            optics.lens().max_field_angle_rad()
-        ),
-    })
+    let why = optics.lens().fold_angle_rad().map_or("", |_| ", where it folds");
+    Some(format!(
+        "The lens sees {wanted_deg:.1} degrees from its axis (half of camera.field_of_view_deg), its model holds up to \
+         {reached_deg:.1} degrees{why}: nothing beyond is used"
+    ))
 }
 
 /// Folder names come from design names, so a name must not be able to leave the output folder.

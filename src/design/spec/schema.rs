@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 
 use super::error::DesignError;
 use super::schema_faults::{
-    first_sentence, join, kind_of, listed, missing, not_a_choice, type_words, unknown_key,
+    first_sentence, join, kind_of, listed, missing, not_a_choice, type_words, unknown_key, within,
 };
 use super::sections::DesignFile;
 
@@ -312,6 +312,10 @@ fn check_type(schema: &Value, value: &Value, at: &str) -> Result<(), DesignError
     let fault =
         DesignError::at(at, value, format!("{} does not belong here", kind_of(value)), type_words(schema));
     let reads_as_number = |text: &str| text.trim().replacen(',', ".", 1).parse::<f64>().is_ok();
+    let fault = match value.as_str().and_then(|text| read_number(schema, text)) {
+        Some(number) => fault.with_cure_data(number),
+        None => fault,
+    };
     match value.as_str() {
         Some(text) if text.contains(',') && reads_as_number(text) => {
             Err(fault.with_help("a decimal comma? JSON wants a bare number with a point, as in 10.5"))
@@ -319,6 +323,12 @@ fn check_type(schema: &Value, value: &Value, at: &str) -> Result<(), DesignError
         Some(text) if reads_as_number(text) => Err(fault.with_help("write the number without quotes")),
         _ => Err(fault),
     }
+}
+
+/// The number that a text says, where the schema wants one.
+fn read_number(schema: &Value, text: &str) -> Option<Value> {
+    let number: Value = serde_json::from_str(&text.trim().replacen(',', ".", 1)).ok()?;
+    (number.is_number() && type_fits(schema, &number)).then_some(number)
 }
 
 fn type_fits(schema: &Value, value: &Value) -> bool {
@@ -364,6 +374,10 @@ fn check_range(schema: &Value, number: f64, value: &Value, at: &str) -> Result<(
     let allowed: Vec<String> =
         rules.iter().filter_map(|(bound, word, _)| bound.map(|bound| format!("{word} {bound}"))).collect();
     let fault = DesignError::at(at, value, "the value is out of range", allowed.join(" and "));
+    let fault = match within(schema, number) {
+        Some(value) => fault.with_cure_data(value),
+        None => fault,
+    };
     let in_degrees = number.to_degrees();
     let could_be = bound("minimum").is_none_or(|low| in_degrees >= low) && in_degrees <= 360.0;
     if at.ends_with("_deg") && number > 0.0 && could_be {

@@ -13,6 +13,7 @@ pub(super) fn unknown_key(key: &str, value: &Value, known: &Map<String, Value>, 
         .max_by(|a, b| a.0.total_cmp(&b.0));
     let names: Vec<&str> = known.keys().map(String::as_str).collect();
     let fault = DesignError::at(join(at, key), value, "unknown key", names.join(", "));
+    let fault = fault.with_cure_data(Value::Null);
     match nearest {
         Some((_, name)) => fault.with_help(format!("did you mean \"{name}\"?")),
         None => fault,
@@ -24,7 +25,36 @@ pub(super) fn missing(name: &str, at: &str) -> DesignError {
 }
 
 pub(super) fn not_a_choice(choices: &[&Value], value: &Value, at: &str) -> DesignError {
-    DesignError::at(at, value, "not one of the known choices", listed(choices))
+    let fault = DesignError::at(at, value, "not one of the known choices", listed(choices));
+    let meant = value.as_str().unwrap_or_default();
+    let likeness = |choice: &&&Value| strsim::jaro_winkler(choice.as_str().unwrap_or_default(), meant);
+    match choices.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b))) {
+        // objects that are distinguished by their keys are no values
+        Some(choice) if !value.is_object() => fault.with_cure_data((*choice).clone()),
+        _ => fault,
+    }
+}
+
+/// A number that a range allows, near to one that it does not.
+pub(super) fn within(schema: &Value, number: f64) -> Option<Value> {
+    let bound = |name: &str| schema.get(name).and_then(Value::as_f64);
+    let is_whole = schema.get("type").and_then(Value::as_str) == Some("integer");
+    let (low, above) = (bound("minimum"), bound("exclusiveMinimum"));
+    let (high, below) = (bound("maximum"), bound("exclusiveMaximum"));
+    let bottom = low.or(above).unwrap_or(f64::NEG_INFINITY);
+    let top = high.or(below).unwrap_or(f64::INFINITY);
+    let step = if is_whole { 1.0 } else { 1f64.min(0.5 * (top - bottom)) };
+    let is_low = low.is_some_and(|low| number < low) || above.is_some_and(|above| number <= above);
+    let found = match (is_low, low, high) {
+        (true, Some(low), _) => low,
+        (true, None, _) => bottom + step,
+        (false, _, Some(high)) => high,
+        (false, _, None) => top - step,
+    };
+    let fits =
+        found.is_finite() && low.is_none_or(|low| found >= low) && high.is_none_or(|high| found <= high);
+    let value = || if is_whole { Value::from(found as i64) } else { Value::from(found) };
+    fits.then(value)
 }
 
 pub(super) fn listed(values: &[&Value]) -> String {

@@ -21,18 +21,19 @@ const MAX_FILE_BYTES: u64 = 16 * 1024 * 1024;
 pub fn read_text(path: &Path) -> Result<String, DesignError> {
     let fault = |problem: String, allowed: &str| DesignError::at("", "", problem, allowed).in_file(path);
     let about = std::fs::metadata(path).map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => fault("there is no such file".into(), "the path of a JSON file"),
-        _ => fault(format!("cannot be read ({error})"), "a readable JSON file"),
+        std::io::ErrorKind::NotFound => fault("there is no such file".into(), "the path of a file"),
+        _ => fault(format!("cannot be read ({error})"), "a readable file"),
     })?;
     if about.is_dir() {
-        return Err(fault("this is a folder".into(), "the path of a JSON file")
-            .with_help("name the design file inside it"));
+        return Err(
+            fault("this is a folder".into(), "the path of a file").with_help("name the file inside it")
+        );
     }
     if about.len() > MAX_FILE_BYTES {
         return Err(fault(format!("the file has {} bytes", about.len()), "at most 16 MiB"));
     }
-    let file = File::open(path)
-        .map_err(|error| fault(format!("cannot be read ({error})"), "a readable JSON file"))?;
+    let file =
+        File::open(path).map_err(|error| fault(format!("cannot be read ({error})"), "a readable file"))?;
     read_text_from(file).map_err(|error| error.in_file(path))
 }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::claims;
-use super::making::{lay_out, make_parts};
+use super::making::{check_parts, lay_out};
 use crate::constants;
 use crate::light::marker_noise_px;
 use domecast_design::{Cure, Design, DesignError};
@@ -77,7 +77,7 @@ fn some(mut changes: Vec<Cure>, max_count: usize, left: &mut usize) -> Vec<Cure>
 
 /// What shows of a design before its parts are made: claimed loads, markers, dots, the camera's view.
 fn quick(design: &Design) -> Result<(), DesignError> {
-    let sight = claims::try_claims(design)?;
+    let sight = claims::check_claims(design)?;
     lay_out(design)?;
     sight.measures()?;
     Ok(())
@@ -91,10 +91,10 @@ fn lit(design: &Design) -> Result<(), DesignError> {
 
 /// The same with the parts, made and assembled.
 fn with_parts(design: &Design) -> Result<(), DesignError> {
-    let sight = claims::try_claims(design)?;
+    let sight = claims::check_claims(design)?;
     let (_, layout) = lay_out(design)?;
     let springs = constants::springs_of(design, sight)?;
-    make_parts(design, &layout, &springs)?;
+    check_parts(design, &layout, &springs)?;
     Ok(())
 }
 
@@ -106,8 +106,8 @@ fn first_that_helps(
     judge: &(dyn Fn(&Design) -> Result<(), DesignError> + Sync),
 ) -> Option<Cure> {
     let mut helps = None;
-    // In pieces, so that a change that leaves nothing ends the search.
-    for some in tried.chunks(8) {
+    // As many at once as there are threads, so that a change that leaves nothing ends the search.
+    for some in tried.chunks(rayon::current_num_threads()) {
         let judged: Vec<Option<bool>> = some
             .par_iter()
             .map(|cure| match design.changed(cure).and_then(|changed| judge(&changed)) {
@@ -144,6 +144,11 @@ fn candidates(design: &Design, fault: &DesignError, of_view: bool) -> Vec<Cure> 
     let mut found = design.off_their_rules();
     found.sort_by_key(near);
     found.truncate(MAX_RULES);
+    // What meets the camera, a deeper one clears.
+    if !of_view && named.contains(&"camera.position_mm") {
+        let deeper = |factor| design.scaled("camera.position_mm", factor);
+        found.splice(0..0, deeper(1.0 + SHARES[0]).into_iter().chain(deeper(1.0 + SHARES[1])));
+    }
     if fault.field.starts_with("pattern") || fault.field.starts_with("print") {
         found.extend(of_the_pattern(design));
     } else if of_view {

@@ -34,6 +34,9 @@ pub struct Manifest {
     pub parts: Vec<PartRecord>,
     /// What the maker should look at, each with the field to change.
     pub warnings: Vec<Warning>,
+    /// What no file could be written for, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub formats_left_out: Vec<String>,
     /// Every file but this one, by path.
     pub files: Vec<FileRecord>,
 }
@@ -100,6 +103,7 @@ impl Manifest {
         design: DesignRecord,
         parts: Vec<PartRecord>,
         warnings: Vec<Warning>,
+        formats_left_out: Vec<String>,
         files: impl Iterator<Item = (&'a str, &'a [u8])>,
     ) -> Self {
         let files = files
@@ -116,6 +120,7 @@ impl Manifest {
             design,
             parts,
             warnings,
+            formats_left_out,
             files,
         }
     }

@@ -44,6 +44,7 @@ use domecast_design::parts;
 use domecast_design::parts::PartError;
 use domecast_design::settings::SAFETY;
 use domecast_design::{Design, DesignError, DesignWarning};
+use domecast_runtime::constants::Constants;
 use making::{MadeParts, lay_out, make_parts};
 
 /// Why a build could not be made.
@@ -124,8 +125,8 @@ impl Build {
         self.tree.add(STAMP, report::stamp(&self.manifest.design.sha256).into_bytes());
         // the manifest lists all files but itself
         self.tree.remove(MANIFEST_NAME);
-        let Manifest { design, parts, warnings, .. } = self.manifest.clone();
-        self.manifest = Manifest::new(design, parts, warnings, self.tree.files());
+        let Manifest { design, parts, warnings, formats_left_out, .. } = self.manifest.clone();
+        self.manifest = Manifest::new(design, parts, warnings, formats_left_out, self.tree.files());
         self.tree.add(MANIFEST_NAME, pretty(&self.manifest));
     }
 }
@@ -150,7 +151,7 @@ pub fn build_with(
     make(design, measured, step).map_err(|error| match error {
         BuildError::Design(error) => {
             let error = cures::with_cures(design, with_value(design, *error));
-            design.with_lints(error).into()
+            design.with_lints(design.with_writable_cures(error)).into()
         }
         ours @ BuildError::Ours(_) => ours,
     })
@@ -198,15 +199,12 @@ fn make(
         tree.add(path, bytes);
     }
     step("writing what other programs read");
-    tree.add(
-        "constants/constants.schema.json",
-        domecast_runtime::constants::Constants::schema().into_bytes(),
-    );
+    tree.add("constants/constants.schema.json", Constants::schema().into_bytes());
     let forms = constants::formats::format_files(design, &constants, &made);
     for (path, text) in forms.files {
         tree.add(path, text.into_bytes());
     }
-    let warnings = warnings(design, &checked.notes, &judged, &light, forms.left_out);
+    let warnings = warnings(design, &checked.notes, &judged, &light);
 
     step("writing the page");
     let shown: Vec<(String, String)> =
@@ -223,13 +221,15 @@ fn make(
         sight: &checked.sight,
         poses: &poses,
         warnings: &shown,
+        formats_left_out: &forms.left_out,
         hash: &sha256,
         files: &tree.files().collect::<Vec<_>>(),
     });
     tree.add("report/index.html", page.into_bytes());
 
     let record = DesignRecord { name: design.name().to_owned(), sha256 };
-    let manifest = Manifest::new(record, made.iter().map(part_record).collect(), warnings, tree.files());
+    let records = made.iter().map(part_record).collect();
+    let manifest = Manifest::new(record, records, warnings, forms.left_out, tree.files());
     tree.add(MANIFEST_NAME, pretty(&manifest));
     let mut headlines = judged.headlines();
     headlines.extend(averaging(design, &forces));
@@ -247,20 +247,18 @@ fn light_and_forces(
     Ok((light, forces))
 }
 
-/// The design's own warnings, then those of the assembled parts, of the constants' formats, of the pattern and of the light.
+/// The design's own warnings, then those of the assembled parts, of the pattern and of the light.
 fn warnings(
     design: &Design,
     notes: &[DesignWarning],
     judged: &LayoutReport,
     light: &LightCheck,
-    formats_left_out: Vec<String>,
 ) -> Vec<Warning> {
     let warning = |field: &str, message: String| Warning { field: field.into(), message };
     let own = design.warnings().iter().chain(notes).map(|own| warning(&own.field, own.message.clone()));
-    let formats = formats_left_out.into_iter().map(|message| warning("constants", message));
     let pattern = judged.warnings.iter().map(|message| warning("pattern", message.clone()));
     let lit = light.warnings.iter().map(|(field, message)| warning(field, message.clone()));
-    own.chain(formats).chain(pattern).chain(lit).collect()
+    own.chain(pattern).chain(lit).collect()
 }
 
 /// What a checker should find in a part's mesh.

@@ -44,6 +44,7 @@ pub enum TextAlign {
 #[derive(Debug, Clone)]
 enum Mark {
     Line { points: Vec<DVec2>, width: f64 },
+    Area { corners: Vec<DVec2> },
     Disc { at: DVec2, radius: f64, filled: bool },
     Bar { low: DVec2, high: DVec2, title: String },
     Text { at: DVec2, align: TextAlign, size: f64, text: String },
@@ -68,6 +69,11 @@ impl Chart {
         if points.len() > 1 {
             self.marks.push((Mark::Line { points: points.to_vec(), width }, color));
         }
+    }
+
+    /// Fills a polygon.
+    pub fn area(&mut self, corners: &[DVec2], color: ChartColor) {
+        self.marks.push((Mark::Area { corners: corners.to_vec() }, color));
     }
 
     /// Draws a disc, or its rim.
@@ -123,13 +129,13 @@ impl Chart {
             let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
             // writing to a String cannot fail
             let _ = match mark {
-                Mark::Line { points, width } => {
-                    let path: Vec<String> = points.iter().map(|p| format!("{:.1} {:.1}", p.x, p.y)).collect();
-                    writeln!(
-                        svg,
-                        "<path{class} d=\"M{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\"/>",
-                        path.join("L")
-                    )
+                Mark::Line { points, width } => writeln!(
+                    svg,
+                    "<path{class} d=\"M{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\"/>",
+                    path(points)
+                ),
+                Mark::Area { corners } => {
+                    writeln!(svg, "<path{class} d=\"M{}Z\" fill=\"{color}\"/>", path(corners))
                 }
                 Mark::Disc { at, radius, filled } => writeln!(
                     svg,
@@ -181,6 +187,10 @@ impl Chart {
                     let points: Vec<DVec2> = points.iter().map(|p| *p * SCALE).collect();
                     canvas::stroke(&mut picture, &points, false, (width * SCALE) as f32, *rgb);
                 }
+                Mark::Area { corners } => {
+                    let corners: Vec<DVec2> = corners.iter().map(|p| *p * SCALE).collect();
+                    canvas::fill(&mut picture, &corners, *rgb);
+                }
                 Mark::Disc { at, radius, filled } => {
                     let rim: Vec<DVec2> = (0..32)
                         .map(|k| DVec2::from_angle(TAU * f64::from(k) / 32.0))
@@ -215,4 +225,9 @@ impl Chart {
         }
         picture.encode_png().ok()
     }
+}
+
+/// Points of an SVG path.
+fn path(points: &[DVec2]) -> String {
+    points.iter().map(|p| format!("{:.1} {:.1}", p.x, p.y)).collect::<Vec<_>>().join("L")
 }

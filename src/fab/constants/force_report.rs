@@ -9,6 +9,8 @@ use super::envelope_picture::envelope_chart;
 use super::resolution::{design_choices, frames_to_average, resolution_at};
 use super::sight::markers_of;
 use super::springs::DesignSprings;
+use crate::chart::Chart;
+use domecast_design::sections::LoadClaim;
 use domecast_design::{Design, DesignError};
 use domecast_design::{limits_of, suspension_of};
 use domecast_optics::numeric::Rigid;
@@ -19,8 +21,6 @@ use domecast_springs::{
 
 /// Directions around the axis that the table has.
 const AZIMUTHS: u32 = 8;
-/// The largest load that the paper measured, N.
-const PAPER_N: f64 = 17.0;
 /// Mixes of push and press along the border in the picture.
 const BORDER_POINTS: u32 = 31;
 
@@ -49,6 +49,8 @@ pub struct ForceReport {
     pub lines: Vec<EnvelopeLine>,
     /// Border of pushes (N, along x) and presses (N) at the pole, with what ends each.
     pub border: Vec<([f64; 2], Option<Limit>)>,
+    /// Push and press (N) of each claimed load without a moment.
+    pub claimed_n: Vec<[f64; 2]>,
     /// Frames to average for the design's `accuracy.force_n`, where it gives one.
     pub frames_to_average: Option<u32>,
     /// All of it, for programs.
@@ -82,8 +84,8 @@ struct Claims {
     json: Vec<serde_json::Value>,
     /// Where they put the platform, those that the springs carry.
     poses: Vec<Rigid>,
-    /// The one that presses hardest.
-    hardest: Option<Wrench>,
+    /// Name and wrench of the one that presses hardest, if one presses.
+    hardest: Option<(String, Wrench)>,
 }
 
 fn claims(design: &Design, suspension: &Suspension, limits: &Limits, more: MoreChecks<'_>) -> Claims {
@@ -95,8 +97,9 @@ fn claims(design: &Design, suspension: &Suspension, limits: &Limits, more: MoreC
         let held = case.equilibrium.as_ref().ok();
         found.poses.extend(held.map(|e| e.pose));
         let reached = reach(suspension, limits, more, &Direction { name: claim.name.clone(), wrench });
-        if found.hardest.is_none_or(|h| wrench.force_n.z < h.force_n.z) {
-            found.hardest = Some(wrench);
+        let hardest_n = found.hardest.as_ref().map_or(0.0, |(_, hardest)| hardest.force_n.z);
+        if wrench.force_n.z < hardest_n {
+            found.hardest = Some((claim.name.clone(), wrench));
         }
         found.json.push(json!({
             "name": claim.name,
@@ -143,7 +146,13 @@ pub fn force_report(
 ) -> Result<ForceReport, DesignError> {
     if design.is_rigid() {
         let json = json!({ "mount": "rigid", "status": RIGID });
-        return Ok(ForceReport { lines: Vec::new(), border: Vec::new(), frames_to_average: None, json });
+        return Ok(ForceReport {
+            lines: Vec::new(),
+            border: Vec::new(),
+            claimed_n: Vec::new(),
+            frames_to_average: None,
+            json,
+        });
     }
     let suspension = suspension_of(design)?;
     let limits = limits_of(design);
@@ -156,19 +165,16 @@ pub fn force_report(
     let border = push_press_border(&suspension, &limits, &more, dome.height_mm(), 0.0, BORDER_POINTS);
 
     let Claims { json: claims, poses, hardest } = claims(design, &suspension, &limits, &more);
-    // The paper's measured maximum, checked whether or not the design claims it.
-    let press =
-        Wrench::of_load(DVec3::new(0.0, 0.0, -PAPER_N), DVec3::ZERO, dome.pole_mm(), suspension.at_mm());
-    let paper = try_all(&suspension, &limits, &more, &press);
-    let springs_that_hold =
-        spring_choices(&suspension, &limits, &more, &hardest.filter(|h| h.force_n.z < 0.0).unwrap_or(press));
+    let springs_that_hold = hardest
+        .as_ref()
+        .map_or_else(Vec::new, |(_, press)| spring_choices(&suspension, &limits, &more, press));
     let markers = markers_of(design);
     let at_rest = resolution_at(design.optics(), &markers, noise_px, &suspension, &Rigid::identity());
-    let pressed = paper
-        .equilibrium
-        .as_ref()
-        .ok()
-        .and_then(|e| resolution_at(design.optics(), &markers, noise_px, &suspension, &e.pose));
+    let pressed = hardest.as_ref().and_then(|(name, press)| {
+        let held = try_all(&suspension, &limits, &more, press).equilibrium.ok()?;
+        let found = resolution_at(design.optics(), &markers, noise_px, &suspension, &held.pose)?;
+        Some(json!({ "name": name, "press_n": -press.force_n.z, "resolution": found }))
+    });
     let frames_to_average = frames_to_average(design, noise_px, &suspension, &poses);
     let plain = springs.plain.as_ref().map(|fit| {
         json!({
@@ -197,20 +203,21 @@ pub fn force_report(
             "push_n": p[0], "press_n": p[1], "ended_by": l.map(Limit::as_str),
         })).collect::<Vec<_>>(),
         "claims": claims,
-        "press_17_n": {
-            "held": paper.passed().next().is_none() && paper.equilibrium.is_ok(),
-            "checks": paper.checks.iter().map(check_json).collect::<Vec<_>>(),
-        },
         "spring_choices": springs_that_hold,
         "centroid_noise_px": noise_px.iter().copied().fold(0.0, f64::max),
         "centroid_noise_px_by_marker": noise_px,
         "resolution_at_rest": at_rest,
-        "resolution_at_17_n": pressed,
+        "resolution_under_press": pressed,
         "frames_to_average": frames_to_average,
         "design_choices": design_choices(design.optics(), &markers, noise_px, &suspension),
         "plain_runtime_bias": plain,
     });
-    Ok(ForceReport { lines, border, frames_to_average, json })
+    let at_pole = |claim: &&LoadClaim| {
+        claim.moment_nmm == [0.0; 3] && DVec3::from_array(claim.point_mm).distance(dome.pole_mm()) < 1e-6
+    };
+    let claimed = design.sections().loads.claims.iter().filter(at_pole);
+    let claimed_n = claimed.map(|c| [c.force_n[0].hypot(c.force_n[1]), -c.force_n[2]]).collect();
+    Ok(ForceReport { lines, border, claimed_n, frames_to_average, json })
 }
 
 impl ForceReport {
@@ -225,6 +232,11 @@ impl ForceReport {
         text
     }
 
+    /// The picture of the load envelope.
+    pub fn envelope(&self) -> Chart {
+        envelope_chart(&self.border, &self.claimed_n)
+    }
+
     /// The report's files: path in the build's tree, and content.
     pub fn files(&self) -> Vec<(String, String)> {
         let json = serde_json::to_string_pretty(&self.json).unwrap_or_default() + "\n";
@@ -234,7 +246,7 @@ impl ForceReport {
         vec![
             ("report/force.json".into(), json),
             ("report/load_envelope.csv".into(), self.csv()),
-            ("report/load_envelope.svg".into(), envelope_chart(&self.border, PAPER_N).to_svg()),
+            ("report/load_envelope.svg".into(), self.envelope().to_svg()),
         ]
     }
 }

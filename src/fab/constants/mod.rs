@@ -33,7 +33,7 @@ use domecast_design::{Design, DesignError};
 use domecast_optics::ColorChannel;
 use domecast_runtime::constants::{
     BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, KeyConstants, KeyImageConstants,
-    LayerConstants, MaskConstants, OpticsConstants, VERSION, WhiteMarker,
+    LayerConstants, MaskConstants, OpticsConstants, SpringTolerances, VERSION, WhiteMarker,
 };
 
 /// The constants of a design with its dots.
@@ -113,6 +113,7 @@ pub fn with_springs(
         key: layout.key.as_ref().map(key_of),
         springs: springs.constants.clone(),
         tolerances: Some(priors_of(design)),
+        optics_uncertainty: None,
         calibrations: Vec::new(),
     })
 }
@@ -145,6 +146,14 @@ pub fn priors_of(design: &Design) -> CalibrationPriors {
         black_dot_mm: tolerances.black_dot_mm,
         white_centroid_px: noise.white_centroid_px,
         black_centroid_px: noise.black_centroid_px,
+        camera_drift_mm: tolerances.camera_drift_mm,
+        camera_drift_rad: tolerances.camera_drift_deg.to_radians(),
+        springs: (!design.is_rigid()).then_some(SpringTolerances {
+            wire_diameter_mm: tolerances.wire_diameter_mm,
+            outer_diameter_mm: tolerances.spring_diameter_mm,
+            active_coils: tolerances.active_coils,
+            modulus_part: 0.01 * tolerances.modulus_percent,
+        }),
     }
 }
 

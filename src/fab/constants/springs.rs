@@ -6,7 +6,8 @@ use super::sight::{MarkerSight, markers_of};
 use domecast_design::{Design, DesignError};
 use domecast_design::{limits_of, suspension_of};
 use domecast_runtime::constants::{
-    PlainFit, PlainInput, PosedLoad, SpringConstants, SpringLaw, StiffnessAt, loads_over, rows,
+    PlainFit, PlainInput, PosedLoad, SpringConstants, SpringLaw, SpringTemperature, StiffnessAt, loads_over,
+    rows,
 };
 use domecast_springs::{Suspension, Wrench, try_load};
 
@@ -87,6 +88,12 @@ pub fn springs_of(design: &Design, sight: MarkerSight) -> Result<DesignSprings, 
         stiffness_at,
         law: Some(SpringLaw::of(&suspension, limits_of(design).grip_force_n)),
         offset: None,
+        uncertainty: None,
+        temperature: design.sections().springs.wire.temperature.as_ref().map(|wire| SpringTemperature {
+            at_c: wire.at_c,
+            modulus_per_k: wire.modulus_per_k,
+            modulus_per_k_sd: wire.modulus_per_k_sd,
+        }),
         plain_runtime,
     };
     Ok(DesignSprings { constants: Some(constants), plain, sight })

@@ -3,8 +3,8 @@
 use glam::DVec2;
 use tiny_skia::{IntSize, Pixmap};
 
-use super::levels::{FULL, LightReport, luma};
-use super::rest::{STEP_PX, fault};
+use super::levels::{FULL, LightReport};
+use super::rest::{STEP_PX, fault, luma};
 use crate::artwork::canvas::{color, fill};
 use domecast_design::{Design, DesignError};
 use domecast_sim::light::RestLight;

@@ -3,6 +3,7 @@
 
 use serde_json::json;
 
+use super::edges::ShadowEdges;
 use super::levels::{FULL, LightReport, MarkerLevels};
 use crate::numbers::{percent, typeset};
 use domecast_design::{Cure, Design, DesignError};
@@ -20,6 +21,8 @@ const MAX_SHARE: f64 = 0.005;
 
 /// A paint whiter than this is none.
 const MAX_REFLECTANCE: f64 = 0.9;
+/// A dome whose median is brighter than this is cut off at full scale over too much of it.
+const MAX_MEDIAN_LEVEL: f64 = 200.0;
 /// Lights this many times brighter are other lights.
 const MAX_BRIGHTER: f64 = 1e3;
 
@@ -85,7 +88,8 @@ fn brighter(design: &Design, factor: f64) -> Cure {
 }
 
 /// What makes a marker stand out by what `track` needs and half of that again: surroundings as dark as that asks for;
-/// where none are dark enough, more light if the camera cannot expose longer, and else a whiter paint.
+/// where none are dark enough, more light if the camera cannot expose longer, and else a whiter paint, or an exposure that
+/// cuts off the brightest places of the dome.
 fn seen_by(design: &Design, report: &LightReport, marker: &MarkerLevels) -> Option<Cure> {
     let wanted = 1.5 * MIN_MARKER_RISE_LEVELS;
     let sections = design.sections();
@@ -98,8 +102,28 @@ fn seen_by(design: &Design, report: &LightReport, marker: &MarkerLevels) -> Opti
         return Some(brighter(design, factor));
     }
     let reflectance = factor * sections.white_markers.reflectance;
-    (reflectance <= MAX_REFLECTANCE)
-        .then(|| Cure { field: "white_markers.reflectance".into(), value: json!(round_up(reflectance)) })
+    if reflectance <= MAX_REFLECTANCE {
+        return Some(Cure { field: "white_markers.reflectance".into(), value: json!(round_up(reflectance)) });
+    }
+    // The exposure leaves headroom at the dome's brightest place, which dots do not need: a longer one.
+    let stray = FULL * sections.exposure.stray_level;
+    let longer = (wanted + FULL * sections.exposure.surround_level - stray)
+        / (marker.level - stray).max(f64::MIN_POSITIVE);
+    let level = round_up(longer * report.level_per_mw_mm2);
+    let is_possible = level <= sections.exposure.max_level_per_mw_mm2
+        && longer * report.dome.median_level <= MAX_MEDIAN_LEVEL;
+    is_possible.then(|| Cure { field: "exposure.level_per_mw_mm2".into(), value: json!(level) })
+}
+
+/// What dots on edges of shadows mean; `None` where there are none.
+fn on_edges(edges: ShadowEdges) -> Option<String> {
+    let polar_deg = edges.from_polar_deg.filter(|_| edges.dots > 0)?;
+    let dots = if edges.dots == 1 { "1 dot lies".to_owned() } else { format!("{} dots lie", edges.dots) };
+    Some(format!(
+        "{dots} on the edge of a light's shadow, where `track` may withhold them or put them some tenths of a pixel off: the pattern keeps off \
+         it within {} degrees",
+        typeset(polar_deg.floor())
+    ))
 }
 
 /// What its maker should know.
@@ -144,6 +168,9 @@ pub(super) fn warnings(design: &Design, report: &LightReport) -> Vec<(String, St
                 percent(dome.saturated_share)
             ),
         );
+    }
+    if let Some(message) = report.edges.and_then(on_edges) {
+        warn("pattern.polar_angle_deg", message);
     }
     let contrast = |pick: fn(f64, f64) -> f64, start: f64| {
         report.markers.iter().map(|marker| marker.contrast_levels).fold(start, pick)

@@ -3,15 +3,14 @@
 use glam::DVec2;
 use serde::Serialize;
 
-use super::rest::marker_outlines;
+use super::edges::ShadowEdges;
+use super::rest::{luma, marker_outlines};
 use domecast_design::Design;
 use domecast_design::sections::ExposureSection;
 use domecast_sim::light::RestLight;
 
 /// Full scale of 8 bits.
 pub(super) const FULL: f64 = 255.0;
-/// Weights of red, green and blue in luma (ITU-R BT.601), the grey that `track` reads.
-const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
 /// Width over which the edge of a marker goes from one level to the other in a sharp image, px: the pixel itself and the
 /// lens.
 const EDGE_PX: f64 = 2.2;
@@ -30,6 +29,8 @@ pub struct LightReport {
     pub dome: DomeLevels,
     /// Each white marker.
     pub markers: Vec<MarkerLevels>,
+    /// Edges of the platform's shadows; `None` where the dots cannot be laid out.
+    pub edges: Option<ShadowEdges>,
 }
 
 /// Grey levels of the dome between the dots, inside of the mask.
@@ -67,11 +68,6 @@ pub struct MarkerLevels {
     /// of noise s fixes a shift along x with the information `C^2 / (w s^2)` times the integral of the squared x of its
     /// normal, which is `P / 2` over the two axes' mean.
     pub centroid_sd_px: f64,
-}
-
-/// Grey of a colour.
-pub(super) fn luma(level: [f64; 3]) -> f64 {
-    level.iter().zip(LUMA).map(|(level, weight)| level * weight).sum()
 }
 
 /// The value below which a part of `sorted` lies; NaN where there is none.

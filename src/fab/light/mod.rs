@@ -12,6 +12,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod edges;
 mod frame;
 mod judge;
 mod levels;
@@ -19,9 +20,10 @@ mod rest;
 
 use serde_json::json;
 
-use domecast_design::{Design, DesignError};
+use domecast_design::{Cure, Design, DesignError};
 use domecast_sim::light::RestLight;
 
+pub use edges::ShadowEdges;
 pub use levels::{DomeLevels, LightReport, MarkerLevels};
 use levels::{dome_levels, marker_levels};
 use rest::{fault, pixels, scene};
@@ -49,12 +51,16 @@ fn measure(design: &Design) -> Result<(RestLight, LightReport), DesignError> {
     let light = RestLight::of(&unit, pixels(design)).map_err(fault)?;
     let light = light.filter(|light| light.dome.iter().any(|place| place.level.iter().any(|v| *v > 0.0)));
     let Some(light) = light else {
-        return Err(DesignError::at(
+        let fault = DesignError::at(
             "leds.list",
             json!(design.sections().leds.list),
             "no light reaches the part of the dome that the camera sees",
             "at least one light, with a radiant flux above 0, whose way to the dome is open",
-        ));
+        );
+        // Left out, a rule gives lights.
+        let is_empty = design.sections().leds.list.is_empty();
+        let ruled = Cure { field: "leds.list".into(), value: serde_json::Value::Null };
+        return Err(if is_empty { fault.with_cure(ruled) } else { fault });
     };
     let brightest = light.dome.iter().flat_map(|place| place.level).fold(0.0, f64::max);
     let wanted = exposure.brightest_level / brightest;
@@ -64,6 +70,7 @@ fn measure(design: &Design) -> Result<(RestLight, LightReport), DesignError> {
         is_exposure_at_limit: exposure.level_per_mw_mm2.is_none() && wanted > exposure.max_level_per_mw_mm2,
         dome: dome_levels(&light, level_per_mw_mm2, exposure),
         markers: marker_levels(design, &light, level_per_mw_mm2),
+        edges: None,
     };
     judge::require(design, &report)?;
     Ok((light, report))
@@ -76,7 +83,8 @@ impl LightCheck {
     /// No light, lights that do not fit the design, a dome too dark for `track`, or a white marker that `track` cannot
     /// tell from what is around it.
     pub fn of(design: &Design) -> Result<Self, DesignError> {
-        let (light, report) = measure(design)?;
+        let (light, mut report) = measure(design)?;
+        report.edges = ShadowEdges::of(design, &light);
         let warnings = judge::warnings(design, &report);
         let map_png = frame::map(design, &light, &report)?;
         let lit = scene(design, report.level_per_mw_mm2, design.sections().exposure.stray_level)?;
@@ -95,10 +103,29 @@ impl LightCheck {
     }
 }
 
+impl LightReport {
+    /// The numbers without the pictures.
+    ///
+    /// # Errors
+    /// As [`LightCheck::of`].
+    pub fn of(design: &Design) -> Result<Self, DesignError> {
+        measure(design).map(|(_, report)| report)
+    }
+}
+
+/// Where the design's own lights leave edges of shadows; `None` where its dots cannot be laid out.
+///
+/// # Errors
+/// As [`LightCheck::of`].
+pub fn shadow_edges(design: &Design) -> Result<Option<ShadowEdges>, DesignError> {
+    let (light, _) = measure(design)?;
+    Ok(ShadowEdges::of(design, &light))
+}
+
 /// Standard deviation of each white marker's centroid in an image axis, px, from its contrast in the lit frame.
 ///
 /// # Errors
 /// As [`LightCheck::of`].
 pub fn marker_noise_px(design: &Design) -> Result<Vec<f64>, DesignError> {
-    Ok(measure(design)?.1.markers.iter().map(|marker| marker.centroid_sd_px).collect())
+    Ok(LightReport::of(design)?.markers.iter().map(|marker| marker.centroid_sd_px).collect())
 }

@@ -14,6 +14,14 @@ use domecast_sim::{Scene, SimError};
 /// Places of the image at which the dome's light is looked at are this far apart, px.
 pub(super) const STEP_PX: u32 = 4;
 
+/// Weights of red, green and blue in luma (ITU-R BT.601), the grey that `track` reads.
+const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
+
+/// Grey of a colour.
+pub(super) fn luma(level: [f64; 3]) -> f64 {
+    level.iter().zip(LUMA).map(|(level, weight)| level * weight).sum()
+}
+
 /// The sensor at rest under its lights with an exposure.
 pub(super) fn scene(design: &Design, level_per_mw_mm2: f64, stray_level: f64) -> Result<Scene, DesignError> {
     let exposure = &design.sections().exposure;

@@ -2,17 +2,17 @@
 
 use super::subject::ReportSubject;
 use crate::html::{Html, html, table};
-use crate::numbers::typeset;
+use crate::numbers::dimension;
 use domecast_runtime::constants::{POSE_AXES, SpringConstants, WRENCH_AXES};
 
 fn list(values: &[f64]) -> String {
-    values.iter().map(|v| typeset(*v)).collect::<Vec<_>>().join(", ")
+    values.iter().map(|v| dimension(*v)).collect::<Vec<_>>().join(", ")
 }
 
 /// Camera, white markers, stiffness.
 pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
     let c = subject.constants;
-    let n = typeset;
+    let n = dimension;
     let matrix = |m: &[[f64; 3]; 3]| {
         format!("fx {}, fy {}, cx {}, cy {}", n(m[0][0]), n(m[1][1]), n(m[0][2]), n(m[1][2]))
     };
@@ -51,7 +51,7 @@ fn stiffness(springs: &SpringConstants) -> Html {
     let row = |(axis, row): (&&str, &[f64; 6])| {
         // what rounding leaves beside the diagonal is nothing
         let floor = 1e-12 * row.iter().fold(0.0f64, |a, b| a.max(b.abs()));
-        let cell = |v: &f64| if v.abs() <= floor { "0".into() } else { typeset(*v).into() };
+        let cell = |v: &f64| if v.abs() <= floor { "0".into() } else { dimension(*v).into() };
         std::iter::once(Html::from(*axis)).chain(row.iter().map(cell)).collect()
     };
     let rows: Vec<Vec<Html>> = WRENCH_AXES.iter().zip(&springs.stiffness).map(row).collect();

@@ -54,16 +54,14 @@ pub(super) fn loads(subject: &ReportSubject<'_>) -> Html {
         })
         .collect();
     html!(
-        "<div class=\"row\">\n{}{}</div>\n{}<p>The 17 N of arXiv 2303.03093 on the pole: <strong>{}</strong>.</p>\n\
-         <details><summary>The whole envelope</summary>\n{}</details>\n{}",
+        "<div class=\"row\">\n{}{}</div>\n{}<details><summary>The whole envelope</summary>\n{}</details>\n{}",
         figure(
-            &subject
-                .shown("report/load_envelope.svg", "Pushes and presses at the pole up to the first limit"),
-            "Push and press at the pole, up to the first limit.",
+            &subject.forces.envelope().to_html(),
+            "Push and press at the pole. The shaded loads are carried; each edge is the first limit that ends them. Dots: \
+             claimed loads at the pole.",
         ),
         springs(json),
         claims(json),
-        if json.pointer("/press_17_n").is_some_and(is_held) { "carried" } else { "not carried" },
         table(
             "Each load grows until a limit ends it (N, or N·mm)",
             &["load", "size", "ended by", "part"],
@@ -152,11 +150,15 @@ pub(super) fn resolution(subject: &ReportSubject<'_>) -> Html {
     const WRENCH: [&str; 7] = ["", "Fx, N", "Fy, N", "Fz, N", "Mx, N·mm", "My, N·mm", "Mz, N·mm"];
     const POSE: [&str; 7] = ["", "tx, mm", "ty, mm", "tz, mm", "rx, °", "ry, °", "rz, °"];
     let json = &subject.forces.json;
-    let rest_and_17_n = |what: &str| {
-        [
-            six(json, "at rest", &format!("/resolution_at_rest/{what}")),
-            six(json, "under 17 N", &format!("/resolution_at_17_n/{what}")),
-        ]
+    let pressed = json.pointer("/resolution_under_press").filter(|press| !press.is_null());
+    let at_rest_and_pressed = |what: &str| {
+        let mut rows = vec![six(json, "at rest", &format!("/resolution_at_rest/{what}"))];
+        rows.extend(pressed.map(|press| {
+            let name =
+                format!("under \"{}\" ({} N)", text_at(press, "/name"), typeset(at(press, "/press_n")));
+            six(press, &name, &format!("/resolution/{what}"))
+        }));
+        rows
     };
     let weak: Vec<&str> =
         list(json, "/resolution_at_rest/weak_axes").iter().filter_map(Value::as_str).collect();
@@ -178,8 +180,8 @@ pub(super) fn resolution(subject: &ReportSubject<'_>) -> Html {
         "<p>One standard deviation of a single frame, with white centroids known to {} px by their contrast in the lit frame: no estimate from the centroids \
          does better (Cramér-Rao).</p>\n{}{}<p>Weak axes: {}. Condition number {} (with a lever of {} mm).</p>\n{}{}",
         typeset(at(json, "/centroid_noise_px")),
-        table("Wrench", &WRENCH, &rest_and_17_n("wrench_sd")),
-        table("Pose", &POSE, &rest_and_17_n("pose_sd")),
+        table("Wrench", &WRENCH, &at_rest_and_pressed("wrench_sd")),
+        table("Pose", &POSE, &at_rest_and_pressed("pose_sd")),
         weak.join(", "),
         typeset(at(json, "/resolution_at_rest/condition")),
         typeset(at(json, "/resolution_at_rest/lever_mm")),

@@ -2,7 +2,7 @@
 
 use super::subject::ReportSubject;
 use crate::html::{Html, html};
-use crate::numbers::typeset;
+use crate::numbers::dimension;
 use domecast_design::parts::Part;
 use domecast_design::sections::LedColor;
 
@@ -49,7 +49,7 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
 
 fn printing_and_casting(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
     let s = subject.design.sections();
-    let n = typeset;
+    let n = dimension;
     let dome_ml = s.dome.shape().volume_mm3() / 1000.0;
     let printed = subject.parts.iter().filter(|part| part.name != "acrylic_sheet");
     let grams = |part: &Part| part.volume_mm3 / 1000.0 * s.process.density_g_per_cm3;
@@ -130,7 +130,7 @@ fn printing_and_casting(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
 
 fn dots_and_assembly(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
     let s = subject.design.sections();
-    let n = typeset;
+    let n = dimension;
     let springs = subject.design.springs_at_mm().len();
     vec![
         step("Print the dots", dots_text(subject)),
@@ -187,13 +187,22 @@ fn dots_and_assembly(subject: &ReportSubject<'_>) -> Vec<MakingStep> {
 
 fn camera_text(subject: &ReportSubject<'_>) -> Html {
     let s = subject.design.sections();
-    let n = typeset;
+    let n = dimension;
+    let exit = &s.platforms.lower.cable_exit;
+    let down = match exit.width_mm > 0.0 && exit.height_mm > 0.0 {
+        true => Html::default(),
+        false => html!(
+            " The cable leaves straight down: leave it a hole of {} mm or more in what the sensor stands on.",
+            n(s.camera_body.cable_diameter_mm),
+        ),
+    };
     match &s.camera_body.board {
         None => html!(
             "Push the camera in from below until its front stands {} mm above the entrance pupil's place at z = {} mm, and \
-             clamp it. Image axes are the sensor's axes.",
+             clamp it. Image axes are the sensor's axes.{}",
             n(s.camera_body.front_from_pupil_mm),
             n(s.camera.position_mm[2]),
+            down,
         ),
         Some(board) => html!(
             "Lay the board into its pocket from below, the lens barrel in the bore, and screw it against its {} posts. The \
@@ -220,14 +229,14 @@ fn dots_text(subject: &ReportSubject<'_>) -> Html {
         films,
         if films == 1 { "" } else { "s" },
         file("artwork/dots.pdf"),
-        typeset(s.print.dpi.into()),
+        dimension(s.print.dpi.into()),
     );
     for (index, pass) in subject.layout.passes.iter().enumerate().filter(|_| films > 1) {
         text += html!(
             " Film {}: tilt {}°, towards {}°.",
             index + 1,
-            typeset(pass.tilt_rad.to_degrees()),
-            typeset(pass.azimuth_rad.to_degrees())
+            dimension(pass.tilt_rad.to_degrees()),
+            dimension(pass.azimuth_rad.to_degrees())
         );
     }
     text + html!(
@@ -247,19 +256,19 @@ fn lights_text(subject: &ReportSubject<'_>) -> Html {
     let list: Vec<String> = leds
         .list
         .iter()
-        .map(|led| format!("{} at {}°", named(led.color), typeset(led.azimuth_deg)))
+        .map(|led| format!("{} at {}°", named(led.color), dimension(led.azimuth_deg)))
         .collect();
     html!(
         "{} boards of {} × {} mm into their pits at {}° to the base: {}. Over each light a {} × {} mm piece of diffuser \
          tape, {} mm thick, of its colour. Wires leave through the {} mm holes.",
         leds.list.len(),
-        typeset(leds.board_mm[0]),
-        typeset(leds.board_mm[1]),
-        typeset(leds.tilt_deg),
+        dimension(leds.board_mm[0]),
+        dimension(leds.board_mm[1]),
+        dimension(leds.tilt_deg),
         list.join(", "),
-        typeset(leds.package_mm[0]),
-        typeset(leds.package_mm[1]),
-        typeset(leds.diffuser_thickness_mm),
-        typeset(leds.wire_hole_diameter_mm),
+        dimension(leds.package_mm[0]),
+        dimension(leds.package_mm[1]),
+        dimension(leds.diffuser_thickness_mm),
+        dimension(leds.wire_hole_diameter_mm),
     )
 }

@@ -22,7 +22,7 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Option<Html> {
     for sweep in all["ladders"].as_array()? {
         rows.push(row(sweep));
         let (name, title) = (word(&sweep["name"]), word(&sweep["title"]));
-        let shown = subject.shown(&format!("{MEASURED}/{name}.svg"), &format!("{title}: error over time"));
+        let shown = subject.drawn(&format!("{MEASURED}/{name}.svg"), &format!("{title}: error over time"));
         if !shown.is_empty() {
             pictures += figure(&shown, title);
         }
@@ -39,18 +39,15 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Option<Html> {
     };
     Some(html!(
         "<p>Measured on {0}, {1} threads, {2}{3}. Each picture has the error over the time; \
-         <a href=\"../{4}/index.html\">all samples and the error budgets</a>.</p>\n<div class=\"row wide\">\n{5}</div>\n{6}{7}",
+         <a href=\"../{4}/index.html\">all samples and the error budgets</a>.</p>\n<div class=\"row wide\">\n{5}</div>\n\
+         <details><summary>What is in use, and what would be enough</summary>{6}</details>\n{7}",
         word(&machine["processor"]),
         machine["threads"].to_string(),
         word(&machine["system"]),
         if all["quick"].as_bool() == Some(true) { ", a quick look with few runs" } else { "" },
         MEASURED,
         pictures,
-        table(
-            "What is in use, and what would be enough",
-            &["setting", "in use", "error", "time", "asked", "fastest that is enough"],
-            &rows,
-        ),
+        table("", &["setting", "in use", "error", "time", "asked", "fastest that is enough"], &rows,),
         all["budgets"].as_array().into_iter().flatten().map(budget).collect::<Html>(),
     ))
 }

@@ -16,11 +16,13 @@ mod forces;
 mod light;
 mod making;
 mod measured;
+mod overlay;
 mod page;
 mod parts;
 mod pattern;
 pub mod section;
 mod subject;
+mod verdict;
 mod watch;
 
 pub use making::{MakingStep, making_steps};

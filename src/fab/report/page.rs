@@ -1,9 +1,14 @@
 //! The page: what is to be seen first, then a chapter for each subject.
 
+use std::io::Write as _;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
 use super::subject::ReportSubject;
-use super::{constants, forces, light, making, measured, parts, pattern, section};
-use crate::html::{Html, base64, figure, html, table};
-use crate::numbers::{percent, typeset};
+use super::{constants, forces, light, making, measured, overlay, parts, pattern, section, verdict};
+use crate::html::{Html, STYLE, base64, figure, html, table};
+use crate::numbers::{dimension, typeset};
 use domecast_optics::DomeShape;
 
 /// A chapter of the page.
@@ -44,53 +49,49 @@ pub fn page(subject: &ReportSubject<'_>) -> Html {
     html!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
          content=\"width=device-width, initial-scale=1\">\n<title>{0} – domecast</title>\n<link rel=\"icon\" \
-         href=\"data:,\">\n<style>\n{1}</style>\n</head>\n<body>\n<a class=\"skip\" href=\"#warnings\">To the \
+         href=\"data:,\">\n<style>\n{1}</style>\n</head>\n<body>\n<a class=\"skip\" href=\"#verdict\">To the \
          content</a>\n<header>\n<h1>{0}</h1>\n{2}<p class=\"soft\">Design <a href=\"../design.json\"><code>{3}</code></a>, \
          domecast {4}</p>\n<nav aria-label=\"Chapters\"><ul>\n{5}</ul></nav>\n</header>\n<main>\n{6}{7}{8}</main>\n\
          <footer><p>Lengths mm, angles degrees, forces N, pixels px. Made by domecast from the design (and the \
          measurement, where one is shown) alone: the same design gives the same page.</p></footer>\n{9}</body>\n</html>\n",
         subject.design.name(),
-        Html::trusted(include_str!("style.css")),
+        Html::trusted(STYLE),
         description.map_or_else(Html::default, |text| html!("<p>{}</p>\n", text)),
         subject.hash.chars().take(12).collect::<String>(),
         env!("CARGO_PKG_VERSION"),
         links.collect::<Html>(),
-        warnings(subject),
+        verdict::verdict(subject),
         key_figures(subject),
         sections.collect::<Html>(),
         viewer(subject),
     )
 }
 
+/// The bytes gzipped (RFC 1952), which a browser's `DecompressionStream` opens; without a time, so that the same bytes give the same.
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    // writing to a Vec cannot fail
+    let _ = encoder.write_all(bytes);
+    encoder.finish().unwrap_or_default()
+}
+
 /// The assembly and the script that shows it.
 fn viewer(subject: &ReportSubject<'_>) -> Html {
     subject.file("parts/assembly.glb").map_or_else(Html::default, |bytes| {
         html!(
-            "<script type=\"application/octet-stream\" id=\"assembly\">{}</script>\n<script>\n{}</script>\n",
-            base64(bytes),
+            "<script type=\"application/gzip\" id=\"assembly\">{}</script>\n<script type=\"application/json\" \
+             id=\"overlay\">{}</script>\n<script>\n{}</script>\n",
+            base64(&gzip(bytes)),
+            // numbers and fixed names only: nothing that could end the element
+            Html::trusted(overlay::overlay(subject).to_string()),
             Html::trusted(include_str!("viewer.js")),
         )
     })
 }
 
-fn warnings(subject: &ReportSubject<'_>) -> Html {
-    let count = subject.warnings.len();
-    if count == 0 {
-        return Html::trusted("<section id=\"warnings\"><p class=\"fine\">No warnings.</p></section>\n");
-    }
-    let lines =
-        subject.warnings.iter().map(|(field, text)| html!("<li><code>{}</code> {}</li>\n", field, text));
-    html!(
-        "<section id=\"warnings\"><h2>{} warning{}</h2><ul class=\"warnings\">\n{}</ul></section>\n",
-        count,
-        if count == 1 { "" } else { "s" },
-        lines.collect::<Html>(),
-    )
-}
-
 /// The dome's size in words.
 fn dome_size(dome: &DomeShape) -> String {
-    let n = typeset;
+    let n = dimension;
     let round = |mm: f64| n((1e3 * mm).round() / 1e3);
     let (wide, radius) = (round(2.0 * dome.rim_radius_mm()), n(dome.radius_mm()));
     match dome.center_z_mm() {
@@ -105,25 +106,22 @@ fn dome_size(dome: &DomeShape) -> String {
 
 fn key_figures(subject: &ReportSubject<'_>) -> Html {
     let s = subject.design.sections();
-    let n = typeset;
+    let n = dimension;
     let mut entries = vec![
         ("Dots", subject.layout.dots.len().to_string()),
         ("Dome", dome_size(&s.dome.shape())),
         ("Envelope", s.envelope.size_mm.map(n).join(" × ") + " mm"),
         ("Air gap at rest", format!("{} mm", n(subject.design.optics().air_gap_mm()))),
-        ("Largest field angle", format!("{}°", n(subject.constants.camera.max_field_angle_rad.to_degrees()))),
+        (
+            "Largest field angle",
+            format!("{}°", typeset(subject.constants.camera.max_field_angle_rad.to_degrees())),
+        ),
     ];
-    if let Some(coverage) = subject.judged.coverage.first().and_then(|record| record.coverage.as_ref()) {
-        entries.push(("Dome inside the mask at rest", percent(coverage.in_mask)));
-    }
-    let rays = subject.sight.iter().flat_map(|pose| &pose.counts);
-    let (traced, blocked) = rays.fold((0, 0), |(t, b), count| (t + count.traced, b + count.blocked));
-    entries.push(("Rays of the image blocked by a part", format!("{blocked} of {traced} traced")));
     if let Some(springs) = &subject.constants.springs {
-        entries.push(("Stiffness Fz", format!("{} N/mm", n(springs.stiffness[2][2]))));
+        entries.push(("Stiffness Fz", format!("{} N/mm", typeset(springs.stiffness[2][2]))));
     }
     if let Some(press) = subject.forces.lines.iter().find(|line| line.load == "press") {
-        entries.push(("Straight press", format!("{} N", n(press.size))));
+        entries.push(("Straight press", format!("{} N", typeset(press.size))));
     }
     let entry = |(name, value): &(&str, String)| html!("<div><dt>{}</dt><dd>{}</dd></div>\n", name, value);
     html!("<dl class=\"glance\">\n{}</dl>\n", entries.iter().map(entry).collect::<Html>())
@@ -131,9 +129,10 @@ fn key_figures(subject: &ReportSubject<'_>) -> Html {
 
 fn sensor(subject: &ReportSubject<'_>) -> Html {
     let row = |layer: &domecast_runtime::constants::LayerConstants| {
-        let index = layer.index_rgb.map_or_else(|| typeset(layer.index), |rgb| rgb.map(typeset).join(" / "));
+        let index =
+            layer.index_rgb.map_or_else(|| dimension(layer.index), |rgb| rgb.map(dimension).join(" / "));
         let thickness =
-            layer.thickness_mm.map_or_else(|| "fills the dome".into(), |t| format!("{} mm", typeset(t)));
+            layer.thickness_mm.map_or_else(|| "fills the dome".into(), |t| format!("{} mm", dimension(t)));
         vec![layer.name.as_str().into(), thickness.into(), index.into()]
     };
     let rows: Vec<Vec<Html>> = subject.constants.optics.layers.iter().map(row).collect();
@@ -147,15 +146,19 @@ fn sensor(subject: &ReportSubject<'_>) -> Html {
 
 fn files(subject: &ReportSubject<'_>) -> Html {
     let line = |(path, bytes): &(&str, &[u8])| {
-        let kb = typeset((bytes.len() as f64 / 100.0).round() / 10.0);
+        let kb = dimension((bytes.len() as f64 / 100.0).round() / 10.0);
         html!(
             "<li><a href=\"../{0}\"><code>{0}</code></a> <span class=\"soft\">{1} kB</span></li>\n",
             path,
             kb
         )
     };
+    let left_out = subject.formats_left_out.iter().map(|text| html!("<p>Not written: {}.</p>\n", text));
     html!(
-        "<ul>\n{}<li><a href=\"../manifest.json\"><code>manifest.json</code></a></li>\n</ul>\n",
+        "{}<details><summary>{} files</summary><ul>\n{}<li><a href=\"../manifest.json\"><code>manifest.json</code></a></li>\n\
+         </ul></details>\n",
+        left_out.collect::<Html>(),
+        subject.files.len() + 1,
         subject.files.iter().map(line).collect::<Html>(),
     )
 }

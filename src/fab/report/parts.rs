@@ -2,7 +2,7 @@
 
 use super::subject::ReportSubject;
 use crate::html::{Html, figure, html, table};
-use crate::numbers::typeset;
+use crate::numbers::dimension;
 
 /// The assembly to turn, a picture and a line for each part.
 pub(super) fn parts(subject: &ReportSubject<'_>) -> Html {
@@ -10,7 +10,7 @@ pub(super) fn parts(subject: &ReportSubject<'_>) -> Html {
     let mut rows = Vec::new();
     for part in subject.parts {
         let name = part.name.replace('_', " ");
-        pictures += figure(&subject.shown(&format!("report/{}.png", part.name), &name), &name);
+        pictures += figure(&subject.drawn(&format!("report/{}.png", part.name), &name), &name);
         let size = part.bounds.max_mm - part.bounds.min_mm;
         let links = ["stl", "3mf", "step", "dxf", "svg"]
             .iter()
@@ -19,9 +19,9 @@ pub(super) fn parts(subject: &ReportSubject<'_>) -> Html {
             .map(|(kind, path)| html!("<a href=\"../{}\">{}</a> ", path, kind));
         rows.push(vec![
             name.into(),
-            size.to_array().map(typeset).join(" × ").into(),
-            typeset(part.volume_mm3).into(),
-            typeset(part.area_mm2).into(),
+            size.to_array().map(dimension).join(" × ").into(),
+            dimension(part.volume_mm3).into(),
+            dimension(part.area_mm2).into(),
             html!("{}", part.genus),
             html!("{}", part.mesh.triangles.len()),
             links.collect(),
@@ -32,8 +32,8 @@ pub(super) fn parts(subject: &ReportSubject<'_>) -> Html {
          turn it, plus and minus zoom\"></canvas><div data-still>{}{}</div><label>closed <input type=\"range\" \
          min=\"0\" max=\"100\" value=\"60\" aria-label=\"How far the assembly is exploded\"> exploded</label><fieldset>\
          <legend class=\"soft\">Shown</legend></fieldset></div>\n<div class=\"row\">\n{}</div>\n{}",
-        subject.shown("report/assembly-closed.png", "The assembly, closed"),
-        subject.shown("report/assembly-exploded.png", "The assembly, exploded"),
+        subject.drawn("report/assembly-closed.png", "The assembly, closed"),
+        subject.drawn("report/assembly-exploded.png", "The assembly, exploded"),
         pictures,
         table(
             "Parts",
@@ -46,7 +46,7 @@ pub(super) fn parts(subject: &ReportSubject<'_>) -> Html {
 /// Play of every fit, and the limits of the process.
 pub(super) fn fits(subject: &ReportSubject<'_>) -> Html {
     let s = subject.design.sections();
-    let n = typeset;
+    let n = dimension;
     let pocket = s.magnets.diameter_mm + s.magnet_pockets.diameter_clearance_mm;
     let fits = [
         ("magnet in its pocket", s.magnets.diameter_mm, pocket, "magnet_pockets.diameter_clearance_mm"),

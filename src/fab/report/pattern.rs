@@ -7,7 +7,7 @@ use crate::numbers::{percent, typeset};
 use domecast_design::layout::evenness::Evenness;
 
 /// Larger drawings of dots stand beside the page, not in it: they would make it heavy.
-const MAX_INLINE_BYTES: usize = 1_500_000;
+const MAX_INLINE_BYTES: usize = 300_000;
 /// Dots left out that are listed one by one.
 const MAX_LISTED: usize = 200;
 
@@ -15,7 +15,7 @@ const MAX_LISTED: usize = 200;
 pub(super) fn dots(subject: &ReportSubject<'_>) -> Html {
     let judged = subject.judged;
     let film = if subject.file("artwork/dots.svg").is_some_and(|bytes| bytes.len() <= MAX_INLINE_BYTES) {
-        subject.shown("artwork/dots.svg", "The film for the pad printer")
+        subject.drawn("artwork/dots.svg", "The film for the pad printer")
     } else {
         html!("<p>The film is large: <a href=\"../artwork/dots.svg\">artwork/dots.svg</a>.</p>")
     };
@@ -26,13 +26,13 @@ pub(super) fn dots(subject: &ReportSubject<'_>) -> Html {
     ];
     html!(
         "<div class=\"row\">\n{}{}{}</div>\n<p>{} dots, {} px apart, {} to {} mm across on the dome, from {} film{}.</p>\n\
-         <div class=\"row\">\n{}</div>\n{}{}{}",
+         {}<div class=\"row\">\n{}</div>\n{}{}{}",
         figure(
             &subject.shown("artwork/camera-view.png", "The dots and white markers in the camera's view"),
             "In the camera's view (raw image).",
         ),
         figure(
-            &subject.shown("artwork/outside-view.png", "The dots on the dome from outside"),
+            &subject.drawn("artwork/outside-view.png", "The dots on the dome from outside"),
             "On the dome, from outside.",
         ),
         figure(&film, "On the film, as the pad takes it."),
@@ -42,6 +42,7 @@ pub(super) fn dots(subject: &ReportSubject<'_>) -> Html {
         typeset(judged.dot_diameter_mm[1]),
         judged.passes.len(),
         if judged.passes.len() == 1 { "" } else { "s" },
+        spacing(subject),
         charts.iter().flatten().map(crate::chart::Chart::to_html).collect::<Html>(),
         evenness(subject),
         tolerances(subject),
@@ -101,6 +102,20 @@ fn nearest(subject: &ReportSubject<'_>, place: Place) -> Vec<f64> {
                 .min_by(f64::total_cmp)
         })
         .collect()
+}
+
+/// What the histograms below it show.
+fn spacing(subject: &ReportSubject<'_>) -> Html {
+    let Some(report) = &subject.judged.evenness else { return Html::default() };
+    let on_film = report.plate_mm.as_ref().map_or_else(String::new, |plate| {
+        format!(" and by {} on the film", percent(plate.nearest.variation))
+    });
+    html!(
+        "<p>Each dot's distance to its nearest neighbour varies by {} in the image, and therefore by {} on the dome{}:</p>\n",
+        percent(report.image_px.nearest.variation),
+        percent(report.dome_mm.nearest.variation),
+        on_film,
+    )
 }
 
 fn evenness(subject: &ReportSubject<'_>) -> Html {
@@ -198,5 +213,6 @@ pub(super) fn coverage(subject: &ReportSubject<'_>) -> Html {
             row
         })
         .collect();
-    table("Share of the dome's area that is seen through the layers", &HEADS, &rows)
+    let notes = subject.design.notes().iter().map(|note| html!("<p>{}.</p>\n", note));
+    notes.collect::<Html>() + table("Share of the dome's area that is seen through the layers", &HEADS, &rows)
 }

@@ -18,7 +18,7 @@ use std::fmt::Write as _;
 use glam::{DVec2, DVec3};
 
 use crate::html::{AsHtml, Html};
-use crate::numbers::typeset;
+use crate::numbers::dimension;
 use domecast_design::Design;
 use domecast_design::parts::{Assembly, AssemblyItem};
 use domecast_mesh::{CuttingPlane, RayTarget};
@@ -290,7 +290,7 @@ fn dimensions(design: &Design, low: DVec3, high: DVec3) -> String {
             "<path class=\"dimension\" d=\"M{from:.3} {a:.3}H{x:.3}M{from:.3} {b:.3}H{x:.3}M{x:.3} {a:.3}V{b:.3}\
              M{l:.3} {a0:.3}L{r:.3} {a1:.3}M{l:.3} {b0:.3}L{r:.3} {b1:.3}\"/><text x=\"{beside:.3}\" y=\"{middle:.3}\" \
              font-size=\"{size:.3}\" text-anchor=\"middle\" transform=\"rotate(-90 {beside:.3} {middle:.3})\">{}</text>",
-            AsHtml(format!("{what} {}", typeset(value)).as_str()),
+            AsHtml(format!("{what} {}", dimension(value)).as_str()),
             a = -z[0],
             b = -z[1],
             l = x - tick,
@@ -331,7 +331,7 @@ fn dimensions(design: &Design, low: DVec3, high: DVec3) -> String {
         high.x + tick,
         0.5 * (low.x + high.x),
         y - 0.4 * size,
-        AsHtml(format!("width {} (mm)", typeset(high.x - low.x)).as_str()),
+        AsHtml(format!("width {} (mm)", dimension(high.x - low.x)).as_str()),
     );
     art
 }

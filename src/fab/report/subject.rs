@@ -1,13 +1,18 @@
 //! What the page is made from.
 
+use tiny_skia::Pixmap;
+
 use crate::constants::ForceReport;
-use crate::html::{Html, picture};
+use crate::html::{Html, html, picture};
 use crate::light::LightReport;
 use domecast_design::Design;
 use domecast_design::layout::Layout;
 use domecast_design::layout::report::LayoutReport;
 use domecast_design::parts::{Assembly, Part, PoseSight};
 use domecast_runtime::constants::Constants;
+
+/// Pictures in the page are at most this wide, px: twice what a column of it shows.
+const MAX_SHOWN_WIDTH: u32 = 1000;
 
 /// What the page is made from.
 #[derive(Clone, Copy)]
@@ -34,6 +39,8 @@ pub struct ReportSubject<'a> {
     pub poses: &'a [String],
     /// Field and message of each warning.
     pub warnings: &'a [(String, String)],
+    /// What no file could be written for, and why.
+    pub formats_left_out: &'a [String],
     /// SHA-256 of the design file.
     pub hash: &'a str,
     /// The files of the build so far, by path.
@@ -48,7 +55,48 @@ impl ReportSubject<'_> {
 
     /// A picture of the build, in the page.
     pub(super) fn shown(&self, path: &str, alt: &str) -> Html {
-        let mime = if path.ends_with(".svg") { "image/svg+xml" } else { "image/png" };
-        self.file(path).map_or_else(Html::default, |bytes| picture(mime, bytes, alt))
+        self.picture(path, alt, "")
     }
+
+    /// A picture on white, which a dark page may turn.
+    pub(super) fn drawn(&self, path: &str, alt: &str) -> Html {
+        self.picture(path, alt, "paper")
+    }
+
+    fn picture(&self, path: &str, alt: &str, class: &str) -> Html {
+        let Some(bytes) = self.file(path) else { return Html::default() };
+        if path.ends_with(".svg") {
+            return picture("image/svg+xml", bytes, alt, class);
+        }
+        match smaller(bytes) {
+            Some(small) => {
+                html!("<a href=\"../{}\">{}</a>", path, picture("image/png", &small, alt, class))
+            }
+            None => picture("image/png", bytes, alt, class),
+        }
+    }
+}
+
+/// A PNG that is wider than the page shows it, with means of its pixels; `None` where it is no wider, or no PNG.
+fn smaller(png: &[u8]) -> Option<Vec<u8>> {
+    // width and height stand at fixed places of a PNG's header
+    let width = u32::from_be_bytes(png.get(16..20)?.try_into().ok()?);
+    let step = width.div_ceil(MAX_SHOWN_WIDTH);
+    if step < 2 {
+        return None;
+    }
+    let whole = Pixmap::decode_png(png).ok()?;
+    let (wide, tall) = (whole.width() / step, whole.height() / step);
+    let mut small = Pixmap::new(wide, tall)?;
+    for (index, pixel) in small.data_mut().chunks_exact_mut(4).enumerate() {
+        let (x, y) = (index as u32 % wide * step, index as u32 / wide * step);
+        for (channel, value) in pixel.iter_mut().enumerate() {
+            let under = (0..step * step).map(|k| (x + k % step, y + k / step));
+            let sum: u32 = under
+                .map(|(x, y)| u32::from(whole.data()[4 * (y * whole.width() + x) as usize + channel]))
+                .sum();
+            *value = (sum / (step * step)) as u8;
+        }
+    }
+    small.encode_png().ok()
 }

@@ -130,6 +130,23 @@ impl DomeShape {
         sphere.with_z(sphere.z + self.center_z_mm)
     }
 
+    /// [`DomeShape::point_mm`]'s meridian for a point near the face; below the rim that of the rim.
+    pub fn meridian_rad(&self, point_mm: DVec3) -> f64 {
+        let up_mm = point_mm.z - self.center_z_mm;
+        let meridian_rad = if self.center_z_mm > 0.0 && up_mm < 0.0 {
+            FRAC_PI_2 - up_mm / self.radius_mm
+        } else {
+            point_mm.truncate().length().atan2(up_mm)
+        };
+        meridian_rad.clamp(0.0, self.meridian_end_rad())
+    }
+
+    /// Distance of the face from the axis at a length of the meridian over the sphere's radius, mm.
+    pub fn ring_radius_mm(&self, meridian_rad: f64) -> f64 {
+        let on_wall = self.center_z_mm > 0.0 && meridian_rad > FRAC_PI_2;
+        if on_wall { self.radius_mm } else { self.radius_mm * meridian_rad.sin() }
+    }
+
     /// Height above the sphere's centre over the radius at the rim: 1 is the pole. Equal steps of it bound equal areas,
     /// on the cylinder as on the sphere (Archimedes).
     pub fn rim_level(&self) -> f64 {
@@ -158,6 +175,15 @@ impl DomeShape {
         let outward = self.outward_mm(point_mm);
         let length = outward.length();
         if length == 0.0 { self.pole_mm() } else { point_mm - outward + outward * (self.radius_mm / length) }
+    }
+
+    /// [`DomeShape::onto`], and the rim for what would lie below the sheet's top: the point of the dome nearest to a point.
+    pub fn nearest_mm(&self, point_mm: DVec3) -> DVec3 {
+        let at_mm = self.onto(point_mm);
+        if at_mm.z >= 0.0 {
+            return at_mm;
+        }
+        (point_mm.truncate().normalize_or(DVec2::X) * self.rim_radius_mm()).extend(0.0)
     }
 
     /// Distance of a point above the sheet from the face: negative within, mm.

@@ -21,6 +21,7 @@ mod plain_pnp;
 mod refit;
 mod sensor;
 mod stiffness;
+mod uncertainty;
 
 pub use error::ConstantsError;
 pub use law::{MagnetLaw, SpringLaw, SpringLawEnds};
@@ -34,6 +35,10 @@ pub use plain::{Bias, PlainFit};
 pub use plain_input::{PlainError, PlainInput};
 pub use plain_pnp::PlainRuntimeSolver;
 pub use stiffness::{matrix_of, rows, stiffness_between, wrench_by_table};
+pub use uncertainty::{
+    AxisUncertainty, OpticsUncertainty, SpringTemperature, SpringTolerances, SpringUncertainty,
+};
+pub(crate) use uncertainty::{body_numbers, shift_body, shift_lens};
 
 /// Bytes at most that are read of a file.
 const MAX_FILE_BYTES: u64 = 1 << 24;

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::law::SpringLaw;
+use super::uncertainty::{OpticsUncertainty, SpringTemperature, SpringTolerances, SpringUncertainty};
 use domecast_optics::DomeShape;
 
 /// Marks the file for readers.
@@ -44,6 +45,9 @@ pub struct Constants {
     /// How far the built sensor may be off these numbers: the priors of `calibrate-optics`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerances: Option<CalibrationPriors>,
+    /// What `calibrate-optics` left open; until then the tolerances stand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub optics_uncertainty: Option<OpticsUncertainty>,
     /// What calibrations say of the numbers that they measured, one entry each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub calibrations: Vec<serde_json::Value>,
@@ -69,6 +73,15 @@ pub struct CalibrationPriors {
     pub white_centroid_px: f64,
     /// A black dot's.
     pub black_centroid_px: f64,
+    /// How far the camera moves in its mount after a calibration, on each axis, mm.
+    #[serde(default)]
+    pub camera_drift_mm: f64,
+    /// How far it turns, about each axis, rad.
+    #[serde(default)]
+    pub camera_drift_rad: f64,
+    /// The springs as they are bought.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub springs: Option<SpringTolerances>,
 }
 
 /// The camera.
@@ -237,6 +250,12 @@ pub struct SpringConstants {
     /// The wrench that a calibration's reference showed at rest; it is no part of `stiffness`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset: Option<[f64; 6]>,
+    /// What `calibrate-force` left open; until then the tolerances stand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<SpringUncertainty>,
+    /// How the stiffness follows the temperature, where the design says it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<SpringTemperature>,
     /// For a runtime that runs plain solvePnP on the apparent positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plain_runtime: Option<PlainRuntime>,

@@ -62,6 +62,7 @@ mod error;
 mod frame;
 mod identities;
 mod marks;
+mod meter;
 mod model;
 mod options;
 mod pose;
@@ -74,12 +75,13 @@ pub use frame::{CameraFrame, FrameFault, Undistorted};
 pub use identities::{CameraTurn, MAX_FALSE_DOTS};
 pub use marks::MarkState;
 pub(crate) use marks::marker_in_still;
+pub use meter::{MarkerCentroid, MeasuredWrench, WrenchMeter};
 pub use options::{
     Channel, FollowMethod, MIN_MARKER_RISE_LEVELS, Reference, Steps, Thresholds, TrackOptions,
 };
 pub use report::{
-    CSV_HEADER, DOTS_CSV_HEADER, DotResult, MarkerResult, Problem, Problems, Tracked, write_csv,
-    write_dots_csv, write_json,
+    CSV_HEADER, DOTS_CSV_HEADER, DotResult, Field, MarkerResult, Problem, Problems, Tracked, write_csv,
+    write_dots_csv, write_json, write_json_fields,
 };
 #[cfg(feature = "overlay")]
 pub use report::{OverlayError, overlay_png};

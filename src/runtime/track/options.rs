@@ -97,6 +97,8 @@ pub struct TrackOptions {
     /// By how much the picture is known to be turned against the constants' camera, from image x towards image y, rad:
     /// the camera was mounted so. With a number, 0 too, the key is not asked whether it is sure.
     pub camera_turned_rad: Option<f64>,
+    /// Temperature of the springs, degrees C, where it is known; `None`: that of the constants' stiffness.
+    pub temperature_c: Option<f64>,
 }
 
 impl Default for TrackOptions {
@@ -112,6 +114,7 @@ impl Default for TrackOptions {
             max_misplaced: 0.5,
             search_every: 30,
             camera_turned_rad: None,
+            temperature_c: None,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The stages in their order, frame by frame.
 
 use glam::{DVec2, DVec3};
+use nalgebra::Matrix6;
 
 use super::error::TrackError;
 use super::frame::{CameraFrame, ExposureMeter, Plane, sharpness};
@@ -9,7 +10,7 @@ use super::model::SensorModel;
 use super::options::{Thresholds, TrackOptions};
 use super::pose::PoseFinder;
 use super::report::{FrameFindings, Problem, Reporter, Tracked};
-use super::wrench::{DotDisplacements, Springs, WrenchEstimate};
+use super::wrench::{DotDisplacements, Springs, WrenchEstimator};
 use crate::constants::Constants;
 use domecast_optics::SensorOptics;
 
@@ -25,13 +26,14 @@ const MAX_GATE: f64 = 1e6;
 pub struct Tracker {
     options: TrackOptions,
     model: SensorModel,
-    springs: Option<Springs>,
+    wrench: WrenchEstimator,
     exposure: ExposureMeter,
     markers: MarkerIdentities,
     pose: PoseFinder,
     dots: DotIdentities,
     displacements: DotDisplacements,
     report: Reporter,
+    time_s: Option<f64>,
 }
 
 impl Tracker {
@@ -46,18 +48,19 @@ impl Tracker {
         }
         let turned = options.camera_turned_rad.map(|turned_rad| turned(constants, turned_rad)).transpose()?;
         let constants = turned.as_ref().unwrap_or(constants);
-        let springs = constants.springs.as_ref().map(Springs::new).transpose()?;
-        let at_mm = springs.as_ref().map_or(DVec3::ZERO, Springs::at_mm);
+        let at_mm = constants.springs.as_ref().map_or(DVec3::ZERO, |s| DVec3::from_array(s.at_mm));
         let model = SensorModel::new(constants, options.max_residual_px, at_mm)?;
+        let wrench = WrenchEstimator::new(constants, &model.optics, options.temperature_c)?;
         let size = [constants.camera.width as usize, constants.camera.height as usize];
         Ok(Self {
             exposure: ExposureMeter::default(),
             markers: MarkerIdentities::new(model.markers.all.len()),
             pose: PoseFinder::new(&model, options.max_residual_px),
             dots: DotIdentities::new(&model, size, &options),
-            displacements: DotDisplacements::new(model.dots.len()),
+            displacements: DotDisplacements::new(&model.optics, &model.dots),
             report: Reporter::new(&model, &options),
-            springs,
+            wrench,
+            time_s: None,
             model,
             options,
         })
@@ -75,7 +78,7 @@ impl Tracker {
 
     /// The springs' law, where the constants have one.
     pub fn springs(&self) -> Option<&Springs> {
-        self.springs.as_ref()
+        self.wrench.springs()
     }
 
     /// Whether a pixel is inside of the runtime's circle.
@@ -98,8 +101,14 @@ impl Tracker {
         self.miss(Some(Problem::Unreadable))
     }
 
+    /// When the next frame was taken, s, on a clock that does not jump. Steps of much more than the usual one are gaps, as
+    /// numbers that are left out are.
+    pub fn stamp(&mut self, time_s: f64) {
+        self.time_s = Some(time_s).filter(|time_s| time_s.is_finite());
+    }
+
     fn begin(&mut self, number: u64) {
-        if self.report.begin(number) {
+        if self.report.begin(number, self.time_s.take()) {
             self.dots.forget_last();
             self.exposure.forget();
         }
@@ -148,16 +157,16 @@ impl Tracker {
             pose: self.pose.last_pose(),
         });
         let pose = self.pose.estimate();
-        let wrench = pose.refined.map(|refined| {
-            let springs = self.springs.as_ref();
-            WrenchEstimate::at_pose(springs, &refined.pose, &refined.covariance, pose.variance_factor)
-        });
-        let displacements_mm =
-            pose.is_known().then(|| self.displacements.at_pose(optics, &model.dots, dots.tracks));
+        let wrench = self.wrench.at_pose(&pose, optics);
+        let motion =
+            pose.refined.map_or_else(Matrix6::zeros, |found| found.covariance * pose.variance_factor);
+        let displacements =
+            pose.is_known().then(|| self.displacements.at_pose(optics, &motion, &model.dots, dots.tracks));
         let is_empty = pose.refined.is_none() && dots.tracks.iter().all(|track| track.spot.is_none());
         let sharpness = is_empty.then(|| sharpness(&plane, &model.mask, &exposure));
         let discs = self.markers.discs();
-        let findings = FrameFindings { discs, pose, wrench, dots, displacements_mm, sharpness };
+        let errors = self.wrench.errors();
+        let findings = FrameFindings { discs, pose, wrench, errors, dots, displacements, sharpness };
         self.report.finish(&findings, model);
         self.report.result()
     }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::contact::stepper::Touch;
 use crate::scene::State;
 use domecast_contact::{ContactState, Extent};
+use domecast_optics::DomeShape;
 use domecast_optics::numeric::Rigid;
 use domecast_springs::Displacement;
 
@@ -105,10 +106,10 @@ impl Between {
         sum
     }
 
-    /// The pressed part of the dome: direction of its middle and half the angle of a cap about it; `None` where
-    /// nothing bears a load.
-    pub fn pressed_cap(&self) -> Option<(DVec3, f64)> {
-        pressed_cap(self.contacts())
+    /// The pressed part of the dome: direction of its middle from the sphere's centre and half the angle of a cap about it;
+    /// `None` where nothing bears a load.
+    pub fn pressed_cap(&self, dome: DomeShape) -> Option<(DVec3, f64)> {
+        pressed_cap(self.contacts(), dome)
     }
 
     /// The region that moves: direction of its middle, half its angle, and the most that anything moves outside.
@@ -124,11 +125,13 @@ impl Between {
 /// The cap that holds what bears a load in any of some contacts: direction of its middle, half its angle.
 pub(crate) fn pressed_cap<'c>(
     contacts: impl Iterator<Item = &'c ContactState> + Clone,
+    dome: DomeShape,
 ) -> Option<(DVec3, f64)> {
-    let nodes = || contacts.clone().flat_map(|contact| &contact.nodes);
-    let middle = nodes().map(|node| node.at_mm.normalize_or_zero()).sum::<DVec3>().try_normalize()?;
+    let nodes =
+        || contacts.clone().flat_map(|contact| &contact.nodes).map(|node| node.at_mm - dome.center_mm());
+    let middle = nodes().map(DVec3::normalize_or_zero).sum::<DVec3>().try_normalize()?;
     let angle_of = |at: DVec3| middle.dot(at.normalize_or(middle)).clamp(-1.0, 1.0).acos();
-    Some((middle, nodes().map(|node| angle_of(node.at_mm)).fold(0.0, f64::max)))
+    Some((middle, nodes().map(angle_of).fold(0.0, f64::max)))
 }
 
 /// The regions that move in some contacts.

@@ -8,6 +8,7 @@ pub fn elastomer_of(design: &Design) -> Elastomer {
     let sections = design.sections();
     Elastomer {
         dome_radius_mm: sections.dome.radius_mm,
+        center_z_mm: design.optics().dome().center_z_mm(),
         young_mpa: sections.elastomer.young_modulus_mpa,
         poisson: sections.elastomer.poisson_ratio,
         friction: sections.elastomer.friction,

@@ -1,8 +1,20 @@
 //! How the contact of a frame was solved, as the truth says it.
 
+use glam::DVec3;
 use serde::Serialize;
 
-use domecast_contact::{ContactState, Pressed, Status};
+use domecast_contact::{ContactState, Pressed, PressedObject, PressedTogether, Status};
+
+/// How far a frame's contact may be from that of a dome at large strain, as measured against the finite-strain level.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ContactErrorTruth {
+    /// Of the membrane, mm.
+    pub displacement_mm: f64,
+    /// The same in the image, where it is seen largest, px.
+    pub px: f64,
+    /// Of the force between dome and object, N.
+    pub force_n: f64,
+}
 
 /// How the contact of a frame was solved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,11 +31,35 @@ pub struct ContactTruth {
     pub penetration_mm: Option<f64>,
     /// Iterations of the last contact solve; null where nothing was solved.
     pub iterations: Option<u32>,
+    /// How far the contact's level may be off here; null where nothing touches.
+    pub estimated_error: Option<ContactErrorTruth>,
     /// What springs and contact are out of balance by, N (moments counted over the springs' reach), on a rigid mount what
     /// a force that is asked for is missed by; null where nothing was solved.
     pub balance_residual_n: Option<f64>,
     /// Contact solves that this took; null where nothing was solved.
     pub solves: Option<u32>,
+    /// Each object's own part, where a scene has several; their wrenches add to the frame's.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub objects: Vec<ObjectTruth>,
+}
+
+/// One of several objects in a frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectTruth {
+    /// Its name in the scene.
+    pub name: String,
+    /// As the contact's: its own; `away` where it cannot touch.
+    pub status: &'static str,
+    /// `rest_from_object`, row-major; null while it is away.
+    pub pose: Option<[[f64; 4]; 4]>,
+    /// Fx, Fy, Fz, Mx, My, Mz that it puts on the dome, rest frame, about the springs' reference point, N and N*mm.
+    pub wrench: [f64; 6],
+    /// Middle of its pressure on the undeformed dome, sensor frame, mm; null where it does not touch.
+    pub middle_mm: Option<[f64; 3]>,
+    /// Radius of a disc of its contact's area, mm.
+    pub contact_radius_mm: f64,
+    /// Its largest pressure, MPa.
+    pub peak_pressure_mpa: f64,
 }
 
 impl ContactTruth {
@@ -35,21 +71,43 @@ impl ContactTruth {
             residual_mm: None,
             penetration_mm: None,
             iterations: None,
+            estimated_error: None,
             balance_residual_n: None,
             solves: None,
+            objects: Vec::new(),
         }
     }
 
     /// Of a contact in balance with the springs.
-    pub(crate) fn of(pressed: &Pressed) -> Self {
+    pub(crate) fn of(pressed: &Pressed, px_per_mm: f64) -> Self {
         let state = &pressed.state;
+        let estimated_error = (!state.nodes.is_empty()).then_some(ContactErrorTruth {
+            displacement_mm: state.deviation.displacement_mm,
+            px: state.deviation.displacement_mm * px_per_mm,
+            force_n: state.deviation.force_n,
+        });
+        Self { estimated_error, ..Self::of_state(state, pressed.residual_n, pressed.iterations) }
+    }
+
+    /// Of several contacts in balance with the springs, or those of a slow gel; the objects' own are written where they are
+    /// several.
+    pub(crate) fn of_several<'n>(
+        pressed: &PressedTogether,
+        names: impl ExactSizeIterator<Item = &'n str>,
+    ) -> Self {
+        let several = names.len() > 1;
+        let objects = names.zip(&pressed.objects).filter(|_| several);
+        let objects = objects.map(|(name, object)| ObjectTruth::of(name, object.as_ref())).collect();
+        Self { objects, ..Self::of_state(&pressed.state, pressed.residual_n, pressed.iterations) }
+    }
+
+    fn of_state(state: &ContactState, residual_n: f64, solves: u32) -> Self {
         let (status, note) = match state.status {
-            Status::Free => ("free", None),
-            Status::Solved => ("converged", None),
             Status::BoundReached => ("not_converged", Some(how_far_off(state))),
             Status::NotApplicable(why) => {
                 ("not_applicable", Some(format!("{why}; the geometric level's contact instead")))
             }
+            status => (status_name(status), None),
         };
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
         Self {
@@ -58,9 +116,47 @@ impl ContactTruth {
             residual_mm: finite(state.residual_mm),
             penetration_mm: finite(state.penetration_mm),
             iterations: Some(state.iterations),
-            balance_residual_n: finite(pressed.residual_n),
-            solves: Some(pressed.iterations),
+            estimated_error: None,
+            balance_residual_n: finite(residual_n),
+            solves: Some(solves),
+            objects: Vec::new(),
         }
+    }
+}
+
+impl ObjectTruth {
+    fn of(name: &str, object: Option<&PressedObject>) -> Self {
+        let Some(PressedObject { rest_from_object, state, wrench }) = object else {
+            return Self {
+                name: name.to_owned(),
+                status: "away",
+                pose: None,
+                wrench: [0.0; 6],
+                middle_mm: None,
+                contact_radius_mm: 0.0,
+                peak_pressure_mpa: 0.0,
+            };
+        };
+        let load: f64 = state.nodes.iter().map(|node| node.pressure_mpa * node.area_mm2).sum();
+        let moment = state.nodes.iter().map(|n| n.at_mm * (n.pressure_mpa * n.area_mm2)).sum::<DVec3>();
+        Self {
+            name: name.to_owned(),
+            status: status_name(state.status),
+            pose: Some(rest_from_object.to_rows_4x4()),
+            wrench: wrench.to_array(),
+            middle_mm: (load > 0.0).then(|| (moment / load).to_array()),
+            contact_radius_mm: state.contact_radius_mm,
+            peak_pressure_mpa: state.peak_pressure_mpa,
+        }
+    }
+}
+
+fn status_name(status: Status) -> &'static str {
+    match status {
+        Status::Free => "free",
+        Status::Solved => "converged",
+        Status::BoundReached => "not_converged",
+        Status::NotApplicable(_) => "not_applicable",
     }
 }
 

@@ -9,6 +9,7 @@ use crate::contact::between::{Around, Between, extents, pressed_cap};
 use crate::contact::displacement_map::{DisplacementMap, MapLayout};
 use crate::effect_name::EffectName;
 use crate::work::Work;
+use domecast_optics::DomeShape;
 
 /// The touched dome at a time, as far as a picture needs it.
 #[derive(Debug, Clone, Default)]
@@ -23,9 +24,9 @@ pub struct SkinShape {
 
 impl SkinShape {
     /// At one time; its map has nodes no further apart than `map_step_mm`, where that is given.
-    pub fn of(touch: Option<Between>, radius_mm: f64, map_step_mm: Option<f64>, work: &mut Work) -> Self {
+    pub fn of(touch: Option<Between>, dome: DomeShape, map_step_mm: Option<f64>, work: &mut Work) -> Self {
         let map = touch.as_ref().filter(|between| between.is_deformed()).and_then(|between| {
-            let (map, nodes) = DisplacementMap::new(between, radius_mm, map_step_mm?)?;
+            let (map, nodes) = DisplacementMap::new(between, dome, map_step_mm?)?;
             work.add(EffectName::Contact, nodes * NODE_UNITS);
             Some(map)
         });
@@ -54,7 +55,7 @@ impl<'a> Shapes<'a> {
     pub fn new(
         around: &'a Around,
         places_mm: &[DVec3],
-        radius_mm: f64,
+        dome: DomeShape,
         map_step_mm: Option<f64>,
         work: &mut Work,
     ) -> Option<Self> {
@@ -62,7 +63,7 @@ impl<'a> Shapes<'a> {
         let contacts = || touches.iter().filter_map(|touch| touch.contact.as_deref());
         contacts().next()?;
         let layout = map_step_mm.and_then(|step_mm| {
-            MapLayout::new(&extents(contacts()), pressed_cap(contacts()), radius_mm, step_mm)
+            MapLayout::new(&extents(contacts()), pressed_cap(contacts(), dome), dome, step_mm)
         });
         let known = touches.map(|touch| {
             let alone = Between::at_frame(touch.clone());

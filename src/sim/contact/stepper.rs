@@ -4,12 +4,16 @@ use std::sync::Arc;
 
 use crate::SimError;
 use crate::contact::elastomer::elastomer_of;
+use crate::contact::level::largest_px_per_mm;
 use crate::contact::record::ContactTruth;
 use crate::effect_name::EffectName;
-use crate::scene::object::Hold;
+use crate::scene::object::{Hold, SceneObject};
 use crate::scene::{Held, Scene, State};
 use crate::work::Work;
-use domecast_contact::{Contact, ContactError, ContactState, Level, PressStatus, Pressed};
+use domecast_contact::{
+    Contact, ContactError, ContactState, Elastomer, GelMemory, Level, PressStatus, Pressed, PressedTogether,
+    Push, Relaxation,
+};
 use domecast_design::DesignError;
 
 /// The dome touched at one time.
@@ -27,9 +31,23 @@ pub struct Touch {
 pub struct Stepper<'a> {
     scene: &'a Scene,
     contact: Contact,
-    last: Option<Pressed>,
+    px_per_mm: f64,
+    last: Last,
+    /// What a slow gel remembers.
+    gel: Option<GelMemory>,
     /// Frames that are solved already.
     known: Option<Arc<SolvedFrames>>,
+}
+
+/// What the frame before leaves to the next one.
+#[derive(Debug, Clone)]
+enum Last {
+    /// A dome that nothing has touched yet, or that is left alone again.
+    Free,
+    /// One object on an elastic dome.
+    One(Box<Pressed>),
+    /// Several objects, or a slow gel.
+    Several(Box<PressedTogether>),
 }
 
 /// Some frames of a scene, solved by one level; kept with the scene.
@@ -39,7 +57,7 @@ pub(crate) struct SolvedFrames {
     contact: Contact,
     /// By number; with what each took.
     frames: Vec<(u32, Touch, Work)>,
-    last: Option<Pressed>,
+    last: Last,
 }
 
 impl SolvedFrames {
@@ -75,14 +93,31 @@ impl<'a> Stepper<'a> {
     /// # Errors
     /// An elastomer that the level cannot work with.
     pub fn new(scene: &'a Scene, level: Level) -> Result<Self, SimError> {
+        let px_per_mm = largest_px_per_mm(scene);
         if let Some(known) = scene.kept::<SolvedFrames>().filter(|known| known.level == level) {
             let contact = known.contact.clone();
-            return Ok(Self { scene, contact, last: None, known: Some(known) });
+            return Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: None, known: Some(known) });
         }
-        let contact = Contact::new(elastomer_of(scene.design()), level).map_err(|error| {
-            DesignError::at("contact", "", error.to_string(), "an elastomer and a level that fit")
-        })?;
-        Ok(Self { scene, contact, last: None, known: None })
+        let contact = Contact::new(elastomer_of(scene.design()), level).map_err(|error| unfit(&error))?;
+        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: None, known: None })
+    }
+
+    /// The same over a gel whose modulus relaxes, from that instant modulus, MPa; before the first frame nothing touches
+    /// it.
+    ///
+    /// # Errors
+    /// As [`Stepper::new`]; a level other than the linear one.
+    pub fn slow(
+        scene: &'a Scene,
+        level: Level,
+        (relaxation, young_mpa): &(Relaxation, f64),
+    ) -> Result<Self, SimError> {
+        let elastomer = Elastomer { young_mpa: *young_mpa, ..elastomer_of(scene.design()) };
+        let px_per_mm = largest_px_per_mm(scene);
+        let step_s = 1.0 / scene.file().frames.rate_hz;
+        let (gel, contact) =
+            GelMemory::new(relaxation.clone(), step_s, &elastomer, level).map_err(|error| unfit(&error))?;
+        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: Some(gel), known: None })
     }
 
     /// Solves the next frame.
@@ -97,63 +132,146 @@ impl<'a> Stepper<'a> {
             self.last.clone_from(&known.last);
             return Ok(touch.clone());
         }
-        let free = |rest: &Scene| -> Result<Touch, SimError> {
-            let state = rest.state_at(frame, time_s)?;
-            Ok(Touch { state, contact: None, solved: ContactTruth::away() })
+        let touch = match self.scene.objects() {
+            [object] if self.gel.is_none() => self.one(object, frame, time_s, work)?,
+            _ => self.several(frame, time_s, work)?,
         };
-        let Some(object) = self.scene.objects().first() else { return free(self.scene) };
+        match touch {
+            Some(touch) => Ok(touch),
+            None => {
+                self.last = Last::Free;
+                let state = self.scene.state_at(frame, time_s)?;
+                Ok(Touch { state, contact: None, solved: ContactTruth::away() })
+            }
+        }
+    }
+
+    /// One object on an elastic dome; `None` while it is away.
+    fn one(
+        &mut self,
+        object: &SceneObject,
+        frame: u32,
+        time_s: f64,
+        work: &mut Work,
+    ) -> Result<Option<Touch>, SimError> {
         let suspension = self.scene.suspension();
-        let radius_mm = self.scene.optics().dome_radius_mm();
-        let before = self.last.as_ref();
-        let solved = match object.hold_at(time_s) {
-            Hold::Away(_) => {
-                self.last = None;
-                return free(self.scene);
-            }
-            Hold::At(_) if !object.may_touch(time_s, radius_mm) => {
-                self.last = None;
-                return free(self.scene);
-            }
-            Hold::At(pose) => match suspension {
-                Some(suspension) => self.contact.press(&object.indenter, suspension, &pose, before),
-                None => self.contact.press_held(&object.indenter, &pose, before),
-            },
-            Hold::Pressed(pose, way, force_n) => match suspension {
-                Some(suspension) => {
-                    self.contact.press_with_force(&object.indenter, suspension, &pose, way, force_n, before)
-                }
-                None => self.contact.press_held_with_force(&object.indenter, &pose, way, force_n, before),
-            },
+        let before = match &self.last {
+            Last::One(pressed) => Some(&**pressed),
+            _ => None,
         };
-        let pressed = solved.map_err(|error| {
-            let fault = DesignError::at(
-                "objects[0].path",
-                "",
-                format!("frame {frame}, `{}`: {error}", object.name),
-                "an object outside the sheet and no deeper in the dome than the contact's level goes",
-            );
-            SimError::from(match way_out(&error) {
-                Some(help) => fault.with_help(help),
-                None => fault,
-            })
-        })?;
+        let solved = match (self.push(object, time_s), suspension) {
+            (None, _) => return Ok(None),
+            (Some(Push::At(pose)), Some(suspension)) => {
+                self.contact.press(&object.indenter, suspension, &pose, before)
+            }
+            (Some(Push::At(pose)), None) => self.contact.press_held(&object.indenter, &pose, before),
+            (Some(Push::Pressed { from, way, force_n }), Some(suspension)) => {
+                self.contact.press_with_force(&object.indenter, suspension, &from, way, force_n, before)
+            }
+            (Some(Push::Pressed { from, way, force_n }), None) => {
+                self.contact.press_held_with_force(&object.indenter, &from, way, force_n, before)
+            }
+        };
+        let pressed = solved.map_err(|error| self.fault(&error, Some(0), frame))?;
         work.add(EffectName::Contact, pressed.state.work.max(0.0) as u64);
-        let held = match pressed.status {
-            PressStatus::Balanced => None,
-            PressStatus::SpringsBind { spring } => {
-                Some(Held { limit: "coil_bind", part: format!("spring {spring}"), carried: 1.0 })
-            }
-            PressStatus::NotBalanced { residual_n } => Some(Held {
-                limit: "not_balanced",
-                part: format!("a residual of {residual_n:.2e} N"),
-                carried: 1.0,
-            }),
-        };
+        let held = held_by(pressed.status);
         let state = State { pose: pressed.rest_from_platform, wrench: pressed.wrench, held };
         let contact = (!pressed.state.nodes.is_empty()).then(|| Arc::new(pressed.state.clone()));
-        let solved = ContactTruth::of(&pressed);
-        self.last = Some(pressed);
-        Ok(Touch { state, contact, solved })
+        let solved = ContactTruth::of(&pressed, self.px_per_mm);
+        self.last = Last::One(Box::new(pressed));
+        Ok(Some(Touch { state, contact, solved }))
+    }
+
+    /// Several objects, or a slow gel; `None` while nothing touches and the dome has its shape.
+    fn several(&mut self, frame: u32, time_s: f64, work: &mut Work) -> Result<Option<Touch>, SimError> {
+        let scene = self.scene;
+        let objects: Vec<_> =
+            scene.objects().iter().map(|object| (&object.indenter, self.push(object, time_s))).collect();
+        let beside = self.gel.as_ref().map(GelMemory::beside).unwrap_or_default();
+        if beside.is_still() && objects.iter().all(|object| object.1.is_none()) {
+            return Ok(None);
+        }
+        let before = match &self.last {
+            Last::Several(pressed) => Some(&**pressed),
+            _ => None,
+        };
+        let solved = self.contact.press_together(&objects, scene.suspension(), &beside, before);
+        let pressed = solved.map_err(|error| match error {
+            ContactError::OfObject { object, error } => self.fault(&error, Some(object), frame),
+            error => self.fault(&error, None, frame),
+        })?;
+        if let Some(gel) = &mut self.gel {
+            gel.take(pressed.objects.iter().flatten().map(|object| &object.state));
+        }
+        work.add(EffectName::Contact, pressed.state.work.max(0.0) as u64);
+        let held = held_by(pressed.status);
+        let state = State { pose: pressed.rest_from_platform, wrench: pressed.wrench, held };
+        let contact = pressed.state.is_moved().then(|| Arc::new(pressed.state.clone()));
+        let names = scene.objects().iter().map(|object| object.name.as_str());
+        let solved = ContactTruth::of_several(&pressed, names);
+        self.last = Last::Several(Box::new(pressed));
+        Ok(Some(Touch { state, contact, solved }))
+    }
+
+    /// What an object does at a time; `None` while it cannot touch.
+    fn push(&self, object: &SceneObject, time_s: f64) -> Option<Push> {
+        // What a slow gel remembers stays within the dome at rest.
+        let dome = self.scene.optics().dome();
+        match object.hold_at(time_s) {
+            Hold::Away(_) => None,
+            Hold::At(_) if !object.may_touch(time_s, dome) => None,
+            Hold::At(pose) => Some(Push::At(pose)),
+            Hold::Pressed(from, way, force_n) => Some(Push::Pressed { from, way, force_n }),
+        }
+    }
+
+    /// What is wrong with an object, or with all together, in a frame.
+    fn fault(&self, error: &ContactError, object: Option<usize>, frame: u32) -> SimError {
+        let objects = self.scene.objects();
+        let name = |number: usize| objects.get(number).map_or("", |object| object.name.as_str());
+        let (field, problem) = match (object, error) {
+            (Some(number), _) => {
+                (format!("objects[{number}].path"), format!("frame {frame}, `{}`: {error}", name(number)))
+            }
+            (None, ContactError::ObjectsMeet { objects: [a, b], depth_mm }) => (
+                format!("objects[{b}].path"),
+                format!(
+                    "frame {frame}: `{}` and `{}` lie {depth_mm:.4} mm in each other",
+                    name(*a),
+                    name(*b)
+                ),
+            ),
+            (None, _) => ("objects".to_owned(), format!("frame {frame}: {error}")),
+        };
+        let allowed = match error {
+            ContactError::ObjectsMeet { .. } => "objects that do not meet each other",
+            _ => "an object outside the sheet and no deeper in the dome than the contact's level goes",
+        };
+        let fault = DesignError::at(field, "", problem, allowed);
+        SimError::from(match way_out(error) {
+            Some(help) => fault.with_help(help),
+            None => fault,
+        })
+    }
+}
+
+/// An elastomer or a gel that the level cannot work with.
+fn unfit(error: &ContactError) -> SimError {
+    DesignError::at("contact", "", error.to_string(), "an elastomer and a level that fit").into()
+}
+
+/// What holds the platform where it is not balanced as it should.
+fn held_by(status: PressStatus) -> Option<Held> {
+    match status {
+        PressStatus::Balanced => None,
+        PressStatus::SpringsBind { spring } => {
+            Some(Held { limit: "coil_bind", part: format!("spring {spring}"), carried: 1.0 })
+        }
+        PressStatus::NotBalanced { residual_n } => Some(Held {
+            limit: "not_balanced",
+            part: format!("a residual of {residual_n:.2e} N"),
+            carried: 1.0,
+        }),
     }
 }
 
@@ -171,9 +289,15 @@ fn way_out(error: &ContactError) -> Option<String> {
         ContactError::ForceTooLarge { reached_n, .. } => {
             Some(format!("ask for less force (`press.force`), at most {:.2} N", (100.0 * reached_n).floor() / 100.0))
         }
+        ContactError::NotConverged { .. } => Some(
+            "take more frames on the way, or the linear level (`contact.level`)".into(),
+        ),
         ContactError::Unseen { .. } => Some(
             "take smaller elements (`contact.element_mm`), a thicker object, or the geometric level (`contact.level`)"
                 .into(),
+        ),
+        ContactError::TooNear { .. } => Some(
+            "take the linear level (`contact.level`), which solves near contacts together, or move them apart".into(),
         ),
         ContactError::BadPose(_) => Some(
             "let `position_mm` start outside the dome and `press.direction` point from there to the dome"

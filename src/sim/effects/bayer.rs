@@ -26,6 +26,11 @@ impl Effect for Bayer {
         Ok(Bound { px: 1.0, grey: light_bound::contrast_grey(scene)? })
     }
 
+    fn grey_has_shift(&self) -> bool {
+        // A mean of other pixels is off by the whole contrast at most, wherever they show an edge.
+        true
+    }
+
     fn cost(&self, scene: &Scene) -> Cost {
         let (width, height) = scene.image_size();
         Cost { once: 0, per_frame: (width * height) as u64 * (FILTER_UNITS + DEMOSAIC_UNITS) }

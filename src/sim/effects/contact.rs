@@ -1,12 +1,12 @@
 //! Objects deform the dome, and press the platform on its springs.
 
 use crate::bound::Bound;
-use crate::contact::level::{level_named, level_of};
+use crate::contact::level::{largest_px_per_mm, level_named, level_of};
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
 use crate::raster::spots::Points;
 use crate::scene::file::LevelName;
-use crate::scene::object::Hold;
+use crate::scene::object::{Hold, SceneObject};
 use crate::{Pipeline, Scene, SimError};
 use domecast_contact::{estimate, max_force_n};
 
@@ -18,19 +18,21 @@ const LOOKS: u32 = 257;
 
 /// Contact solves that a balance with the springs takes, as a rule.
 const SOLVES: f64 = 12.0;
-/// Largest motion in the image for a millimetre of the dome's surface, px over focal lengths and nearest distances.
-const NEARER: f64 = 1.6;
+/// Turns in which several contacts are solved until they agree.
+const TURNS: f64 = 4.0;
 /// Directions of the dome at which its depth in an object is looked at.
 const DEPTH_LOOKS: u32 = 2000;
 
 /// Predicted work of a level for a frame.
 fn per_frame(scene: &Scene, name: LevelName) -> u64 {
     let elastomer = crate::elastomer_of(scene.design());
-    let depth_mm = 0.1 * elastomer.dome_radius_mm;
-    let work = scene.objects().first().map_or(0.0, |object| {
+    let depth_mm = 0.1 * elastomer.depth_scale_mm();
+    let of_object = |object: &SceneObject| {
         estimate(level_named(scene, name), &elastomer, &object.indenter, depth_mm).work
-    });
-    (SOLVES * work) as u64
+    };
+    let work: f64 = scene.objects().iter().map(of_object).sum();
+    let turns = if scene.objects().len() > 1 { TURNS } else { 1.0 };
+    (SOLVES * turns * work) as u64
 }
 
 /// A coarser level than the scene's that the plan may take: its name, how far its pictures of dots may be from those
@@ -40,7 +42,11 @@ fn per_frame(scene: &Scene, name: LevelName) -> u64 {
 pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
     let best = scene.file().contact.level;
     let Some(depth_mm) = deepest_mm(scene) else { return Vec::new() };
-    let Some(object) = scene.objects().first() else { return Vec::new() };
+    // Several contacts, a slow gel, and a dome that is no hemisphere are what the scene's own level makes of them.
+    let [object] = scene.objects() else { return Vec::new() };
+    if scene.file().slow_gel.is_some() || !scene.optics().dome().is_hemisphere() {
+        return Vec::new();
+    }
     let elastomer = crate::elastomer_of(scene.design());
     let hardest_n = max_force_n(&elastomer, &object.indenter, depth_mm);
     let errors = |name| {
@@ -51,7 +57,7 @@ pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
     let max_n = scene.file().tolerance.force_n.unwrap_or(f64::INFINITY);
     let px_per_mm = largest_px_per_mm(scene);
     let own_work = per_frame(scene, best);
-    [LevelName::Geometric, LevelName::ClosedForm]
+    [LevelName::Geometric, LevelName::ClosedForm, LevelName::Linear]
         .into_iter()
         .filter(|name| *name < best)
         .filter_map(|name| {
@@ -62,11 +68,6 @@ pub fn coarser_levels(scene: &Scene) -> Vec<(LevelName, f64, u64)> {
         })
         .filter(|(_, _, saved)| *saved > 0)
         .collect()
-}
-
-fn largest_px_per_mm(scene: &Scene) -> f64 {
-    let seen = scene.dots().iter().filter_map(|dot| scene.optics().project_with_jacobian(dot.center_mm).ok());
-    NEARER * seen.map(|(_, by_point)| by_point.norm()).fold(0.0, f64::max)
 }
 
 /// A bound on how deep the undeformed dome at rest lies in an object that is held, over the frames; `None` where
@@ -106,13 +107,15 @@ impl Effect for ContactEffect {
     }
 
     fn calls_for(&self, scene: &Scene) -> Option<String> {
-        let radius_mm = scene.optics().dome_radius_mm();
+        let dome = scene.optics().dome();
         let end_s = scene.time_s(scene.frame_count().saturating_sub(1));
-        let touches = |object: &&crate::scene::object::SceneObject| {
-            (0..LOOKS).any(|k| object.may_touch(end_s * f64::from(k) / f64::from(LOOKS - 1), radius_mm))
+        let touches = |object: &&SceneObject| {
+            (0..LOOKS).any(|k| object.may_touch(end_s * f64::from(k) / f64::from(LOOKS - 1), dome))
         };
-        let object = scene.objects().iter().find(touches)?;
-        Some(format!("{} may touch the dome; {} level", object.name, level_of(scene).name()))
+        let names: Vec<&str> =
+            scene.objects().iter().filter(touches).map(|object| object.name.as_str()).collect();
+        (!names.is_empty())
+            .then(|| format!("{} may touch the dome; {} level", names.join(" and "), level_of(scene).name()))
     }
 
     fn bound(&self, _scene: &Scene) -> Result<Bound, SimError> {

@@ -35,6 +35,11 @@ impl Effect for Defocus {
         Ok(Bound { px: pull, grey })
     }
 
+    fn grey_has_shift(&self) -> bool {
+        // The weights of all steps are positive and add up to 1: a pixel changes by what it gives to others at most.
+        true
+    }
+
     fn cost(&self, scene: &Scene) -> Cost {
         let Some(focus) = &scene.file().electronics.focus else { return Cost::default() };
         let (width, height) = scene.image_size();

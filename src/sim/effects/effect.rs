@@ -38,6 +38,11 @@ pub trait Effect: Sync {
     /// A scene on which the bound cannot be computed (the fault is then the scene's).
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError>;
 
+    /// Whether the bound's grey levels hold all that the effect does to a pixel, its shift at edges included.
+    fn grey_has_shift(&self) -> bool {
+        false
+    }
+
     /// What it costs in a scene that calls for it.
     fn cost(&self, scene: &Scene) -> Cost;
 

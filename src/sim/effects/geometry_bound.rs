@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::SimError;
 use crate::contact::between::Between;
@@ -99,6 +99,25 @@ pub(super) fn px_per_touched_frame(scene: &Scene) -> Result<Option<f64>, SimErro
     Ok(Some(UNDER_OBJECT * fastest))
 }
 
+/// The most that any place of the dome moves under the scene's objects, in its frame or with the platform, mm.
+///
+/// # Errors
+/// A frame whose load has no balance.
+pub(super) fn dome_moved_mm(scene: &Scene) -> Result<f64, SimError> {
+    let solved = solved_frames(scene)?;
+    let pole_mm = scene.optics().dome().pole_mm();
+    let mut max_mm = 0.0_f64;
+    for (_, touch) in solved.touches() {
+        let pose = &touch.state.pose;
+        let platform_mm = [DVec3::ZERO, pole_mm].map(|at| pose.point(at).distance(at));
+        let own_mm = touch.contact.iter().flat_map(|contact| {
+            contact.nodes.iter().map(|node| contact.displacement_mm(node.at_mm).length())
+        });
+        max_mm = max_mm.max(own_mm.fold(0.0, f64::max) + platform_mm[0].max(platform_mm[1]));
+    }
+    Ok(UNDER_OBJECT * max_mm)
+}
+
 /// A level of contact that answers at once: the geometric one. Under a body with edges its forces have steps, on which a
 /// balance is long in coming, if it comes; there the finite elements are quicker, and where the scene asks for
 /// them anyway they cost nothing more to prepare.
@@ -106,6 +125,12 @@ fn quickest_level(scene: &Scene) -> Level {
     let edged = scene.objects().iter().any(|object| object.indenter.solid.is_mesh());
     match scene.file().contact.level {
         LevelName::Linear if edged => level_named(scene, LevelName::Linear),
+        // The others take contacts one by one, and may refuse some.
+        name if scene.objects().len() > 1 => level_named(scene, name),
+        // It knows hemispheres only.
+        name if !scene.objects().is_empty() && !scene.optics().dome().is_hemisphere() => {
+            level_named(scene, name)
+        }
         _ => Level::Geometric,
     }
 }

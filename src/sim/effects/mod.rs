@@ -32,6 +32,7 @@ mod refraction;
 mod rolling_shutter;
 mod sharpening;
 mod sheet_motion;
+mod slow_gel;
 pub mod speed;
 #[cfg(test)]
 mod tests;
@@ -52,6 +53,7 @@ pub fn all() -> &'static [&'static dyn Effect] {
         &sheet_motion::SheetMotion,
         &gap_change::GapChange,
         &contact::ContactEffect,
+        &slow_gel::SlowGel,
         &dots::Dots,
         &ink_edge::InkEdge,
         &uneven_ink::UnevenInk,

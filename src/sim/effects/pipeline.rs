@@ -8,7 +8,7 @@ use crate::light::shading::Shading;
 use crate::light::uneven::Unevenness;
 use crate::raster::settings::{Geometry, Ink, Timing};
 use crate::raster::specks::Specks;
-use domecast_contact::Level;
+use domecast_contact::{Level, Relaxation};
 
 /// What the used effects have installed.
 ///
@@ -21,6 +21,8 @@ pub struct Pipeline {
     pub light: LightUse,
     /// How contact is computed; `None`: nothing touches the dome.
     pub contact: Option<Level>,
+    /// How the elastomer's modulus relaxes, and its instant value, MPa; `None`: it is elastic.
+    pub slow_gel: Option<(Relaxation, f64)>,
     /// What the dots look like.
     pub ink: Ink,
     /// The lights mirrored in the sheet's faces.

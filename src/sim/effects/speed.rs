@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::SimError;
+use crate::contact::level::largest_px_per_mm_at;
 use crate::effects::geometry_bound::px_per_touched_frame;
 use crate::scene::Scene;
 use crate::scene::file::{MotionSection, PoseKey, WrenchKey};
@@ -14,9 +15,6 @@ const CURVED: f64 = 2.0;
 
 /// A dot under an object moves with it, or less; the platform, on its springs behind the dome, less still.
 const DRAGGED: f64 = 2.0;
-
-/// Images of points nearer to the camera than at rest move faster, by less than this.
-const NEARER: f64 = 1.6;
 
 /// A bound on the speed of any dot or marker in the image, px/s; `None` where nothing moves.
 pub fn fastest_px_per_s(scene: &Scene) -> Option<f64> {
@@ -116,7 +114,8 @@ fn pose_key(key: &PoseKey) -> (f64, Displacement) {
 }
 
 fn objects_mm_per_s(scene: &Scene) -> f64 {
-    let reach_mm = 2.0 * scene.optics().dome_radius_mm();
+    let dome = scene.optics().dome();
+    let reach_mm = 2.0 * dome.height_mm().max(dome.radius_mm());
     let mut fastest = 0.0_f64;
     for (object, resolved) in scene.file().objects.iter().zip(scene.objects()) {
         // No point of it is farther from its origin than this.
@@ -147,8 +146,7 @@ fn objects_mm_per_s(scene: &Scene) -> f64 {
 fn largest_px_per_mm(scene: &Scene) -> f64 {
     let dots = scene.dots().iter().map(|dot| dot.center_mm);
     let markers = scene.markers().iter().map(|marker| marker.position_mm);
-    let seen = dots.chain(markers).filter_map(|at| scene.optics().project_with_jacobian(at).ok());
-    NEARER * seen.map(|(_, by_point)| by_point.norm()).fold(0.0, f64::max)
+    largest_px_per_mm_at(scene, dots.chain(markers))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! 1.5.2), for light without polarisation that meets several of them in turn.
 //!
 //! The two polarisations keep apart from interface to interface, so each is followed to the end and the mean
-//! is taken there. Light that goes to and fro inside a layer is left out: between acrylic and silicone it is
+//! is taken there. Light that goes back and forth inside a layer is left out: between acrylic and silicone it is
 //! less than a thousandth.
 
 /// Share of the flux that one interface lets through, for light polarised across and in the plane of

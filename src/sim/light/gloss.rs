@@ -4,7 +4,7 @@
 //! face and down again to a light is unfolded: air twice, each layer below the face twice, with one momentum (index times
 //! sine) throughout. A light that sends the radiance `L` appears with `L R`, `R` being the share that passes the faces
 //! before, is thrown back, and passes them again. A white surface in air shows `E / pi` under the irradiance `E`, so the
-//! level of a radiance is `pi` times that of an irradiance. Light that is thrown to and fro more often is left out: it is a
+//! level of a radiance is `pi` times that of an irradiance. Light that is thrown back and forth more often is left out: it is a
 //! thousandth of that.
 
 use std::f64::consts::PI;

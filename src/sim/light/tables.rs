@@ -17,7 +17,7 @@ use domecast_optics::SensorOptics;
 const DOME_CELLS: usize = 60;
 pub(crate) const SHELL_CELLS: usize = 36;
 
-/// Radii of the shells for moved points, parts of the dome's.
+/// Radii of the shells for moved points, parts of the dome's; in a flat cap nearer to it ([`Ways::shell`]).
 pub(super) const SHELLS: [f64; 3] = [1.0, 0.86, 0.72];
 
 /// Directions in which a table is compared with what it stands for.
@@ -74,9 +74,21 @@ impl Ways {
         DomeFace::of(self.optics[1].dome())
     }
 
+    /// How far the shells lie apart, over what they do in a hemisphere: a cap has less room.
+    pub fn room(&self) -> f64 {
+        (self.optics[1].dome().height_mm() / self.radius_mm()).min(1.0)
+    }
+
+    /// Radius of a shell, part of the dome's.
+    pub fn shell(&self, part: f64) -> f64 {
+        1.0 - (1.0 - part) * self.room()
+    }
+
     /// The point of a place of the dome, or of a shell inside it.
     pub fn point(&self, place: DVec3, part: f64) -> DVec3 {
-        let point = self.optics[1].dome().center_mm() + place * (self.radius_mm() * part);
+        // A shell of the cylinder is narrower, not lower.
+        let up = if place.z < 0.0 { place.z } else { place.z * part };
+        let point = self.optics[1].dome().center_mm() + (place * part).with_z(up) * self.radius_mm();
         // The rim of the dome is silicone, not the sheet's top beside it.
         point.with_z(point.z.max(1e-9 * self.radius_mm()))
     }
@@ -124,7 +136,9 @@ impl Prepared {
             SHELLS
                 .iter()
                 .skip(1)
-                .map(|&part| tables(ways, part, DomeGrid::with_cells(SHELL_CELLS).over(ways.face())))
+                .map(|&part| {
+                    tables(ways, ways.shell(part), DomeGrid::with_cells(SHELL_CELLS).over(ways.face()))
+                })
                 .collect()
         })
     }

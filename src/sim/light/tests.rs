@@ -35,11 +35,16 @@ fn sensor(sheet: &[f64], dome: f64) -> SensorOptics {
 
 /// The same with a dome of another radius, mm.
 fn sensor_of(sheet: &[f64], dome: f64, dome_radius_mm: f64) -> SensorOptics {
+    sensor_with(sheet, dome, domecast_optics::DomeShape::hemisphere(dome_radius_mm))
+}
+
+/// The same with a dome of another shape.
+fn sensor_with(sheet: &[f64], index: f64, dome: domecast_optics::DomeShape) -> SensorOptics {
     let mut layers: Vec<FlatLayer> = sheet
         .iter()
         .map(|&n| FlatLayer { name: "sheet".into(), index: [n; 3], thickness_mm: Some(1.0) })
         .collect();
-    layers.push(FlatLayer { name: "dome".into(), index: [dome; 3], thickness_mm: None });
+    layers.push(FlatLayer { name: "dome".into(), index: [index; 3], thickness_mm: None });
     let lens = LensSpec {
         model: LensModel::Pinhole,
         width: 640,
@@ -50,13 +55,7 @@ fn sensor_of(sheet: &[f64], dome: f64, dome_radius_mm: f64) -> SensorOptics {
         pupil_shift_mm: Vec::new(),
     };
     let sensor_from_camera = Rigid::from_translation(DVec3::new(0.0, 0.0, -10.0));
-    SensorOptics::new(&OpticsSpec {
-        lens,
-        sensor_from_camera,
-        layers,
-        dome: domecast_optics::DomeShape::hemisphere(dome_radius_mm),
-    })
-    .unwrap()
+    SensorOptics::new(&OpticsSpec { lens, sensor_from_camera, layers, dome }).unwrap()
 }
 
 /// A square emitter at a place, facing a direction.

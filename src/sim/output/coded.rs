@@ -93,12 +93,12 @@ const HEIGHT_SIDE: u32 = 200;
 fn extras(scene: &Scene, drawn: &Drawn) -> tiff::TiffResult<Vec<(String, Vec<u8>)>> {
     let wanted = scene.file().output;
     let number = drawn.truth.frame;
-    let radius_mm = scene.optics().dome_radius_mm();
+    let dome = scene.optics().dome();
     let mut files = Vec::new();
     if wanted.heights {
         let heights = match &drawn.contact {
-            Some(contact) => contact.height_map_mm(radius_mm, HEIGHT_SIDE as usize),
-            None => still_heights_mm(scene.optics().dome(), HEIGHT_SIDE as usize),
+            Some(contact) => contact.height_map_mm(dome, HEIGHT_SIDE as usize),
+            None => still_heights_mm(dome, HEIGHT_SIDE as usize),
         };
         files.push((format!("heights_{number:04}.tif"), float_tiff(&heights, HEIGHT_SIDE)?));
     }

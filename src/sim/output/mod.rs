@@ -34,7 +34,7 @@ use crate::work::Work;
 
 use coded::CodedFrame;
 pub use error::RunError;
-pub use parts::{ContactFault, PLAN_NAME, Summary, TRUTH_NAME, VIDEO_NAME};
+pub use parts::{ContactFault, PLAN_NAME, Summary, TRUTH_NAME, VIDEO_NAME, WorstContact};
 use parts::{Pending, Sent};
 use writer::Writer;
 

@@ -4,11 +4,12 @@ use std::sync::atomic::{AtomicBool, AtomicU32};
 
 use serde::Serialize;
 
-use crate::contact::record::ContactTruth;
+use crate::contact::record::{ContactErrorTruth, ContactTruth};
 use crate::electronics::deviation::CodingDeviation;
 use crate::error::SimError;
 use crate::output::coded::CodedFrame;
 use crate::output::truth::FrameTruth;
+use crate::scene::file::ToleranceSection;
 use crate::work::Work;
 
 /// Names of the files beside the frames.
@@ -27,6 +28,8 @@ pub struct Summary {
     pub notes: Vec<(u32, String)>,
     /// Frames whose contact is not what the level asks for, by its status in the truth.
     pub contact: Vec<ContactFault>,
+    /// The frame whose contact may be furthest off; `None` without a contact.
+    pub worst_contact: Option<WorstContact>,
     /// What the camera's lossy code made of all pictures; `None` without one.
     pub coding: Option<CodingDeviation>,
     /// What it took in all.
@@ -57,7 +60,8 @@ impl Summary {
     }
 
     /// Takes what a frame's truth says that is not as asked.
-    pub(super) fn note(&mut self, truth: FrameTruth) {
+    pub(super) fn note(&mut self, truth: FrameTruth, tolerance: &ToleranceSection) {
+        self.note_error(&truth, tolerance);
         if let Some(note) = truth.note {
             self.notes.push((truth.frame, format!("{}: {note}", truth.status)));
         }
@@ -67,6 +71,55 @@ impl Summary {
             None => self.contact.push(ContactFault { status, frames: 1, first: truth.frame, note }),
         }
     }
+}
+
+impl Summary {
+    /// Takes how far a frame's contact may be off, where that is more than the tolerance.
+    fn note_error(&mut self, truth: &FrameTruth, tolerance: &ToleranceSection) {
+        let Some(error) = truth.contact.as_ref().and_then(|contact| contact.estimated_error) else { return };
+        let over =
+            (error.px / tolerance.px).max(tolerance.force_n.map_or(0.0, |max_n| error.force_n / max_n));
+        if self.worst_contact.is_none_or(|worst| over > worst.over) {
+            self.worst_contact = Some(WorstContact { frame: truth.frame, over, error });
+        }
+        if over <= 1.0 {
+            return;
+        }
+        match self.contact.iter_mut().find(|fault| fault.status == BEYOND) {
+            Some(fault) => fault.frames += 1,
+            None => self.contact.push(ContactFault {
+                status: BEYOND,
+                frames: 1,
+                first: truth.frame,
+                note: String::new(),
+            }),
+        }
+        let Some(worst) = self.worst_contact else { return };
+        if let Some(fault) = self.contact.iter_mut().find(|fault| fault.status == BEYOND) {
+            fault.note = format!(
+                "in frame {} its level may be off by {:.2} px and {:.3} N; the tolerance is {} px{}",
+                worst.frame,
+                worst.error.px,
+                worst.error.force_n,
+                tolerance.px,
+                tolerance.force_n.map_or(String::new(), |max_n| format!(" and {max_n} N"))
+            );
+        }
+    }
+}
+
+/// The status of a contact whose level may be off by more than the scene's tolerance.
+const BEYOND: &str = "beyond_tolerance";
+
+/// The frame whose contact may be furthest off, over the tolerance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorstContact {
+    /// Its number.
+    pub frame: u32,
+    /// How often the tolerance.
+    pub over: f64,
+    /// How far.
+    pub error: ContactErrorTruth,
 }
 
 /// Where the frames are between those who solve, draw and write them.

@@ -99,7 +99,11 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// An elastomer that the level cannot work with.
     pub fn stepper(&self) -> Result<Option<Stepper<'a>>, SimError> {
-        self.pipeline.contact.map(|level| Stepper::new(self.scene, level)).transpose()
+        let Some(level) = self.pipeline.contact else { return Ok(None) };
+        Ok(Some(match &self.pipeline.slow_gel {
+            Some(gel) => Stepper::slow(self.scene, level, gel)?,
+            None => Stepper::new(self.scene, level)?,
+        }))
     }
 
     /// The sensor at a frame's time; `around` is the touched dome about the frame.
@@ -115,7 +119,7 @@ impl<'a> Renderer<'a> {
         // Where light is gathered over a time, that very instant is not drawn.
         let step_mm = self.map_step_mm().filter(|_| self.is_at_once());
         let touch = around.map(|around| around.at(0.0));
-        let shape = SkinShape::of(touch, self.scene.optics().dome_radius_mm(), step_mm, work);
+        let shape = SkinShape::of(touch, *self.scene.optics().dome(), step_mm, work);
         self.instant_of(frame, self.scene.time_s(frame), shape, work)
     }
 
@@ -268,9 +272,9 @@ impl<'a> Renderer<'a> {
             self.run_passes(&mut frame, &context, work, |stage| stage <= Stage::Focus);
         } else {
             let mut extra = Work::default();
-            let radius_mm = scene.optics().dome_radius_mm();
+            let dome = *scene.optics().dome();
             let shapes = around.and_then(|around| {
-                Shapes::new(around, &self.points.on_dome_mm(), radius_mm, self.map_step_mm(), &mut extra)
+                Shapes::new(around, &self.points.on_dome_mm(), dome, self.map_step_mm(), &mut extra)
             });
             work.add(self.owner_of_time(), extra.total());
             let mut part =

@@ -12,6 +12,7 @@ use super::error::{RunError, fault};
 use super::parts::{Pending, Sent, Summary, TRUTH_NAME, VIDEO_NAME};
 use super::video::VideoFiles;
 use crate::scene::Scene;
+use crate::scene::file::ToleranceSection;
 
 /// Writes frames, video and truth.
 pub(super) struct Writer {
@@ -21,6 +22,7 @@ pub(super) struct Writer {
     video: VideoFiles,
     video_path: PathBuf,
     summary: Summary,
+    tolerance: ToleranceSection,
 }
 
 impl Writer {
@@ -34,6 +36,7 @@ impl Writer {
             video: VideoFiles::new(folder.join(VIDEO_NAME), scene.file().frames.rate_hz),
             video_path: folder.join(VIDEO_NAME),
             summary: Summary::default(),
+            tolerance: scene.file().tolerance,
         })
     }
 
@@ -79,7 +82,7 @@ impl Writer {
             fs::write(&path, bytes).map_err(fault("write the file", &path))?;
         }
         writeln!(self.truth, "{}", frame.line).map_err(fault("write the truth", &self.truth_path))?;
-        self.summary.note(frame.truth);
+        self.summary.note(frame.truth, &self.tolerance);
         self.summary.add_coding(frame.coding);
         self.summary.work.merge(&frame.work);
         self.summary.frames += 1;

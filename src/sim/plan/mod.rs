@@ -193,7 +193,9 @@ impl Plan {
             if bound.px > tolerance.px || own > tolerance.grey {
                 continue;
             }
-            let (cost, grey) = (cost.total(frames), own + grey_of_shift(scene, bound.px)?);
+            let whole = effect_of(entry.effect).is_some_and(|effect| effect.grey_has_shift());
+            let at_edges = if whole { 0.0 } else { grey_of_shift(scene, bound.px)? };
+            let (cost, grey) = (cost.total(frames), own + at_edges);
             let free = scene.choice(entry.effect) == EffectChoice::Plan;
             if grey <= tolerance.grey && free && cost > 0 {
                 candidates.push(Candidate { index, px: bound.px, grey, cost });

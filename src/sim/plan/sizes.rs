@@ -8,6 +8,7 @@ use domecast_optics::numeric::SeededRandom;
 use super::grey_of_shift;
 use super::growth::grown;
 use super::random_scenes::{apart, lit_designs, lit_scene, shipped};
+use super::search::effect_of;
 use crate::contact::between::Around;
 use crate::contact::stepper::Touch;
 use crate::output::drawn::{Drawn, Scratch};
@@ -100,11 +101,16 @@ fn measure(name: &str, scene: &Scene, numbers: &[u32], ratios: &mut Ratios) -> V
             own = frames(scene, &with_it, numbers, &touches);
             &own
         };
-        let (px, grey) = difference(scene, random, with, &frames(scene, &without, numbers, &touches));
+        // A slow gel is another contact.
+        let elastic = (entry.effect == EffectName::SlowGel).then(|| self::touches(scene, &without));
+        let others = elastic.as_deref().unwrap_or(&touches);
+        let (px, grey) = difference(scene, random, with, &frames(scene, &without, numbers, others));
         let by_px = bound.px / px.max(MIN_PX);
         // What effects after it enlarge counts as in the plan.
         let own = grown(scene, entry.effect, bound.grey);
-        let whole = (own + grey_of_shift(scene, bound.px).unwrap()).min(255.0);
+        let has_shift = effect_of(entry.effect).unwrap().grey_has_shift();
+        let at_edges = if has_shift { 0.0 } else { grey_of_shift(scene, bound.px).unwrap() };
+        let whole = (own + at_edges).min(255.0);
         let by_grey = whole / grey.max(MIN_GREY);
         let ratio = if !scene.draws() || (bound.grey == 0.0 && px > MIN_PX) { by_px } else { by_grey };
         let line = format!(

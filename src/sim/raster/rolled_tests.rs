@@ -83,14 +83,13 @@ fn a_dome_between_frames_is_the_mean_of_both() {
     let mut stepper = Stepper::new(&scene, renderer.pipeline().contact.unwrap()).unwrap();
     let touches: Vec<Touch> = (0..3).map(|k| stepper.next(k, scene.time_s(k), &mut work).unwrap()).collect();
     let around = Around::of(&touches, 1).unwrap();
-    let radius_mm = scene.optics().dome_radius_mm();
-    let shapes =
-        Shapes::new(&around, &renderer.points().on_dome_mm(), radius_mm, Some(0.5), &mut work).unwrap();
+    let dome = *scene.optics().dome();
+    let shapes = Shapes::new(&around, &renderer.points().on_dome_mm(), dome, Some(0.5), &mut work).unwrap();
     let places = renderer.points().on_dome_mm();
     for (frames, from, to, part) in [(-0.7, 0, 1, 0.3), (0.0, 1, 1, 0.0), (0.25, 1, 2, 0.25)] {
         let shape = shapes.at(frames);
         let between = Between { from: touches[from].clone(), to: touches[to].clone(), part };
-        let alone = SkinShape::of(Some(between.clone()), radius_mm, Some(0.5), &mut work);
+        let alone = SkinShape::of(Some(between.clone()), dome, Some(0.5), &mut work);
         let expected = between.displacements_mm(&places);
         let mut largest = 0.0_f64;
         for (k, (a, b)) in shape.displaced_mm.unwrap().iter().zip(&expected).enumerate() {

@@ -50,7 +50,7 @@ fn levels(scene: &Scene, frame: u32, tolerances: &[f32]) -> (Vec<Levels>, Vec<(u
     let around = Between::at_frame(touches.last().unwrap().clone());
     let state = around.state(scene.reference_mm());
     let step = Some(map_step_mm(Some(level)));
-    let shape = SkinShape::of(Some(around), scene.optics().dome_radius_mm(), step, &mut work);
+    let shape = SkinShape::of(Some(around), *scene.optics().dome(), step, &mut work);
     let time_s = scene.time_s(frame);
     let instant = SensorState::new(&eye, pipeline.geometry, time_s, state, shape, &mut work).unwrap();
     let optics = instant.eye.optics(1).unwrap();

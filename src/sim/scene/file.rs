@@ -7,6 +7,7 @@ use super::dust::DustSection;
 use super::electronics::ElectronicsSection;
 use super::light::LightSection;
 use super::objects::ObjectSection;
+use super::slow_gel::SlowGelSection;
 use super::uneven::{UnevenInkSection, UnevenMembraneSection};
 use crate::effect_name::EffectChoices;
 use domecast_design::sections::Why;
@@ -14,7 +15,7 @@ use domecast_design::sections::Why;
 /// Frames at most of a sequence.
 pub(super) const MAX_FRAMES: u32 = 1_000_000;
 
-/// What the sensor is made to feel, how it is lit and recorded, and how exact the frames shall be.
+/// What the sensor is made to feel, how it is lit and recorded, and how exact the frames must be.
 ///
 /// Lengths are mm, angles degrees, forces N, torques N*mm, times s, pixels px, as the names say.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -44,13 +45,16 @@ pub struct SceneFile {
     /// What moves the platform besides objects; left out: nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionSection>,
-    /// What touches the dome: nothing, or one object.
+    /// What touches the dome: nothing, or objects that do not meet each other.
     #[serde(default)]
-    #[schemars(length(max = 1))]
+    #[schemars(length(max = 16))]
     pub objects: Vec<ObjectSection>,
     /// How contact is computed.
     #[serde(default)]
     pub contact: ContactSection,
+    /// An elastomer that yields slowly; left out: it is elastic.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slow_gel: Option<SlowGelSection>,
     /// How bright things are; left out: evenly lit.
     #[serde(default)]
     pub light: LightSection,
@@ -66,7 +70,7 @@ pub struct SceneFile {
     /// Dust and scratches on sheet and lens; left out: they are clean.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dust: Option<DustSection>,
-    /// Effects that shall be used, or not, whatever the plan says.
+    /// Effects that must be used, or not, whatever the plan says.
     #[serde(default)]
     pub effects: EffectChoices,
     /// What is written besides frames and truth.
@@ -179,14 +183,17 @@ pub struct PoseKey {
 pub struct ContactSection {
     /// The level that counts as exact for this scene; the plan takes none above it.
     pub level: LevelName,
-    /// Length of a finite element on the dome, mm; for the levels that have elements.
+    /// Length of a finite element of the linear level on the dome, mm.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 100.0))]
     pub element_mm: f64,
+    /// Elements of the finite-strain level across the part of the dome that the object touches.
+    #[schemars(range(min = 4, max = 16))]
+    pub elements_across: u32,
 }
 
 impl Default for ContactSection {
     fn default() -> Self {
-        Self { level: LevelName::Linear, element_mm: 1.0 }
+        Self { level: LevelName::Linear, element_mm: 1.0, elements_across: 8 }
     }
 }
 
@@ -197,6 +204,7 @@ impl LevelName {
             Self::Geometric => "geometric",
             Self::ClosedForm => "closed_form",
             Self::Linear => "linear",
+            Self::FiniteStrain => "finite_strain",
         }
     }
 }
@@ -211,6 +219,8 @@ pub enum LevelName {
     ClosedForm,
     /// Linear finite elements.
     Linear,
+    /// Neo-Hookean finite elements at large strain: seconds a pose, on springs some ten poses a frame.
+    FiniteStrain,
 }
 
 /// The printed dots as they came out.

@@ -11,6 +11,7 @@ mod motion;
 pub mod object;
 pub mod objects;
 mod resolve;
+pub mod slow_gel;
 pub mod uneven;
 
 pub use file::SceneFile;

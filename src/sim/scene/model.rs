@@ -47,7 +47,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Takes another number of frames or another seed than the file's.
+    /// Takes another number of frames, spread over the same time, or another seed than the file's. A single frame is the first.
     ///
     /// # Errors
     /// No frame at all, or more than a scene file may ask for.
@@ -58,6 +58,11 @@ impl Scene {
                     if count == 0 { "there is no frame to draw" } else { "these are too many frames" };
                 let allowed = format!("1 to {MAX_FRAMES}");
                 return Err(DesignError::at("frames.count", count, problem, allowed).into());
+            }
+            let [before, after] =
+                [self.file.frames.count, count].map(|count| f64::from(count.saturating_sub(1)));
+            if before > 0.0 && after > 0.0 {
+                self.file.frames.rate_hz *= after / before;
             }
             self.file.frames.count = count;
             self.kept = OnceLock::new();

@@ -9,6 +9,7 @@ use super::objects::{ObjectSection, ShapeSection};
 use domecast_contact::{ContactError, ContactSolid, Indenter};
 use domecast_design::{DesignError, read_up_to};
 use domecast_mesh::read_stl;
+use domecast_optics::DomeShape;
 use domecast_optics::numeric::{Rigid, rotation_from_vector};
 
 /// A mesh of a million triangles has 50 MB; the contact needs far fewer.
@@ -81,14 +82,14 @@ impl SceneObject {
         }
     }
 
-    /// Whether it can touch a dome of this radius at a time, by its bounding sphere; true for one that is pressed on.
-    pub fn may_touch(&self, time_s: f64, dome_radius_mm: f64) -> bool {
+    /// Whether it can touch a dome at a time, by its bounding sphere; true for one that is pressed on.
+    pub fn may_touch(&self, time_s: f64, dome: &DomeShape) -> bool {
         match self.hold_at(time_s) {
             Hold::Pressed(..) => true,
             Hold::Away(_) => false,
             Hold::At(pose) => {
                 let (center, radius) = self.indenter.solid.bounding_sphere();
-                pose.point(center).length() <= radius + dome_radius_mm
+                dome.distance_mm(pose.point(center)) <= radius
             }
         }
     }

@@ -6,11 +6,12 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use super::check_camera;
-use super::file::{MotionSection, SceneFile};
+use super::file::{LevelName, MotionSection, SceneFile};
 use super::model::{RIM_POINTS, Scene, SceneDot};
 use super::motion::Motion;
 use super::object::SceneObject;
 use crate::SimError;
+use domecast_contact::ContactError;
 use domecast_design;
 use domecast_design::layout::{Dot, Layout};
 use domecast_design::suspension_of;
@@ -56,6 +57,7 @@ fn load(path: &Path) -> Result<Scene, SimError> {
 
 fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
     let value = domecast_design::parse_json(text)?;
+    domecast_design::FileKind::Scene.expect(&value)?;
     let file: SceneFile = domecast_design::from_value(&value)?;
     let path = folder.join(&file.design);
     let design = Design::load(&path)?;
@@ -72,6 +74,7 @@ fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimE
         return Err(DesignError::at("motion", "", "rigid mount: the platform does not move", allowed).into());
     }
     check_dome(&file, &design)?;
+    check_gel(&file, &design)?;
     let suspension = if design.is_rigid() { None } else { Some(suspension_of(&design)?) };
     let mut dots: Vec<SceneDot> = layout.dots.iter().map(|dot| scene_dot(dot, design.optics())).collect();
     for (index, broken) in file.ink.broken.iter().enumerate() {
@@ -168,16 +171,32 @@ fn check(file: &SceneFile) -> Result<(), DesignError> {
     Ok(())
 }
 
-/// Contact is computed on a hemisphere only.
+/// A slow gel has terms that are some, and a level that knows them.
+fn check_gel(file: &SceneFile, design: &Design) -> Result<(), DesignError> {
+    let Some(gel) = &file.slow_gel else { return Ok(()) };
+    let fault = |error: ContactError| {
+        let allowed = "terms of positive times whose parts leave 0.01 of the modulus or more";
+        DesignError::at("slow_gel.terms", "", error.to_string(), allowed)
+    };
+    gel.resolved(design.sections().elastomer.young_modulus_mpa).map_err(fault)?;
+    if !file.objects.is_empty() && file.contact.level != LevelName::Linear {
+        let problem = "a slow gel is computed by the linear level only";
+        let allowed = "`linear`, or a scene without `slow_gel`";
+        return Err(DesignError::at("contact.level", file.contact.level.as_str(), problem, allowed));
+    }
+    Ok(())
+}
+
+/// Another dome than a hemisphere is computed by the linear level only.
 fn check_dome(file: &SceneFile, design: &Design) -> Result<(), DesignError> {
     let dome = design.optics().dome();
-    if dome.is_hemisphere() || file.objects.is_empty() {
+    let level = file.contact.level;
+    if dome.is_hemisphere() || file.objects.is_empty() || level == LevelName::Linear {
         return Ok(());
     }
-    let problem =
-        format!("scene objects: the dome is {}, contact is computed on a hemisphere only", dome.kind());
-    let allowed = "a scene without objects, or a design whose dome is a hemisphere";
-    Err(DesignError::at("objects", "", problem, allowed))
+    let problem = format!("the dome is {}, this level computes hemispheres only", dome.kind());
+    let allowed = "`linear`, or a design whose dome is a hemisphere";
+    Err(DesignError::at("contact.level", level.as_str(), problem, allowed))
 }
 
 /// Every load of the scene has a place inside the envelope; coils that bind are a matter of the frame.

@@ -1,7 +1,9 @@
 //! `domecast track FRAMES --constants FILE`
 
+mod arguments;
 mod decode;
 mod source;
+mod times;
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -17,145 +19,14 @@ use domecast_files::{OutputRules, StagedFile, StagedFolder};
 use domecast_optics::SensorOptics;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
-    CSV_HEADER, CameraFrame, CameraTurn, Channel, DOTS_CSV_HEADER, FollowMethod, Reference, Steps,
-    Thresholds, TrackOptions, Tracked, Tracker, Undistorted, overlay_png, write_csv, write_dots_csv,
-    write_json,
+    CSV_HEADER, CameraFrame, CameraTurn, DOTS_CSV_HEADER, Tracked, Tracker, Undistorted, overlay_png,
+    write_csv, write_dots_csv, write_json_fields,
 };
-use source::{FrameSource, RawSize};
+use source::FrameSource;
+use times::FrameTimes;
 
-/// What is written for each frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
-    /// A JSON object a line.
-    Jsonl,
-    /// Pose and wrench, a line a frame.
-    Csv,
-    /// The dots, a line each.
-    DotsCsv,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum ChannelName {
-    Red,
-    Green,
-    Blue,
-    /// The paper's grey.
-    Luma,
-}
-
-/// Arguments of `domecast track`.
-#[derive(Debug, clap::Args)]
-pub struct TrackArguments {
-    /// A folder of PNG or JPEG frames, frames, a video (through ffmpeg), a file of raw frames (with --raw), or `-` for
-    /// standard input (PGM or PPM pictures one after the other, or raw with --raw).
-    #[arg(required = true)]
-    frames: Vec<PathBuf>,
-    /// The constants.json of the sensor.
-    #[arg(long)]
-    constants: PathBuf,
-    /// Where to write [default: standard output].
-    #[arg(long)]
-    out: Option<PathBuf>,
-    #[arg(long, value_enum, default_value = "jsonl")]
-    format: Format,
-    /// Draw dots, axes and force over each frame, into this folder.
-    #[arg(long)]
-    overlay: Option<PathBuf>,
-    /// How many times as long as they are the arrows of the dots are drawn.
-    #[arg(long, default_value_t = 1.0)]
-    magnify: f64,
-    /// Write each frame undistorted and masked, as the paper's runtime sees it, into this folder.
-    #[arg(long)]
-    undistorted: Option<PathBuf>,
-    /// Raw frames of this size: WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb.
-    #[arg(long)]
-    raw: Option<RawSize>,
-    /// The channel that marks are measured in: colour filters and JPEG leave luma whole, where they are not, green is
-    /// free of dispersion.
-    #[arg(long, value_enum, default_value = "luma")]
-    channel: ChannelName,
-    /// The paper's fixed levels, BLACK,WHITE (0 to 255), instead of adaptive ones.
-    #[arg(long, value_parser = levels)]
-    thresholds: Option<[u8; 2]>,
-    /// Follow dots by pyramidal Lucas-Kanade, as the paper does.
-    #[arg(long)]
-    flow: bool,
-    /// Levels of its pyramid: each doubles the way that a dot can be followed.
-    #[arg(long, default_value_t = 3, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=5), requires = "flow")]
-    pyramid_levels: usize,
-    /// Sharpen before the whole frame is searched.
-    #[arg(long)]
-    sharpen: bool,
-    /// Do not blur before it.
-    #[arg(long)]
-    no_blur: bool,
-    /// Open (3 x 3) the thresholded frame.
-    #[arg(long)]
-    open: bool,
-    /// Count from the mean of the first so many good frames, which are without load, not from the constants' rest.
-    #[arg(long)]
-    reference: Option<u32>,
-    /// Search the whole frame at least every so many frames; 0: only when needed.
-    #[arg(long, default_value_t = 30)]
-    search_every: u32,
-    /// Largest rms of the white markers' residuals that is still a pose, px.
-    #[arg(long, alias = "most-residual-px", default_value_t = 2.0)]
-    max_residual_px: f64,
-    /// Share of the dots' spacing by which three quarters of them may be misplaced before the constants are called
-    /// another sensor's.
-    #[arg(long, alias = "most-misplaced", default_value_t = 0.5)]
-    max_misplaced: f64,
-    /// The camera is mounted so that the picture is turned clockwise by so many degrees against the constants. With a
-    /// number, 0 too, a key that cannot be seen is no fault.
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees)]
-    camera_turned: Option<f64>,
-    /// The picture is mirrored left to right, before it is turned; pixels are then stated as in the picture mirrored back.
-    #[arg(long)]
-    camera_mirrored: bool,
-}
-
-fn degrees(text: &str) -> Result<f64, String> {
-    let number = text.trim().parse().ok().filter(|v: &f64| v.abs() <= 360.0);
-    number.ok_or_else(|| "a number of degrees from -360 to 360".into())
-}
-
-fn levels(text: &str) -> Result<[u8; 2], String> {
-    let parts: Vec<u8> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
-    match parts.as_slice() {
-        [black, white] if black < white => Ok([*black, *white]),
-        _ => Err("two levels from 0 to 255, the black one first: 60,200".into()),
-    }
-}
-
-impl TrackArguments {
-    /// A picture that is mirrored and then turned is, mirrored back, turned the other way.
-    fn camera_turned_rad(&self) -> Option<f64> {
-        let turned_rad = self.camera_turned.map(f64::to_radians);
-        if self.camera_mirrored { Some(-turned_rad.unwrap_or(0.0)) } else { turned_rad }
-    }
-
-    fn options(&self) -> TrackOptions {
-        TrackOptions {
-            channel: match self.channel {
-                ChannelName::Red => Channel::Red,
-                ChannelName::Green => Channel::Green,
-                ChannelName::Blue => Channel::Blue,
-                ChannelName::Luma => Channel::Luma,
-            },
-            thresholds: self
-                .thresholds
-                .map_or(Thresholds::Adaptive, |[black, white]| Thresholds::Fixed { black, white }),
-            steps: Steps { blur: !self.no_blur, sharpen: self.sharpen, open: self.open },
-            motion: if self.flow { FollowMethod::LucasKanade } else { FollowMethod::Predicted },
-            pyramid_levels: self.pyramid_levels,
-            reference: self.reference.map_or(Reference::Constants, Reference::Frames),
-            search_every: self.search_every,
-            max_residual_px: self.max_residual_px,
-            max_misplaced: self.max_misplaced,
-            camera_turned_rad: self.camera_turned_rad(),
-        }
-    }
-}
+use arguments::Format;
+pub use arguments::TrackArguments;
 
 /// Where the lines go: a file that is there whole or not at all, or standard output, frame by frame.
 enum Sink {
@@ -296,16 +167,28 @@ fn turned_hint(turn: CameraTurn) -> String {
     )
 }
 
+/// Says what is to be done where the picture is turned, or where nothing tells whether it is.
+fn tell_turn(output: &Output, turn: Option<CameraTurn>, tally: &Tally) {
+    if let Some(turn) = turn {
+        output.warn(&turned_hint(turn));
+    } else if tally.counts.contains_key("key_unsure") {
+        let whether = "the gap that tells how the picture lies is not seen (dirt, or a broken dot); nothing is stated of such \
+            frames: if the camera is as the constants say, track with --camera-turned 0";
+        output.warn(whether);
+    }
+}
+
 /// Tracks every frame that there is; a frame that cannot be read is reported and skipped.
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     let constants = read_constants(&arguments.constants)?;
     let mut tracker = Tracker::new(&constants, arguments.options()).map_err(|e| unfit(arguments, &e))?;
-    let inputs: Vec<&Path> =
-        arguments.frames.iter().chain([&arguments.constants]).map(PathBuf::as_path).collect();
+    let named = arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times);
+    let inputs: Vec<&Path> = named.map(PathBuf::as_path).collect();
     let rules = output.rules(&inputs);
     let mut pictures = Pictures::new(arguments, &rules, &constants, &tracker)?;
     let mut sink = Sink::new(arguments.out.as_deref(), &rules)?;
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
+    let mut times = FrameTimes::open(arguments.times.as_deref())?;
     let mut line = Vec::new();
     match arguments.format {
         Format::Jsonl => {}
@@ -331,6 +214,9 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
                 .map_err(|error| error.to_string()),
             Err(problem) => Err(problem.clone()),
         };
+        if let Some(time_s) = times.next_s()? {
+            tracker.stamp(time_s);
+        }
         let began = Instant::now();
         let tracked: &Tracked = match &picture {
             Ok(frame) => tracker.track(next.number, frame),
@@ -346,7 +232,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         *tally.counts.entry(tracked.status()).or_default() += 1;
         line.clear();
         match arguments.format {
-            Format::Jsonl => write_json(&mut line, tracked)?,
+            Format::Jsonl => write_json_fields(&mut line, tracked, &arguments.fields)?,
             Format::Csv => write_csv(&mut line, tracked, at_mm)?,
             Format::DotsCsv => write_dots_csv(&mut line, tracked)?,
         }
@@ -354,6 +240,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         if let Ok(frame) = &picture {
             pictures.write(output, next.number, frame, tracked)?;
         }
+        source.reuse(next.picture);
     }
     output.steps_done();
     if !tally.counts.is_empty() {
@@ -365,13 +252,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         let allowed = "PNG or JPEG frames, a video, or raw";
         return Err(input_fault(&arguments.frames[0], "holds no frame", allowed));
     }
-    if let Some(turn) = turn {
-        output.warn(&turned_hint(turn));
-    } else if tally.counts.contains_key("key_unsure") {
-        let whether = "the gap that tells how the picture lies is not seen (dirt, or a broken dot); nothing is stated of such \
-            frames: if the camera is as the constants say, track with --camera-turned 0";
-        output.warn(whether);
-    }
+    tell_turn(output, turn, &tally);
     tally.summarize(output, arguments.out.as_deref())?;
     let nothing_read = tally.counts.keys().all(|status| *status == "unreadable");
     if nothing_read { Err(Failure::Negative) } else { Ok(()) }

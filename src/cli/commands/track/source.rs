@@ -60,12 +60,14 @@ pub struct FrameSource {
     next: u64,
     done: bool,
     video: Option<(Child, PathBuf)>,
+    /// The bytes of a frame that is done with: a new one of that size needs no new memory.
+    scratch: Vec<u8>,
 }
 
 impl FrameSource {
     /// Opens what the command line names.
     pub fn open(paths: &[PathBuf], raw: Option<RawSize>) -> Result<Self, Failure> {
-        let of = |kind: Kind| Self { kind, next: 0, done: false, video: None };
+        let of = |kind: Kind| Self { kind, next: 0, done: false, video: None, scratch: Vec::new() };
         let [path, more @ ..] = paths else {
             return Err(input_fault(Path::new("-"), "nothing was given", ALLOWED));
         };
@@ -86,6 +88,10 @@ impl FrameSource {
         }
         if has_extension(path, &VIDEOS) {
             return Self::video(path);
+        }
+        // a name that the user gave must be there; a file that cannot be read later on is one lost frame
+        for named in paths {
+            named.metadata().map_err(|error| unreadable(named, &error))?;
         }
         let files = if path.is_dir() && more.is_empty() { pictures_in(path)? } else { paths.to_vec() };
         Ok(of(Kind::Files(numbered(files).into_iter())))
@@ -110,7 +116,13 @@ impl FrameSource {
             Some(stdout) => Box::new(BufReader::new(stdout)),
             None => Box::new(io::empty()),
         };
-        Ok(Self { kind: Kind::Pnm(stream), next: 0, done: false, video: Some((child, path.to_path_buf())) })
+        Ok(Self {
+            kind: Kind::Pnm(stream),
+            next: 0,
+            done: false,
+            video: Some((child, path.to_path_buf())),
+            scratch: Vec::new(),
+        })
     }
 
     /// The next frame; `None` at the end. After a stream that broke off there is nothing more.
@@ -128,7 +140,9 @@ impl FrameSource {
             }
             Kind::Raw(stream, size) => {
                 let wanted = size.width * size.height * size.channels;
-                let mut bytes = Vec::with_capacity(wanted);
+                let mut bytes = std::mem::take(&mut self.scratch);
+                bytes.clear();
+                bytes.reserve_exact(wanted);
                 let read = stream.take(wanted as u64).read_to_end(&mut bytes);
                 let picture = match read {
                     Ok(0) => return None,
@@ -149,6 +163,11 @@ impl FrameSource {
         }
     }
 
+    /// Takes the bytes of a frame back.
+    pub fn reuse(&mut self, picture: Result<Picture, String>) {
+        self.scratch = picture.map(|picture| picture.bytes).unwrap_or_default();
+    }
+
     /// The fault that shows only at the end: a video that could not be read.
     pub fn end(&mut self) -> Result<(), Failure> {
         let Some((mut child, path)) = self.video.take() else { return Ok(()) };
@@ -165,7 +184,11 @@ impl FrameSource {
 }
 
 fn unreadable(path: &Path, error: &io::Error) -> Failure {
-    input_fault(path, format!("cannot be read ({error})"), ALLOWED)
+    let problem = match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file or folder".to_owned(),
+        _ => format!("cannot be read ({error})"),
+    };
+    input_fault(path, problem, ALLOWED)
 }
 
 fn has_extension(path: &Path, list: &[&str]) -> bool {

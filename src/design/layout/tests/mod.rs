@@ -308,6 +308,22 @@ fn patterns_are_symmetric_about_the_axis() {
 }
 
 #[test]
+fn a_runtime_is_led_to_the_key_from_three_sides() {
+    for kind in ["square", "hexagonal", "rings", "fill"] {
+        for pitch_px in [16.0, 22.0, 31.0] {
+            let change = serde_json::json!({ "kind": kind, "pitch_px": pitch_px, "dot_diameter_px": 7 });
+            let layout = Layout::new(&spec(LensModel::KannalaBrandt, change)).unwrap();
+            let Some(key) = &layout.key else { continue };
+            assert!(key.dot.neighbors.len() >= 3, "{kind}, {pitch_px} px: {:?}", key.dot.neighbors);
+            for near in &key.dot.neighbors {
+                let apart = layout.dots[*near as usize].image_px.distance(key.dot.image_px);
+                assert!(apart < 2.5 * layout.pitch_px, "{kind}, {pitch_px} px: {apart}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_key_is_one_dot_whose_images_are_dots() {
     for (kind, centred_on, rotation_deg, images) in [
         ("square", "gap", 0.0, 7),

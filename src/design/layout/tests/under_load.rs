@@ -16,7 +16,8 @@ fn tolerances(change: serde_json::Value) -> TolerancesSection {
         "pupil_mm": [0.0, 0.0, 0.0], "camera_rotation_deg": [0.0, 0.0, 0.0], "dome_radius_mm": 0.0,
         "layer_thickness_mm": 0.0, "index": 0.0, "white_marker_mm": 0.0, "black_dot_mm": 0.0,
         "print_registration_mm": 0.0, "print_rotation_deg": 0.0, "print_scatter_mm": 0.0,
-        "wire_diameter_mm": 0.0, "spring_diameter_mm": 0.0, "samples": 40, "seed": 5,
+        "wire_diameter_mm": 0.0, "spring_diameter_mm": 0.0, "active_coils": 0.0, "modulus_percent": 0.0,
+        "camera_drift_mm": 0.0, "camera_drift_deg": 0.0, "samples": 40, "seed": 5,
     });
     for (key, value) in change.as_object().unwrap() {
         json[key] = value.clone();

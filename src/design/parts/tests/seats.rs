@@ -11,6 +11,10 @@ fn edited(edits: &[(&str, Value)]) -> Value {
     // Coarse meshes: what is looked for is tenths of a millimetre.
     set(&mut tree, "mesh.chord_tolerance_mm", json!(0.03));
     set(&mut tree, "mesh.optical_chord_tolerance_mm", json!(0.05));
+    // A channel for the cable, which thumb24 has no room for, and the two set screws that then have room beside it.
+    set(&mut tree, "platforms.lower.cable_exit.width_mm", json!(3.2));
+    set(&mut tree, "platforms.lower.cable_exit.height_mm", json!(2.5));
+    set(&mut tree, "platforms.lower.clamp.azimuth_deg", json!([60, 300]));
     for (field, value) in edits {
         set(&mut tree, field, value.clone());
     }
@@ -79,6 +83,13 @@ fn thumb24_holds_everything_and_says_what_it_does_not() {
         }
         assert!(pose.counts.iter().map(|c| c.traced).sum::<usize>() > 2000, "{:?}", pose.counts);
     }
+    let shipped = [
+        ("platforms.lower.cable_exit.width_mm", json!(0)),
+        ("platforms.lower.cable_exit.height_mm", json!(0)),
+        ("platforms.lower.clamp.azimuth_deg", json!([60, 180, 300])),
+    ];
+    let shipped = verdict(&edited(&shipped)).unwrap();
+    assert!(shipped.notes.is_empty(), "thumb24 as it is: {:?}", shipped.notes);
     let note = |field: &str| checked.notes.iter().find(|note| note.field == field).map(|n| n.message.clone());
     let push = note("platforms.lower.clamp.azimuth_deg").unwrap();
     assert!(push.contains("180 degrees: (-0.100, 0.000) mm"), "{push}");

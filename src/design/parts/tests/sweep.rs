@@ -94,6 +94,7 @@ fn awkward_parts_are_sound_or_refused() {
         }),
         ("cable exit flush with the top", {
             let mut m = base.clone();
+            m.platforms.lower.cable_exit.width_mm = 3.2;
             m.platforms.lower.cable_exit.height_mm = m.lower_top_z_mm - m.platforms.lower.underside_z_mm;
             m
         }),

@@ -9,8 +9,9 @@ use domecast_optics::camera::{LensModel, LensSpec};
 const MIN_FOCAL_SHARE: f64 = 0.05;
 /// One longer than this many widths sees half a degree: it is in another unit.
 const MAX_FOCAL_SHARE: f64 = 100.0;
-/// A principal point farther from the middle than this share of the image belongs to another resolution.
-const MAX_OFF_CENTER: f64 = 0.25;
+/// A principal point farther from the middle than this share of the image belongs to another resolution: that of half the
+/// image is a quarter of it away.
+const MAX_OFF_CENTER: f64 = 0.2;
 /// Beyond this share it is unusual.
 const UNUSUAL_OFF_CENTER: f64 = 0.1;
 /// Focal lengths along x and y that differ by more than this are unusual.

@@ -47,32 +47,45 @@ pub(super) fn pocket_mm(k: &Known<'_>) -> [DVec2; 2] {
 /// A strip of a recess narrower than this stays full, mm, as the board's seat is made.
 const MAX_STRIP_MM: f64 = 1.0;
 
-/// Whether a hole at a place leaves no thin wall beside the pocket: it lies a wall beside it, or wholly in it and clear of
-/// the posts that the board bears on.
-pub(super) fn is_clear_of_pocket(k: &Known<'_>, at: DVec2, hole_mm: f64) -> bool {
-    let [low, high] = pocket_mm(k);
-    let needed = hole_mm + wall_mm(k);
-    if at.distance(at.clamp(low, high)) >= needed {
-        return true;
+/// What the board's seat takes of the lower platform, read once.
+pub(super) struct Pocket {
+    corners: [DVec2; 2],
+    /// Where the posts that the board bears on stand, and half of their sides, mm.
+    posts: Vec<DVec2>,
+    post_mm: f64,
+    wall_mm: f64,
+}
+
+impl Pocket {
+    pub(super) fn of(k: &Known<'_>) -> Self {
+        let corners = pocket_mm(k);
+        let screw = k.n("camera_body.board.hole_diameter_mm");
+        let axes = DVec2::from_angle(turn_rad(k));
+        let middle = 0.5 * (corners[0] + corners[1]);
+        let holes = k.value("camera_body.board.holes_mm").and_then(Value::as_array);
+        let holes: Vec<DVec2> = holes
+            .into_iter()
+            .flatten()
+            .filter_map(|hole| Some(dvec2(hole.get(0)?.as_f64()?, hole.get(1)?.as_f64()?)))
+            .collect();
+        // posts stand where any hole's column meets any hole's row
+        let at = |column: &DVec2, row: &DVec2| middle + axes.rotate(dvec2(column.x, row.y));
+        let posts = holes.iter().flat_map(|column| holes.iter().map(move |row| at(column, row))).collect();
+        Self { corners, posts, post_mm: 0.5 * screw + wall_mm(k).max(0.5 * screw), wall_mm: wall_mm(k) }
     }
-    let inside = (at - low).min(high - at).min_element();
-    let screw = k.n("camera_body.board.hole_diameter_mm");
-    let post = 0.5 * screw + wall_mm(k).max(0.5 * screw);
-    let axes = DVec2::from_angle(turn_rad(k));
-    let middle = 0.5 * (low + high);
-    let holes = k.value("camera_body.board.holes_mm").and_then(Value::as_array);
-    let holes: Vec<DVec2> = holes
-        .into_iter()
-        .flatten()
-        .filter_map(|hole| Some(dvec2(hole.get(0)?.as_f64()?, hole.get(1)?.as_f64()?)))
-        .collect();
-    // posts stand where any hole's column meets any hole's row
-    let is_clear = |x: f64, y: f64| {
-        let post_at = middle + axes.rotate(dvec2(x, y));
-        (at - post_at).abs().max_element() >= post + needed
-    };
-    inside >= MAX_STRIP_MM + needed
-        && holes.iter().all(|column| holes.iter().all(|row| is_clear(column.x, row.y)))
+
+    /// Whether a hole at a place leaves no thin wall beside the pocket: it lies a wall beside it, or wholly in it and
+    /// clear of the posts.
+    pub(super) fn is_clear(&self, at: DVec2, hole_mm: f64) -> bool {
+        let [low, high] = self.corners;
+        let needed = hole_mm + self.wall_mm;
+        if at.distance(at.clamp(low, high)) >= needed {
+            return true;
+        }
+        let inside = (at - low).min(high - at).min_element();
+        let past = |post: &DVec2| (at - *post).abs().max_element() >= self.post_mm + needed;
+        inside >= MAX_STRIP_MM + needed && self.posts.iter().all(past)
+    }
 }
 
 /// Half of each of the platforms' sides that a board asks for, mm: a wall round its pocket, and beside it, along one side,

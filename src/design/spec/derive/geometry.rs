@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::super::lens::lens_spec;
-use super::super::sections::{CameraSection, DomeSection};
+use super::super::sections::{CameraSection, DomeSection, MIN_BEND_DIAMETERS};
 use super::known::Known;
 use domecast_optics::DomeShape;
 use domecast_optics::camera::Lens;
@@ -198,4 +198,23 @@ pub(super) fn dome(k: &Known<'_>) -> DomeShape {
 /// Radius of the circle in which the dome meets the sheet, mm.
 pub(super) fn rim_mm(k: &Known<'_>) -> f64 {
     dome(k).rim_radius_mm()
+}
+
+/// What a round cable takes to turn into its channel, mm; none where there is no channel.
+pub(super) fn bend_mm(k: &Known<'_>) -> f64 {
+    let cable = k.n("camera_body.cable_diameter_mm");
+    let radius = match k.has("camera_body.cable_bend_radius_mm") {
+        true => k.n("camera_body.cable_bend_radius_mm"),
+        false => MIN_BEND_DIAMETERS * cable,
+    };
+    let exit = |side: &str| k.n(&format!("platforms.lower.cable_exit.{side}_mm")) > 0.0;
+    if exit("width") && exit("height") { radius + 0.5 * cable } else { 0.0 }
+}
+
+/// Where a given envelope ends below the dome, mm.
+pub(super) fn lowest_mm(k: &Known<'_>) -> f64 {
+    if !k.has("envelope.size_mm") {
+        return f64::NEG_INFINITY;
+    }
+    dome(k).height_mm() + k.n("elastomer.membrane_thickness_mm") - k.at("envelope.size_mm", 2)
 }

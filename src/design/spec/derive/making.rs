@@ -110,6 +110,18 @@ pub(super) const EXACTNESS: &[Rule] = &[
     fixed("tolerances.print_scatter_mm", "0.02", "from print to print"),
     fixed("tolerances.wire_diameter_mm", "0.005", "trade tolerance"),
     fixed("tolerances.spring_diameter_mm", "0.05", "trade tolerance"),
+    fixed("tolerances.active_coils", "0.1", "estimate: a tenth of a coil, where the ends are ground"),
+    fixed("tolerances.modulus_percent", "2", "music wire: makers state 79 to 81.5 GPa"),
+    fixed(
+        "tolerances.camera_drift_mm",
+        "0.005",
+        "estimate: a body held by screws in a printed bore; measure yours",
+    ),
+    fixed(
+        "tolerances.camera_drift_deg",
+        "0.05",
+        "estimate: 0.005 mm over the length of a small camera; measure yours",
+    ),
     follows("tolerances.samples", "200; none where `accuracy` stands in the file and chooses it", |k| {
         if k.has("accuracy") { None } else { Some(Value::from(200)) }
     }),

@@ -6,12 +6,12 @@ use glam::DVec2;
 
 use super::board::{self, has_board};
 use super::geometry::{
-    back_mm, bore_mm, depth_mm, dome, lower_top_mm, pocket_mm, rim_mm, sheet_mm, tilt, travel_mm, view_mm,
-    wall_mm,
+    back_mm, bend_mm, bore_mm, depth_mm, dome, lower_top_mm, lowest_mm, pocket_mm, rim_mm, sheet_mm, tilt,
+    travel_mm, view_mm, wall_mm,
 };
 use super::known::{Known, down, up};
 use super::mount::beside_posts;
-use super::room::{HOLE_IN_RECESS_MM, half_mm, ring_count, ring_mm, spring_count, springs_reach_mm};
+use super::room::{HOLE_IN_RECESS_MM, half_mm, ring, ring_count, spring_count, springs_reach_mm};
 use super::rule::{Rule, fixed, follows};
 
 pub(super) const LIGHTS: &[Rule] = &[
@@ -138,7 +138,8 @@ pub(super) const LOWER: &[Rule] = &[
     ),
     follows(
         "platforms.lower.underside_z_mm",
-        "the cable's channel below the camera's back, and room for the set screws over it",
+        "room for the cable to bend into its channel below the camera's back, as far as a given envelope has it, and room for \
+         the set screws over the channel",
         bottom,
     ),
     follows(
@@ -212,7 +213,7 @@ fn sheet_size(k: &Known<'_>) -> Option<Value> {
     // what opens into the recess opens wholly: an edge half-way over a hole leaves a sliver
     let gap = k.n("sheet.clearance_mm");
     let lights = k.n("leds.center_radius_mm") + 0.25 - gap;
-    let springs = if k.has("springs.places") { springs_reach_mm(k) } else { ring_mm(k, ring_count(k)) };
+    let springs = if k.has("springs.places") { springs_reach_mm(k) } else { ring(k, ring_count(k)).1 };
     let holes = springs + 0.5 * k.n("magnet_pockets.push_out_diameter_mm") + HOLE_IN_RECESS_MM - gap;
     let half = (rim_mm(k) + 0.8).max(markers).max(lights).max(holes);
     let side = up(2.0 * half, 0.1);
@@ -305,7 +306,7 @@ const MIN_HEAD_MM: f64 = 3.0;
 fn bottom(k: &Known<'_>) -> Option<Value> {
     let channel = k.n("platforms.lower.cable_exit.height_mm");
     let screws = channel + k.n("platforms.lower.clamp.hole_diameter_mm") + 2.0 * (wall_mm(k) + 0.2);
-    let mut body = back_mm(k) - channel;
+    let mut body = (back_mm(k) - channel.max(bend_mm(k))).max(lowest_mm(k)).min(back_mm(k) - channel);
     if k.has("camera_body.board") {
         let parts = k.n("camera_body.board.components_height_mm").max(MIN_HEAD_MM);
         body = back_mm(k) - k.n("camera_body.board.thickness_mm") - parts.max(channel);

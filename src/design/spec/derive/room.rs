@@ -3,6 +3,7 @@
 use glam::DVec2;
 use serde_json::Value;
 
+use super::board::{Pocket, has_board};
 use super::geometry::{
     SWAY_MM, bore_mm, marks_mm, pit_half_mm, pocket_mm, sheet_mm, spring_from_light_rad, tilt, view_mm,
     wall_mm,
@@ -18,19 +19,56 @@ pub(super) fn first_deg(k: &Known<'_>, count: usize) -> f64 {
     light.unwrap_or(0.0) + 180.0 / count as f64
 }
 
-/// Smallest ring for so many springs, mm.
-pub(super) fn ring_mm(k: &Known<'_>, count: usize) -> f64 {
+/// How far a ring is turned from the middle between the lights where a board's pocket asks for it, degrees, in the order in
+/// which they are tried.
+const TURNS_DEG: [f64; 13] = [0.0, 2.5, -2.5, 5.0, -5.0, 7.5, -7.5, 10.0, -10.0, 15.0, -15.0, 20.0, -20.0];
+/// How much wider a ring may become to come clear of a board's pocket, mm, and the step at which it is tried.
+const MAX_WIDER_MM: f64 = 12.0;
+pub(super) const RING_STEP_MM: f64 = 0.05;
+
+/// Azimuth of the first of so many springs, degrees, and the smallest ring for them, mm: half a step from the lights; over a
+/// board, whose pocket their push-out holes must leave a wall to, turned to where that ring is smallest.
+pub(super) fn ring(k: &Known<'_>, count: usize) -> (f64, f64) {
+    let first = first_deg(k, count);
+    let plain = (first, ring_from_mm(k, count, first));
+    if !has_board(k) {
+        return plain;
+    }
+    let pocket = Pocket::of(k);
+    let hole = 0.5 * k.n("magnet_pockets.push_out_diameter_mm");
+    let found = TURNS_DEG.iter().filter_map(|turn| {
+        let first = first + turn;
+        let smallest = up(ring_from_mm(k, count, first), 0.01);
+        let steps = (0..).map(|i| up(smallest + RING_STEP_MM * f64::from(i), 0.01));
+        let radius = steps
+            .take_while(|radius| *radius <= smallest + MAX_WIDER_MM)
+            .find(|radius| is_clear(&pocket, count, first, *radius, hole))?;
+        Some((first, radius))
+    });
+    found.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(plain)
+}
+
+/// Whether all push-out holes of a ring leave no thin wall beside a board's pocket.
+pub(super) fn is_clear(pocket: &Pocket, count: usize, first_deg: f64, radius_mm: f64, hole_mm: f64) -> bool {
+    (0..count).all(|i| {
+        let azimuth_deg = first_deg + 360.0 * i as f64 / count as f64;
+        pocket.is_clear(radius_mm * DVec2::from_angle(azimuth_deg.to_radians()), hole_mm)
+    })
+}
+
+/// Smallest ring for so many springs from an azimuth on, whatever stands below, mm.
+fn ring_from_mm(k: &Known<'_>, count: usize, first_deg: f64) -> f64 {
     let (pocket, wall) = (pocket_mm(k), wall_mm(k));
     let coil = 0.5 * k.n("springs.outer_diameter_mm");
-    let between = spring_from_light_rad(k, count, first_deg(k, count)).min(0.5 * std::f64::consts::PI).sin();
+    let between = spring_from_light_rad(k, count, first_deg).min(0.5 * std::f64::consts::PI).sin();
     let view = view_mm(k, k.n("platforms.upper.underside_z_mm")) + wall + pocket;
     let camera = (bore_mm(k) + wall + pocket).max(0.5 * k.n("camera_body.diameter_mm") + 1.0 + coil);
     let lights = (pit_half_mm(k) + wall + pocket) / between.max(0.05);
-    past_markers_mm(k, count, view.max(camera).max(lights))
+    past_markers_mm(k, count, first_deg, view.max(camera).max(lights))
 }
 
 /// The smallest ring from a radius on of which no push-out hole comes near a marker's window, mm.
-fn past_markers_mm(k: &Known<'_>, count: usize, from_mm: f64) -> f64 {
+fn past_markers_mm(k: &Known<'_>, count: usize, first_deg: f64, from_mm: f64) -> f64 {
     const STEP_MM: f64 = 0.05;
     let hole = 0.5 * k.n("magnet_pockets.push_out_diameter_mm");
     let apart = hole + wall_mm(k) + 0.5 * k.n("white_markers.diameter_mm") + 0.7 * SWAY_MM;
@@ -41,7 +79,7 @@ fn past_markers_mm(k: &Known<'_>, count: usize, from_mm: f64) -> f64 {
         .filter_map(|place| Some(DVec2::new(place.get(0)?.as_f64()?, place.get(1)?.as_f64()?)))
         .map(|place| place - place.normalize_or_zero() * 0.5 * sheet_mm(k))
         .collect();
-    let first = first_deg(k, count).to_radians();
+    let first = first_deg.to_radians();
     let is_clear = |radius: f64| {
         (0..count).all(|i| {
             let azimuth = first + std::f64::consts::TAU * i as f64 / count as f64;
@@ -55,7 +93,8 @@ fn past_markers_mm(k: &Known<'_>, count: usize, from_mm: f64) -> f64 {
 
 /// How many springs a ring gets.
 pub(super) fn ring_count(k: &Known<'_>) -> usize {
-    if ring_mm(k, 6) <= 1.5 * ring_mm(k, 3) { 6 } else { 3 }
+    let smallest = |count: usize| ring_from_mm(k, count, first_deg(k, count));
+    if smallest(6) <= 1.5 * smallest(3) { 6 } else { 3 }
 }
 
 /// How many springs there are.

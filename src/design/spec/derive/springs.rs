@@ -1,12 +1,11 @@
 //! Springs, magnets, and the loads that they carry.
 
-use glam::DVec2;
 use serde_json::{Value, json};
 
-use super::board::{has_board, is_clear_of_pocket};
+use super::board::{Pocket, has_board};
 use super::geometry::{pocket_mm, wall_mm};
-use super::known::{Known, down, up};
-use super::room::{HOLE_IN_RECESS_MM, first_deg, half_mm, ring_count, ring_mm, spring_count};
+use super::known::{Known, down, tidy, up};
+use super::room::{HOLE_IN_RECESS_MM, RING_STEP_MM, half_mm, is_clear, ring, ring_count, spring_count};
 use super::rule::{Rule, fixed, follows};
 
 /// So much of what the wire bears may the largest press use.
@@ -48,7 +47,7 @@ pub(super) const RING: &[Rule] = &[
         "springs.places",
         "on a ring as far in as view, camera and lights allow, and moved out to the platforms' wall; six of them, two \
          between neighbouring lights, or three where six would need a ring half as wide again; their push-out holes clear of \
-         the edge of a camera board's pocket",
+         the edge of a camera board's pocket, the ring turned by up to 20 degrees or widened where that asks for it",
         places,
     ),
     follows(
@@ -79,10 +78,10 @@ fn claims(k: &Known<'_>) -> Option<Value> {
     } else {
         (0.5 * radius, 0.866 * radius + dome.center_z_mm())
     };
-    let (off_axis, off_height) = (super::known::tidy(off_axis), super::known::tidy(off_height));
-    let of = |share: f64| super::known::tidy(share * radius);
+    let (off_axis, off_height) = (tidy(off_axis), tidy(off_height));
+    let of = |share: f64| tidy(share * radius);
     // the push tilts too, which adds to what the spring at the end has to hold
-    let push = of(0.05).min(super::known::tidy(0.85 * k.n("magnets.grip_force_n")));
+    let push = of(0.05).min(tidy(0.85 * k.n("magnets.grip_force_n")));
     Some(json!([
         { "name": "press", "force_n": [0, 0, -of(1.7)], "point_mm": [0, 0, height] },
         { "name": "press off centre", "force_n": [0, 0, -of(0.5)], "point_mm": [off_axis, 0, off_height] },
@@ -95,8 +94,9 @@ fn claims(k: &Known<'_>) -> Option<Value> {
 
 fn places(k: &Known<'_>) -> Option<Value> {
     let count = ring_count(k);
+    let (first_deg, narrowest_mm) = ring(k, count);
     let wall = wall_mm(k) + pocket_mm(k);
-    let half = half_mm(k, ring_mm(k, count) + wall);
+    let half = half_mm(k, narrowest_mm + wall);
     let reach = k
         .value("platforms.outer_mm")
         .map_or(half, |_| 0.5 * k.at("platforms.outer_mm", 0).min(k.at("platforms.outer_mm", 1)));
@@ -104,24 +104,16 @@ fn places(k: &Known<'_>) -> Option<Value> {
     let recess = 0.5 * k.at("sheet.size_mm", 0).min(k.at("sheet.size_mm", 1)) + k.n("sheet.clearance_mm");
     let hole = 0.5 * k.n("magnet_pockets.push_out_diameter_mm");
     let widest_mm = down((reach - wall).min(recess - hole - HOLE_IN_RECESS_MM), 0.01);
-    let radius_mm = if has_board(k) { beside_pocket_mm(k, count, widest_mm, hole) } else { widest_mm };
-    Some(
-        json!({ "ring": { "count": count, "radius_mm": radius_mm, "first_azimuth_deg": first_deg(k, count) } }),
-    )
-}
-
-/// The widest ring, up to a radius, whose push-out holes leave no thin wall beside a board's pocket, mm.
-fn beside_pocket_mm(k: &Known<'_>, count: usize, widest_mm: f64, hole_mm: f64) -> f64 {
-    const STEP_MM: f64 = 0.05;
-    let narrowest_mm = ring_mm(k, count);
-    let is_clear = |radius: &f64| {
-        (0..count).all(|i| {
-            let azimuth_deg = first_deg(k, count) + 360.0 * i as f64 / count as f64;
-            is_clear_of_pocket(k, *radius * DVec2::from_angle(azimuth_deg.to_radians()), hole_mm)
-        })
-    };
-    let steps = (0..400).map(|step| down(widest_mm - STEP_MM * f64::from(step), 0.01));
-    steps.take_while(|radius| *radius >= narrowest_mm).find(is_clear).unwrap_or(widest_mm)
+    let mut radius_mm = widest_mm;
+    if has_board(k) {
+        let pocket = Pocket::of(k);
+        let steps = (0..400).map(|step| down(widest_mm - RING_STEP_MM * f64::from(step), 0.01));
+        let mut clear = steps
+            .take_while(|radius| *radius >= narrowest_mm - 1e-9)
+            .filter(|radius| is_clear(&pocket, count, first_deg, *radius, hole));
+        radius_mm = clear.next().unwrap_or(narrowest_mm.min(widest_mm));
+    }
+    Some(json!({ "ring": { "count": count, "radius_mm": radius_mm, "first_azimuth_deg": tidy(first_deg) } }))
 }
 
 fn wire(k: &Known<'_>) -> Option<Value> {

@@ -124,3 +124,36 @@ fn any_one_field_may_be_left_out_of_a_whole_file() {
         }
     }
 }
+
+#[test]
+fn springs_of_any_common_size_stand_clear_of_a_boards_pocket() {
+    let mut unclear = Vec::new();
+    for camera in ["picam2", "picam3", "uvc32", "uvc38"] {
+        for radius_mm in (4..=25).map(f64::from) {
+            for outer_mm in [3.0, 3.5, 4.0] {
+                for wall_mm in [0.6, 0.8] {
+                    let mut design = json!({
+                        "version": 1, "name": "least", "camera": { "from": camera },
+                        "camera_body": { "from": camera }, "dome": { "radius_mm": radius_mm },
+                        "springs": { "outer_diameter_mm": outer_mm }, "process": { "min_wall_mm": wall_mm },
+                    });
+                    crate::spec::fill::fill(&mut design, None).unwrap();
+                    derive(&mut design).unwrap_or_else(|error| panic!("{camera} {radius_mm}: {error}"));
+                    let known = Known::new(&design);
+                    let ring = &design["springs"]["places"]["ring"];
+                    let of = |key: &str| ring[key].as_f64().unwrap();
+                    let hole_mm = 0.5 * known.n("magnet_pockets.push_out_diameter_mm");
+                    let is_clear = (0..ring["count"].as_u64().unwrap()).all(|i| {
+                        let azimuth_deg = of("first_azimuth_deg") + 360.0 * i as f64 / of("count");
+                        let at = of("radius_mm") * glam::DVec2::from_angle(azimuth_deg.to_radians());
+                        board::Pocket::of(&known).is_clear(at, hole_mm)
+                    });
+                    if !is_clear {
+                        unclear.push(format!("{camera} {radius_mm} {outer_mm} {wall_mm}"));
+                    }
+                }
+            }
+        }
+    }
+    assert!(unclear.is_empty(), "{}: {unclear:#?}", unclear.len());
+}

@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::Why;
 
+/// A cable is bent to no less than this many of its diameters where the design gives no radius: the usual limit of
+/// thin flexible cables.
+pub const MIN_BEND_DIAMETERS: f64 = 2.0;
+
 /// What a camera's housing is.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -71,7 +71,7 @@ pub struct RuntimeSection {
     /// Radius of the circular mask in the undistorted frame, px.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 20000.0))]
     pub mask_radius_px: f64,
-    /// Field angle that the mask's edge shall show, degrees; it sets the focal length of the undistorted
+    /// Field angle that the mask's edge must show, degrees; it sets the focal length of the undistorted
     /// frame, f = mask_radius_px / tan(angle). The frame keeps the raw frame's size and principal point.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub mask_field_angle_deg: f64,

@@ -34,7 +34,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use accuracy::AccuracySection;
-pub use body::{CameraBoardSection, CameraBodyKind, CameraBodySection};
+pub use body::{CameraBoardSection, CameraBodyKind, CameraBodySection, MIN_BEND_DIAMETERS};
 pub use camera::{CameraSection, ModelName, RuntimeSection};
 pub use light::{DiffuserSection, ExposureSection, PowerRgb, ReflectanceRgb};
 pub use loads::{CentroidNoiseSection, LoadClaim, LoadsSection, WhiteMarkersSection};
@@ -95,7 +95,7 @@ pub struct DesignFile {
     pub envelope: EnvelopeSection,
     /// The frame of the paper's runtime.
     pub runtime: RuntimeSection,
-    /// The black dots, as they shall appear in the image.
+    /// The black dots, as they should appear in the image.
     pub pattern: PatternSection,
     /// How they are printed.
     pub print: PrintSection,
@@ -114,7 +114,7 @@ pub struct DesignFile {
     /// The pockets of those magnets; left out of a rigid mount.
     #[serde(default, skip_serializing_if = "MagnetPocketsSection::is_none")]
     pub magnet_pockets: MagnetPocketsSection,
-    /// Weight of what the springs carry; left out where it shall not count.
+    /// Weight of what the springs carry; left out where it must not count.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity: Option<GravitySection>,
     /// The loads that the design claims to carry.
@@ -145,7 +145,7 @@ pub struct DesignFile {
     /// How exact the meshes are; may be left out where `accuracy` says it.
     #[serde(default)]
     pub mesh: MeshSection,
-    /// How exact the results shall be; left out where every setting is given.
+    /// How exact the results must be; left out where every setting is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<AccuracySection>,
 }

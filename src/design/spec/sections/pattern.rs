@@ -1,4 +1,4 @@
-//! The black dots, as they shall appear in the image.
+//! The black dots, as they should appear in the image.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

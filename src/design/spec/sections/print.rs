@@ -100,7 +100,7 @@ pub struct PrintSection {
     /// Pad's footprint over the picture's diameter; registration crosses lie outside it.
     #[schemars(range(min = 1.0, max = 10.0))]
     pub pad_over_image: f64,
-    /// Resolution of the raster film, dots per inch.
+    /// Resolution of the bitmap film, dots per inch.
     #[schemars(range(min = 72, max = 20000))]
     pub dpi: u32,
     /// How far a drawn outline may lie from the exact one, mm; chosen from `accuracy` where it is left out.

@@ -58,6 +58,7 @@ impl Default for SpringsSection {
                 shear_modulus_mpa: 0.0,
                 elastic_modulus_mpa: 0.0,
                 allowable_shear_mpa: 0.0,
+                temperature: None,
             },
             places: SpringPlaces::Listed(Vec::new()),
             reference_point_mm: None,
@@ -105,6 +106,27 @@ pub struct WireSection {
     /// 45 % of the tensile strength for music wire, 35 % for 302 stainless.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1.0e5))]
     pub allowable_shear_mpa: f64,
+    /// How the moduli follow the temperature; left out: `track --temperature` is refused.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<WireTemperature>,
+}
+
+/// How the wire's moduli follow the temperature.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WireTemperature {
+    /// Temperature that the moduli are of, degrees C.
+    #[schemars(range(min = -100.0, max = 200.0))]
+    pub at_c: f64,
+    /// Change of the moduli by a kelvin, part of them: negative, for metals soften.
+    #[schemars(range(min = -0.01, max = 0.01))]
+    pub modulus_per_k: f64,
+    /// How far that may be off, as one standard deviation.
+    #[schemars(range(min = 0.0, max = 0.01))]
+    pub modulus_per_k_sd: f64,
+    /// Reasons and sources, by field.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub why: Option<Why>,
 }
 
 /// Where the springs' axes stand: on a ring, or one by one.

@@ -43,6 +43,18 @@ pub struct TolerancesSection {
     /// The springs' outer diameter, mm.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub spring_diameter_mm: f64,
+    /// The springs' active coils.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub active_coils: f64,
+    /// The moduli of the springs' wire, percent of them.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub modulus_percent: f64,
+    /// How far the camera moves in its mount after a calibration, on each axis, mm.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub camera_drift_mm: f64,
+    /// How far it turns after a calibration, about each axis, degrees.
+    #[schemars(range(min = 0.0, max = 180.0))]
+    pub camera_drift_deg: f64,
     /// Sensors drawn in a Monte Carlo; chosen from `accuracy` where it is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 100000))]

@@ -66,6 +66,7 @@ fn axis_fit(
         readings: rows.len(),
         coefficients: solved.coefficients,
         half_widths: solved.half_widths,
+        covariance: solved.covariance,
         sd: solved.sd,
         outliers,
         hysteresis,

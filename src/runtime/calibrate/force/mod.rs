@@ -7,6 +7,7 @@
 //!
 //! [`examine_pairs`] and [`examine_fit`] ask whether table and fit can be this sensor's, and name the mistake if not.
 
+mod apply;
 mod choice;
 mod fit;
 mod motion;

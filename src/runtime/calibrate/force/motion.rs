@@ -61,6 +61,13 @@ pub(super) fn with_scatter(pairs: &[Pair], found: &ForceFit, nominal: &Matrix6<f
 /// spread between them, a standard deviation of the distance over the root of twelve).
 pub(super) fn split_half_width(found: &mut ForceFit, exact: &ForceFit) {
     for (axis, other) in found.axes.iter_mut().zip(&exact.axes) {
+        let apart: Vec<f64> = axis.coefficients.iter().zip(&other.coefficients).map(|(a, b)| a - b).collect();
+        let is_known: Vec<bool> = axis.half_widths.iter().map(Option::is_some).collect();
+        for (i, j) in (0..apart.len()).flat_map(|i| (0..apart.len()).map(move |j| (i, j))) {
+            if is_known[i] && is_known[j] {
+                axis.covariance[(i, j)] += apart[i] * apart[j] / 12.0;
+            }
+        }
         let numbers = axis.coefficients.iter().zip(&other.coefficients);
         for (half, (a, b)) in axis.half_widths.iter_mut().zip(numbers) {
             if let Some(half) = half {

@@ -26,6 +26,8 @@ const MIN_VARIANCE_IN_NOISE: f64 = 1.0;
 pub(super) struct RobustFit {
     pub coefficients: Vec<f64>,
     pub half_widths: Vec<Option<f64>>,
+    /// Of the coefficients; zero where the data do not determine them.
+    pub covariance: DMatrix<f64>,
     pub sd: f64,
 }
 
@@ -143,8 +145,8 @@ impl Terms {
         Some((&inverse * right, determined))
     }
 
-    /// Huber's asymptotic variance of an M-estimate: `sd^2 E[psi^2] / E[psi']^2 (X^T X)^-1`, its diagonal.
-    fn variances(&self, found: &DVector<f64>, sd: f64) -> DVector<f64> {
+    /// Huber's asymptotic variance of an M-estimate: `sd^2 E[psi^2] / E[psi']^2 (X^T X)^-1`.
+    fn covariance(&self, found: &DVector<f64>, sd: f64) -> DMatrix<f64> {
         let (height, width) = self.design.shape();
         let n = height as f64;
         let left = &self.target - &self.design * found;
@@ -163,14 +165,14 @@ impl Terms {
             matrix.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(width, width))
         };
         if self.noise.is_empty() {
-            return inverse(gram).diagonal().map(|c| variance * c);
+            return inverse(gram) * variance;
         }
         // Fuller (1987), theorem 2.2.1: residuals and noise of the terms go together, which widens the middle.
         let noise = self.noise_sum(|_| 1.0);
         let pull = &noise * found / n.max(1.0);
         let middle = &gram + &pull * pull.transpose() * (n / (sd * sd).max(f64::MIN_POSITIVE));
         let outer = inverse(gram - noise);
-        (&outer * middle * &outer).diagonal().map(|c| variance * c)
+        &outer * middle * &outer * variance
     }
 }
 
@@ -206,14 +208,18 @@ pub(super) fn robust(
             break;
         }
     }
-    let variances = terms.variances(&found, sd);
+    let scaled = terms.covariance(&found, sd);
+    let mut covariance = DMatrix::zeros(terms.count, terms.count);
     let mut coefficients = vec![0.0; terms.count];
     let mut half_widths = vec![None; terms.count];
     for (k, term) in terms.used.iter().enumerate() {
         coefficients[*term] = found[k] / terms.scale[k];
         if determined[k] {
-            half_widths[*term] = Some(1.96 * variances[k].max(0.0).sqrt() / terms.scale[k]);
+            half_widths[*term] = Some(1.96 * scaled[(k, k)].max(0.0).sqrt() / terms.scale[k]);
+            for (j, other) in terms.used.iter().enumerate().filter(|(j, _)| determined[*j]) {
+                covariance[(*term, *other)] = scaled[(k, j)] / (terms.scale[k] * terms.scale[j]);
+            }
         }
     }
-    RobustFit { coefficients, half_widths, sd }
+    RobustFit { coefficients, half_widths, covariance, sd }
 }

@@ -76,6 +76,9 @@ pub struct AxisFit {
     pub coefficients: Vec<f64>,
     /// Half width of the 95 % confidence interval of each; null where the data do not determine it.
     pub half_widths: Vec<Option<f64>>,
+    /// Covariance of the coefficients; rows of those that the data do not determine are zero.
+    #[serde(skip)]
+    pub covariance: DMatrix<f64>,
     /// Standard deviation of the readings about the fit (robust), N or N*mm.
     pub sd: f64,
     /// Rows of the data that are outliers, from 0.

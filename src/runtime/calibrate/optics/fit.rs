@@ -7,7 +7,7 @@ use super::normal::{OwnBlock, Reduced};
 use super::plausibility::{examine_numbers, examine_observations, examine_residuals};
 use super::problem::Problem;
 use super::types::{Kind, Observation, OpticsFit, OpticsFitError, Parameter};
-use crate::constants::{CalibrationPriors, Constants};
+use crate::constants::{CalibrationPriors, Constants, OpticsUncertainty};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::{Rigid, rotation_from_vector};
 use domecast_optics::pose::Sighting;
@@ -199,6 +199,22 @@ fn start_poses(problem: &Problem, priors: &CalibrationPriors) -> Result<Vec<Rigi
     Ok(poses)
 }
 
+/// What is left open of camera, layers and white markers.
+fn uncertainty(constants: &Constants, problem: &Problem, covariance: &DMatrix<f64>) -> OpticsUncertainty {
+    let (first, count) = (problem.body_numbers(), problem.intrinsics.count());
+    let named = problem.camera_numbers() + 2 * problem.white_markers.len();
+    let mut root = DMatrix::identity(named, named);
+    if let Some(own) = problem.intrinsics.root() {
+        root.view_mut((first, first), (count, count)).copy_from(own);
+    }
+    let whole = &root * covariance.view((0, 0), (named, named)) * root.transpose();
+    let row = |i: usize| (0..named).map(|j| 0.5 * (whole[(i, j)] + whole[(j, i)])).collect();
+    OpticsUncertainty {
+        parameters: (0..named).map(|k| problem.name(k, constants).0).collect(),
+        covariance: (0..named).map(row).collect(),
+    }
+}
+
 /// The constants with what was fitted.
 fn measured(
     constants: &Constants,
@@ -243,6 +259,11 @@ fn measured(
         dot.surface_mm = at.to_array();
         dot.normal = (at / at.length()).to_array();
         dot.image_px = optics.project(at).map_err(hidden)?.to_array();
+    }
+    made.optics_uncertainty = Some(uncertainty(constants, problem, covariance));
+    if let Some(open) = made.springs.as_mut().and_then(|springs| springs.uncertainty.as_mut()) {
+        // The stiffness was measured through other optics.
+        open.through_optics = false;
     }
     made.refit_plain_runtime();
     Ok(made)

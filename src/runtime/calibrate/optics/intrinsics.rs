@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::constants::CameraConstants;
+use crate::constants::{CameraConstants, shift_lens};
 use domecast_optics::camera::LensSpec;
 
 /// fx, fy, cx, cy and the coefficients of the distortion, as independent numbers of deviation one: the columns of a root
@@ -62,16 +62,12 @@ impl Intrinsics {
     }
 
     pub fn apply(&self, x: &[f64], lens: &mut LensSpec) {
-        let steps = self.steps(x);
-        if let [fx, fy, cx, cy, coefficients @ ..] = steps.as_slice() {
-            lens.matrix[0][0] += fx;
-            lens.matrix[1][1] += fy;
-            lens.matrix[0][2] += cx;
-            lens.matrix[1][2] += cy;
-            for (coefficient, step) in lens.distortion.iter_mut().zip(coefficients) {
-                *coefficient += step;
-            }
-        }
+        shift_lens(lens, &self.steps(x));
+    }
+
+    /// What takes the independent numbers to the numbers themselves.
+    pub fn root(&self) -> Option<&DMatrix<f64>> {
+        self.root.as_ref()
     }
 
     /// Covariance of the numbers themselves from that of the independent ones; the prior's of a unit matrix.

@@ -4,8 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::intrinsics::Intrinsics;
 use super::types::{Kind, Observation, OpticsFitError};
-use crate::constants::{CalibrationPriors, Constants};
-use domecast_optics::numeric::rotation_from_vector;
+use crate::constants::{CalibrationPriors, Constants, body_numbers, shift_body};
 use domecast_optics::pose::{Marker, PoseOptions, PoseSolver, outline_centroid_offset};
 use domecast_optics::{DomeShape, OpticsSpec, SensorOptics};
 
@@ -98,7 +97,7 @@ impl<'a> Problem<'a> {
 
     /// Pupil, camera rotation and layers take the first numbers.
     pub fn body_numbers(&self) -> usize {
-        6 + 2 * self.flat + 1
+        body_numbers(&self.nominal)
     }
 
     /// Then the camera's own.
@@ -112,18 +111,7 @@ impl<'a> Problem<'a> {
 
     pub fn spec(&self, x: &[f64]) -> OpticsSpec {
         let mut spec = self.nominal.clone();
-        spec.sensor_from_camera.translation_mm += DVec3::new(x[0], x[1], x[2]);
-        let turn = rotation_from_vector(DVec3::new(x[3], x[4], x[5]));
-        spec.sensor_from_camera.rotation *= turn;
-        let flat = self.flat;
-        for (k, layer) in spec.layers.iter_mut().enumerate() {
-            if let Some(thickness) = layer.thickness_mm.as_mut() {
-                *thickness = (*thickness + x[6 + k]).max(0.0);
-            }
-            for index in &mut layer.index {
-                *index = (*index + x[6 + flat + k]).max(1.0);
-            }
-        }
+        shift_body(&mut spec, x);
         self.intrinsics.apply(&x[self.body_numbers()..self.camera_numbers()], &mut spec.lens);
         spec
     }

@@ -13,12 +13,23 @@ const MIN_BRIGHT_LEVEL: u8 = 24;
 const MAX_SATURATED: f64 = 0.5;
 /// Contrast below which there is nothing to see, levels.
 const MIN_CONTRAST: u8 = 10;
+/// Mean brightness of a frame over that of the last, or the other way round, from which on it jumped: lamps that flicker,
+/// and cameras that follow the light in steps, do less.
+const MIN_JUMP: f64 = 1.2;
+/// A frame that differs from the last by less than this part of what two frames differed by at least so far is the last one
+/// again, coded anew; below so many levels a camera has no noise to tell.
+const SAME_PART: f64 = 0.5;
+const MIN_CHANGE: f64 = 0.2;
+/// The least change so far is given up by this part a frame: light and gain change.
+const FORGOTTEN: f64 = 0.02;
 
 /// Takes the exposure of frames; keeps the last frame's samples.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ExposureMeter {
     samples: Vec<u8>,
     before: Vec<u8>,
+    /// The least that the samples of two frames differed by so far, levels in the mean.
+    min_change: Option<f64>,
 }
 
 /// Exposure statistics of one frame, inside of the mask.
@@ -29,8 +40,10 @@ pub(crate) struct Exposure {
     pub high: u8,
     /// Part of the samples that is saturated.
     pub saturated: f64,
-    /// All samples are those of the last frame.
+    /// All samples are those of the last frame, or differ from them by less than the camera's noise.
     pub is_repeated: bool,
+    /// The frame is much brighter or darker than the last.
+    pub has_jumped: bool,
 }
 
 impl Exposure {
@@ -74,12 +87,28 @@ impl ExposureMeter {
         };
         let level = |part: f64| below(part).unwrap_or(255) as u8;
         let bright: u32 = counts[usize::from(SATURATED_LEVEL)..].iter().sum();
+        let sum = |samples: &[u8]| samples.iter().map(|v| u64::from(*v)).sum::<u64>() as f64;
+        let brighter = sum(&self.samples).max(1.0) / sum(&self.before).max(1.0);
+        let has_before = !self.samples.is_empty() && self.samples.len() == self.before.len();
         Exposure {
             low: level(0.02),
             high: level(0.98),
             saturated: if total > 0.0 { f64::from(bright) / total } else { 0.0 },
-            is_repeated: !self.samples.is_empty() && self.samples == self.before,
+            is_repeated: has_before && self.is_same(),
+            has_jumped: has_before && !(1.0 / MIN_JUMP..MIN_JUMP).contains(&brighter),
         }
+    }
+
+    /// Whether the samples are the last ones, but for less than what always changes between two frames.
+    fn is_same(&mut self) -> bool {
+        let apart = self.samples.iter().zip(&self.before).map(|(a, b)| u64::from(a.abs_diff(*b)));
+        let change = apart.sum::<u64>() as f64 / self.samples.len() as f64;
+        if change == 0.0 {
+            return true;
+        }
+        let so_far = self.min_change.unwrap_or(change);
+        self.min_change = Some(change.min(so_far * (1.0 + FORGOTTEN)));
+        so_far > MIN_CHANGE && change < SAME_PART * so_far
     }
 
     /// Forgets the last frame.

@@ -303,7 +303,7 @@ mod tests {
 
     /// Dots of a lattice, where they are expected, and blobs a third of the spacing away from there.
     fn scene(missing: &[usize]) -> (Vec<DotModel>, Vec<DotTrack>, Vec<DarkBlob>) {
-        let outline = SpotOutline { radius_px: 3.5, area_px: 38.0, spread_px2: 6.0 };
+        let outline = SpotOutline { radius_px: 3.5, area_px: 38.0, spread_px2: 6.0, ..Default::default() };
         let models = DotModel::lattice(6, 5, SPACING_PX, outline);
         let at =
             |i: usize| DVec2::new(30.0 + SPACING_PX * (i % 6) as f64, 30.0 + SPACING_PX * (i / 6) as f64);
@@ -354,6 +354,7 @@ mod tests {
                 spread_px2: 6.0,
                 sd_px: 0.02,
                 ground: 150.0,
+                ..Default::default()
             });
         }
         let between = tracks[0].now_px().unwrap() + SPACING_PX * 0.5;

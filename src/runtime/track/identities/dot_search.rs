@@ -22,6 +22,8 @@ const SAME_PLACE: f64 = 0.25;
 const SURELY_SMOOTH: f64 = 0.3;
 /// How far a dot's motion may differ from its neighbours', in parts of its spacing.
 const MAX_UNLIKE: f64 = 0.4;
+/// One dot in so many is looked at anew in each frame.
+const LOOKED_AT_PART: usize = 4;
 /// Rounds in which found dots lead to their neighbours.
 const MAX_ROUNDS: usize = 64;
 
@@ -35,15 +37,22 @@ pub(super) struct DotSearch<'a, 'b> {
 }
 
 impl DotSearch<'_, '_> {
-    fn measure(&mut self, index: usize, start: DVec2, stray_px: f64) -> Result<DarkSpot, SpotFault> {
-        self.meter.measure(self.plane, start, &self.tracks[index].outline, stray_px)
+    fn measure(
+        &mut self,
+        index: usize,
+        start: DVec2,
+        stray_px: f64,
+        known: Option<&DarkSpot>,
+    ) -> Result<DarkSpot, SpotFault> {
+        self.meter.measure(self.plane, start, &self.tracks[index].outline, stray_px, known)
     }
 
     /// Each dot where its own past puts it: what the pose expects and it was displaced by, or the flow.
-    pub fn follow(&mut self, flow: Option<&Flow>) {
+    pub fn follow(&mut self, flow: Option<&Flow>, turn: usize) {
         for index in 0..self.tracks.len() {
             let track = &mut self.tracks[index];
-            track.spot = None;
+            // The looks of some are taken anew in each frame, and of all whose size has changed.
+            let known = track.spot.take().filter(|_| !(index + turn).is_multiple_of(LOOKED_AT_PART));
             track.start_px = None;
             if !track.is_wanted() {
                 continue;
@@ -54,7 +63,7 @@ impl DotSearch<'_, '_> {
             let Some(start) = by_flow.or(by_pose) else { continue };
             track.start_px = Some(start);
             let reach = OWN_REACH * self.models[index].spacing_px;
-            match self.measure(index, start, reach) {
+            match self.measure(index, start, reach, known.as_ref()) {
                 Ok(spot) => self.tracks[index].find(spot),
                 Err(SpotFault::Misshapen) => self.tracks[index].state = MarkState::Merged,
                 Err(_) => {}
@@ -101,7 +110,9 @@ impl DotSearch<'_, '_> {
                     if track.state == MarkState::Merged && again {
                         continue;
                     }
-                    let Ok(spot) = self.measure(index, start, NEIGHBOR_REACH * spacing) else { continue };
+                    let Ok(spot) = self.measure(index, start, NEIGHBOR_REACH * spacing, None) else {
+                        continue;
+                    };
                     if self.is_free(index, spot.at_px) {
                         if self.tracks[index].start_px.is_none() {
                             self.tracks[index].start_px = Some(start);

@@ -26,6 +26,8 @@ pub(in crate::track) struct DotTrack {
     /// Whether the last search left open which dot it is.
     pub is_unsure: bool,
     pub spot: Option<DarkSpot>,
+    /// Why the spot does not look like a dot, if it does not.
+    pub fault: Option<MarkState>,
 }
 
 impl DotTrack {

@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::blob_matching::BlobMatcher;
 use super::choice::IdentityChoice;
+use super::dot_faults::DotFaults;
 use super::dot_prediction::DotPrediction;
 use super::dot_search::DotSearch;
 use super::dot_track::DotTrack;
@@ -83,7 +84,7 @@ impl Dots {
             track.lose(track.absent());
             let Some(at) = blob_of(index) else { continue };
             let reach = BLOB_REACH * model.spacing_px;
-            if let Ok(spot) = self.meter.measure(plane, at, &track.outline, reach) {
+            if let Ok(spot) = self.meter.measure(plane, at, &track.outline, reach, None) {
                 track.find(spot);
                 track.start_px = Some(spot.at_px);
                 if let Some(expected) = track.expected_px {
@@ -109,6 +110,9 @@ pub(in crate::track) struct DotIdentities {
     searched: bool,
     false_dots: Vec<DVec2>,
     key: KeyCheck,
+    faults: DotFaults,
+    /// Frames so far.
+    turn: usize,
 }
 
 impl DotIdentities {
@@ -126,13 +130,14 @@ impl DotIdentities {
             meter.prepare(largest * model.outline.radius_px);
         }
         let count = models.len();
+        let widest_px = models.iter().map(|model| model.outline.radius_px).fold(0.0, f64::max);
         let follows = options.motion == FollowMethod::LucasKanade;
         let steps = options.steps;
         Self {
             dots: Dots { meter, tracks: vec![DotTrack::default(); count], order: Vec::with_capacity(count) },
             prediction: DotPrediction::default(),
             flow: follows.then(|| Flow::new(width, height, options.pyramid_levels)),
-            scan: BlobScan::new(width, height),
+            scan: BlobScan::new(width, height, widest_px),
             scan_settings: ScanSettings {
                 blur: steps.blur,
                 sharpen: steps.sharpen,
@@ -150,6 +155,8 @@ impl DotIdentities {
             searched: false,
             false_dots: Vec::with_capacity(MAX_FALSE_DOTS),
             key: KeyCheck::new(options.camera_turned_rad.is_some(), width, height),
+            faults: DotFaults::new(count),
+            turn: 0,
         }
     }
 
@@ -180,6 +187,7 @@ impl DotIdentities {
                 self.key.search(blobs.unwrap_or_default(), key, models, model.optics.lens().spec());
             }
         }
+        self.faults.judge(models, &mut self.dots.tracks);
         self.dots.tracks.iter_mut().for_each(DotTrack::remember);
         self.now()
     }
@@ -190,7 +198,8 @@ impl DotIdentities {
         let (known, wanted) =
             wanted.fold((0, 0), |(known, all), t| (known + usize::from(t.displaced_px.is_some()), all + 1));
         let mut search = self.dots.search(frame.plane, models);
-        search.follow(self.flow.as_ref());
+        search.follow(self.flow.as_ref(), self.turn);
+        self.turn = self.turn.wrapping_add(1);
         search.spread();
         let torn = search.check();
         let found = self.dots.found();
@@ -284,6 +293,7 @@ impl DotIdentities {
         self.forget_last();
         self.dots.tracks.fill(DotTrack::default());
         self.prediction = DotPrediction::default();
+        self.turn = 0;
         self.key.restart();
     }
 }

@@ -93,6 +93,7 @@ impl KeyFrame<'_, '_> {
             expected_px + lead.displaced_px,
             outline,
             REACH * model.spacing_px,
+            None,
         ) {
             Ok(_) => Found::Dot,
             Err(SpotFault::Faint | SpotFault::Strayed) => Found::Gap,

@@ -84,8 +84,7 @@ mod tests {
 
     #[test]
     fn combinations_come_by_rank_and_only_of_what_there_is() {
-        let disc =
-            FittedDisc { centroid_px: DVec2::ZERO, sd_px: 0.1, misfit: 0.1, levels: [1.0; 3], shading: None };
+        let disc = FittedDisc { sd_px: 0.1, misfit: 0.1, levels: [1.0; 3], ..FittedDisc::default() };
         let some = Some(disc);
         let all = |discs| MarkerHypotheses { discs }.combinations(None).collect::<Vec<_>>();
         let found = all([[some, some, None, None], [some, None, None, None], [some; 4], [some; 4]]);

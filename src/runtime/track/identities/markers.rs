@@ -138,7 +138,7 @@ impl MarkerIdentities {
     /// Takes in how the light falls off across the discs of a frame whose pose is good.
     pub fn learn_shading(&mut self) {
         for (shading, disc) in self.shading.iter_mut().zip(&self.discs) {
-            shading.add(disc.and_then(|disc| disc.shading));
+            shading.add(disc.filter(|disc| disc.fault.is_none()).and_then(|disc| disc.shading));
         }
     }
 

@@ -7,6 +7,7 @@
 mod blob_matching;
 mod buckets;
 mod choice;
+mod dot_faults;
 mod dot_prediction;
 mod dot_search;
 mod dot_track;

@@ -5,8 +5,10 @@ use glam::DVec2;
 use super::filter::{self, Pads};
 use crate::track::frame::Plane;
 
-/// Side of the blocks that levels are found in, px; a power of two.
-const BLOCK: usize = 16;
+/// Least side of the blocks that levels are found in, px, and over the widest dot's diameter: the ground must be more than
+/// half of a block, wherever a dot lies in it.
+const MIN_BLOCK: usize = 16;
+const BLOCK_BY_DIAMETER: f64 = 1.5;
 /// Largest number of runs that a frame of marks could have; noise has more.
 const MAX_RUNS: usize = 1 << 15;
 
@@ -57,6 +59,8 @@ struct Sum {
 pub struct BlobScan {
     width: usize,
     height: usize,
+    /// Side of the blocks.
+    block: usize,
     first: Vec<u8>,
     second: Vec<u8>,
     /// Middle and lowest level of each block, then the threshold.
@@ -71,12 +75,14 @@ pub struct BlobScan {
 }
 
 impl BlobScan {
-    /// A search of frames of one size.
-    pub fn new(width: usize, height: usize) -> Self {
-        let blocks = width.div_ceil(BLOCK) * height.div_ceil(BLOCK);
+    /// A search of frames of one size for dots of up to a radius, px.
+    pub fn new(width: usize, height: usize, radius_px: f64) -> Self {
+        let block = MIN_BLOCK.max((2.0 * BLOCK_BY_DIAMETER * radius_px).ceil() as usize);
+        let blocks = width.div_ceil(block) * height.div_ceil(block);
         Self {
             width,
             height,
+            block,
             first: vec![0; width * height],
             second: vec![0; width * height],
             ground: vec![0; blocks],
@@ -98,7 +104,7 @@ impl BlobScan {
         span: impl Fn(usize) -> [usize; 2],
         settings: &ScanSettings,
     ) -> Option<&[DarkBlob]> {
-        let (width, height) = (self.width, self.height);
+        let (width, height, side) = (self.width, self.height, self.block);
         if plane.width() != width || plane.height() != height {
             return None;
         }
@@ -115,16 +121,16 @@ impl BlobScan {
         }
         self.find_levels(settings);
         // Marks become ones in the second buffer.
-        let across = width.div_ceil(BLOCK);
+        let across = width.div_ceil(side);
         for y in 0..height {
             let row = &self.first[y * width..(y + 1) * width];
             let out = &mut self.second[y * width..(y + 1) * width];
             let [start, end] = span(y).map(|v| v.min(width));
             out[..start.min(end)].fill(0);
             out[end..].fill(0);
-            let levels = &self.levels[y / BLOCK * across..(y / BLOCK + 1) * across];
+            let levels = &self.levels[y / side * across..(y / side + 1) * across];
             for (block, level) in levels.iter().enumerate() {
-                let (a, b) = ((block * BLOCK).max(start), ((block + 1) * BLOCK).min(end));
+                let (a, b) = ((block * side).max(start), ((block + 1) * side).min(end));
                 if a < b {
                     for (to, value) in out[a..b].iter_mut().zip(&row[a..b]) {
                         *to = u8::from(value < level);
@@ -145,15 +151,16 @@ impl BlobScan {
             self.levels.fill(level);
             return;
         }
-        let (across, down) = (self.width.div_ceil(BLOCK), self.height.div_ceil(BLOCK));
+        let side = self.block;
+        let (across, down) = (self.width.div_ceil(side), self.height.div_ceil(side));
         for by in 0..down {
             for bx in 0..across {
-                // Every other pixel: 64 of them tell the middle level to a few parts of their noise.
-                let mut counts = [0_u8; 256];
+                // Every other pixel: 64 of them and more tell the middle level to a few parts of their noise.
+                let mut counts = [0_u16; 256];
                 let (mut total, mut low) = (0_u32, 255_u8);
-                let end_x = ((bx + 1) * BLOCK).min(self.width);
-                for y in (by * BLOCK..((by + 1) * BLOCK).min(self.height)).step_by(2) {
-                    let row = &self.first[y * self.width + bx * BLOCK..y * self.width + end_x];
+                let end_x = ((bx + 1) * side).min(self.width);
+                for y in (by * side..((by + 1) * side).min(self.height)).step_by(2) {
+                    let row = &self.first[y * self.width + bx * side..y * self.width + end_x];
                     for value in row.iter().step_by(2) {
                         counts[usize::from(*value)] += 1;
                         total += 1;

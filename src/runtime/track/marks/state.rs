@@ -14,6 +14,14 @@ pub enum MarkState {
     Merged,
     /// Seen, but it is not clear which mark it is.
     IdentityUnsure,
+    /// Seen with something dark on it or beside it.
+    Dirty,
+    /// Seen wider or longer than it should be, or twice.
+    Smeared,
+    /// Seen with a reflection on it or beside it.
+    Glare,
+    /// A part of it is covered.
+    PartlyHidden,
     /// Outside of the mask or of the camera's view at this pose.
     Hidden,
 }
@@ -27,6 +35,10 @@ impl MarkState {
             Self::Lost => "lost",
             Self::Merged => "merged",
             Self::IdentityUnsure => "identity_unsure",
+            Self::Dirty => "dirty",
+            Self::Smeared => "smeared",
+            Self::Glare => "glare",
+            Self::PartlyHidden => "partly_hidden",
             Self::Hidden => "hidden",
         }
     }

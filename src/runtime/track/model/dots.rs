@@ -32,18 +32,23 @@ pub(in crate::track) struct DotModel {
 /// Area, largest radius and spread of an outline of eight points about its centroid.
 fn outline_of(center: DVec2, outline: &[DVec2; 8]) -> SpotOutline {
     let (mut area, mut spread, mut radius) = (0.0, 0.0, 0.0_f64);
+    let mut apart = DVec2::ZERO;
     for (i, p) in outline.iter().enumerate() {
         let (a, b) = (*p - center, outline[(i + 1) % 8] - center);
         let swept = 0.5 * a.perp_dot(b);
         area += swept;
         // Second moment of the triangle (0, a, b) about its corner: area (a.a + a.b + b.b) / 6.
         spread += swept * (a.dot(a) + a.dot(b) + b.dot(b)) / 6.0;
+        // The same of the squares along x less those along y, and of twice their product.
+        let double = |p: DVec2, q: DVec2| DVec2::new(p.x * q.x - p.y * q.y, p.x * q.y + p.y * q.x);
+        apart += (double(a, a) + double(a, b) + double(b, b)) * (swept / 6.0);
         radius = radius.max(a.length());
     }
     // An octagon in a circle has 0.9003 of its area and 0.854 of its mean square distance.
     let octagon = 0.900_316;
     let (area_px, spread_px2) = (area.abs() / octagon, (spread / area).abs() / 0.853_6);
-    SpotOutline { radius_px: radius, area_px, spread_px2 }
+    let elongation = if spread == 0.0 { DVec2::ZERO } else { apart / spread };
+    SpotOutline { radius_px: radius, area_px, spread_px2, elongation }
 }
 
 impl DotModel {

@@ -4,6 +4,7 @@ use glam::{DVec2, DVec3};
 
 use crate::constants::Constants;
 use crate::track::error::TrackError;
+use crate::track::marks::{MAX_HALF_PX, MarkerView};
 use domecast_optics::SensorOptics;
 use domecast_optics::pose::Marker;
 use domecast_springs::Displacement;
@@ -76,7 +77,13 @@ fn reach_of(
     let mut places = Vec::with_capacity(markers.len());
     for (index, marker) in markers.iter().enumerate() {
         match marker.image(optics) {
-            Ok(image) => places.push(image.centroid_px),
+            Ok(image) => {
+                if MarkerView::new(optics, marker).is_none() {
+                    let problem = format!("makes an image wider than {} px", 2 * MAX_HALF_PX);
+                    return Err(TrackError::at(format!("white_markers[{index}].diameter_mm"), problem));
+                }
+                places.push(image.centroid_px);
+            }
             Err(limit) => {
                 return Err(TrackError::at(
                     format!("white_markers[{index}]"),

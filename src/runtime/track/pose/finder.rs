@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 use super::refine::{MarkerSighting, RefinedPose, refine};
 use super::residual_scale::ResidualScale;
 use crate::track::identities::{Choice, MarkerFrame, MarkerHypotheses, MarkerIdentities};
-use crate::track::marks::MarkerView;
+use crate::track::marks::{FittedDisc, MarkerView};
 use crate::track::model::SensorModel;
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
@@ -17,6 +17,8 @@ const MAX_TRANSLATION_MM: f64 = 20.0;
 const MAX_TURN_RAD: f64 = 0.4;
 /// Discs that fit within this part of the largest residual need no rivals.
 const CLEAR_PART: f64 = 0.25;
+/// Markers that make a pose.
+const MIN_SOUND: usize = 3;
 /// Combinations of three markers that are tried for each one left out.
 const MAX_TRIPLES: usize = 12;
 /// A dot is dark where its level is below this part of the levels around; this share of the dots must be.
@@ -46,12 +48,24 @@ pub(in crate::track) struct PoseEstimate<'a> {
     /// Whether another pose fits as well.
     pub is_ambiguous: bool,
     /// Markers that the pose rests on.
-    pub sightings: usize,
+    pub seen: &'a [MarkerSighting],
     /// Each marker of the constants against the pose, where both are found.
     pub markers: &'a [Option<MarkerAtPose>],
 }
 
-impl PoseEstimate<'_> {
+impl<'a> PoseEstimate<'a> {
+    /// Of a pose that was found from these markers, each frame for itself.
+    pub fn of_markers(refined: &'a RefinedPose, seen: &'a [MarkerSighting]) -> Self {
+        Self {
+            refined: Some(refined),
+            variance_factor: 1.0,
+            is_fixed: false,
+            is_ambiguous: false,
+            seen,
+            markers: &[],
+        }
+    }
+
     /// Whether it is known where the platform is.
     pub fn is_known(&self) -> bool {
         self.is_fixed || self.refined.is_some()
@@ -136,7 +150,7 @@ impl PoseFinder {
             variance_factor: self.residual_scale.variance_factor(),
             is_fixed: self.is_fixed,
             is_ambiguous: self.is_ambiguous,
-            sightings: self.sightings.len(),
+            seen: &self.sightings,
             markers: &self.markers,
         }
     }
@@ -158,8 +172,10 @@ impl PoseFinder {
             }
         }
         let seen = self.markers.iter().zip(discs);
-        self.residual_scale
-            .add(seen.map(|(at, disc)| Some((at.as_ref()?.residual_px, disc.as_ref()?.sd_px))));
+        self.residual_scale.add(seen.map(|(at, disc)| {
+            let disc = disc.as_ref().filter(|disc| disc.fault.is_none())?;
+            Some((at.as_ref()?.residual_px, disc.noise_sd_px))
+        }));
         markers.learn_shading();
     }
 
@@ -172,8 +188,17 @@ impl PoseFinder {
     ) -> Option<RefinedPose> {
         self.sightings.clear();
         let found = frame.models.all.iter().zip(markers.discs());
+        // What does not look like a marker is left out where enough others are there.
+        let sound = markers.discs().iter().flatten().filter(|disc| disc.fault.is_none()).count();
+        let is_used = |disc: &&FittedDisc| sound < MIN_SOUND || disc.fault.is_none();
         self.sightings.extend(found.filter_map(|(marker, disc)| {
-            disc.map(|d| MarkerSighting { marker: *marker, centroid_px: d.centroid_px, sd_px: d.sd_px })
+            let disc = disc.as_ref().filter(is_used)?;
+            Some(MarkerSighting {
+                marker: *marker,
+                centroid_px: disc.centroid_px,
+                sd_px: disc.sd_px,
+                random_sd_px: disc.noise_sd_px,
+            })
         }));
         let refined = refine(&mut self.optics, &self.sightings, start)?;
         let cosine = 0.5 * (refined.pose.rotation.to_cols_array().iter().step_by(4).sum::<f64>() - 1.0);
@@ -193,7 +218,12 @@ impl PoseFinder {
             return None;
         }
         markers.follow(frame, &self.optics);
-        let found = self.refine(frame, markers, last)?;
+        let mut found = self.refine(frame, markers, last)?;
+        // Beside where it was a sound disc has another outline.
+        if markers.discs().iter().flatten().any(|disc| disc.fault.is_some()) {
+            markers.refit(frame, &self.optics);
+            found = self.refine(frame, markers, &found.pose)?;
+        }
         if markers.are_all_found() || self.optics.move_to(&found.pose).is_err() {
             return Some(found);
         }

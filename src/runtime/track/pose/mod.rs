@@ -8,3 +8,6 @@ mod refine;
 mod residual_scale;
 
 pub(super) use finder::{PoseEstimate, PoseFinder};
+#[cfg(test)]
+pub(super) use refine::tests::pinhole_sensor;
+pub(super) use refine::{MarkerSighting, refine};

@@ -16,11 +16,12 @@ const CONVERGED_MM: f64 = 1e-6;
 
 /// A marker's centroid in the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct MarkerSighting {
+pub(in crate::track) struct MarkerSighting {
     pub marker: Marker,
     pub centroid_px: DVec2,
-    /// Its standard deviation on each axis, px.
+    /// Its standard deviation on each axis, px, and the share of it that changes from frame to frame.
     pub sd_px: f64,
+    pub random_sd_px: f64,
 }
 
 /// A pose that fits the markers.
@@ -33,6 +34,8 @@ pub(in crate::track) struct RefinedPose {
     /// Covariance of a small motion after the pose (mm, rad about the rest frame's origin), from the centroids' own
     /// standard deviations.
     pub covariance: Matrix6<f64>,
+    /// The same from what changes from frame to frame.
+    pub random: Matrix6<f64>,
 }
 
 struct Normal {
@@ -40,13 +43,15 @@ struct Normal {
     matrix: Matrix6<f64>,
     /// The same with each row weighed by its variance.
     noisy: Matrix6<f64>,
+    random: Matrix6<f64>,
     right: Vector6<f64>,
 }
 
 fn normal_at(optics: &mut SensorOptics, seen: &[MarkerSighting], pose: &Rigid) -> Option<Normal> {
     optics.move_to(pose).ok()?;
+    let zeros = Matrix6::zeros();
     let mut normal =
-        Normal { chi2: 0.0, matrix: Matrix6::zeros(), noisy: Matrix6::zeros(), right: Vector6::zeros() };
+        Normal { chi2: 0.0, matrix: zeros, noisy: zeros, random: zeros, right: Vector6::zeros() };
     for one in seen {
         let (centroid, motion) = one.marker.centroid_with_motion(optics).ok()?;
         let left = one.centroid_px - centroid;
@@ -56,6 +61,7 @@ fn normal_at(optics: &mut SensorOptics, seen: &[MarkerSighting], pose: &Rigid) -
             normal.chi2 += left[axis] * left[axis];
             normal.matrix += square;
             normal.noisy += square * (one.sd_px * one.sd_px);
+            normal.random += square * (one.random_sd_px * one.random_sd_px);
             normal.right += row * left[axis];
         }
     }
@@ -64,7 +70,7 @@ fn normal_at(optics: &mut SensorOptics, seen: &[MarkerSighting], pose: &Rigid) -
 
 /// Levenberg-Marquardt from a start, at most [`MAX_STEPS`] steps; `None` where three markers are not seen, a marker
 /// is past what the camera sees, or the steps do not converge. The optics are left at the pose that is given.
-pub(super) fn refine(
+pub(in crate::track) fn refine(
     optics: &mut SensorOptics,
     seen: &[MarkerSighting],
     start: &Rigid,
@@ -115,18 +121,20 @@ pub(super) fn refine(
     }
     let inverse = now.matrix.cholesky()?.inverse();
     let rms_px = (now.chi2 / (2.0 * seen.len() as f64)).sqrt();
-    Some(RefinedPose { pose, rms_px, covariance: inverse * now.noisy * inverse })
+    let [covariance, random] = [now.noisy, now.random].map(|noise| inverse * noise * inverse);
+    Some(RefinedPose { pose, rms_px, covariance, random })
 }
 
 #[cfg(test)]
-mod tests {
+pub(in crate::track) mod tests {
     use super::*;
     use domecast_optics::camera::{LensModel, LensSpec};
     use domecast_optics::{FlatLayer, OpticsSpec};
     use glam::DMat3;
 
-    fn sensor() -> (SensorOptics, [Marker; 4]) {
-        let optics = SensorOptics::new(&OpticsSpec {
+    /// A pinhole 10 mm below a sheet of 1 mm and a dome of 10 mm.
+    pub fn pinhole_sensor() -> SensorOptics {
+        let spec = OpticsSpec {
             lens: LensSpec {
                 model: LensModel::Pinhole,
                 width: 640,
@@ -142,14 +150,18 @@ mod tests {
                 FlatLayer { name: "silicone".into(), index: [1.41; 3], thickness_mm: None },
             ],
             dome: domecast_optics::DomeShape::hemisphere(10.0),
-        });
+        };
+        SensorOptics::new(&spec).unwrap()
+    }
+
+    fn sensor() -> (SensorOptics, [Marker; 4]) {
         let corners = [(11.0, 10.0), (-11.0, 10.0), (-11.0, -10.0), (11.0, -9.0)];
         let marker = |id: usize| Marker {
             id: id as u32,
             position_mm: DVec3::new(corners[id].0, corners[id].1, 0.0),
             diameter_mm: 1.0,
         };
-        (optics.unwrap(), std::array::from_fn(marker))
+        (pinhole_sensor(), std::array::from_fn(marker))
     }
 
     #[test]
@@ -161,12 +173,15 @@ mod tests {
             marker,
             centroid_px: marker.image(&moved).unwrap().centroid_px,
             sd_px: 0.05,
+            random_sd_px: 0.01,
         });
         let found = refine(&mut optics, &sightings, &Rigid::identity()).unwrap();
         assert!(found.rms_px < 1e-6, "{}", found.rms_px);
         assert!(found.pose.translation_mm.distance(pose.translation_mm) < 1e-6);
         let variances = found.covariance.diagonal();
         assert!(variances.iter().all(|v| *v > 0.0 && v.sqrt() < 0.05), "{variances}");
+        let part = (found.random - found.covariance * 0.04).norm() / found.covariance.norm();
+        assert!(part < 1e-9, "{part}");
         assert_eq!(refine(&mut optics, &sightings[..2], &Rigid::identity()), None);
     }
 }

@@ -2,18 +2,24 @@
 //!
 //! In: [`FrameFindings`], what all stages found. Out: [`Tracked`], its JSON and CSV lines, and with the feature `overlay` a picture.
 
+mod affine;
 mod checks;
+mod drift;
+mod fields;
 #[cfg(feature = "overlay")]
 mod overlay;
+mod pace;
 mod problem;
 mod reference;
 mod reporter;
 mod result;
+mod tear;
 mod write;
 
+pub use fields::Field;
 #[cfg(feature = "overlay")]
 pub use overlay::{OverlayError, overlay_png};
 pub use problem::{Problem, Problems};
 pub(super) use reporter::{FrameFindings, Reporter};
 pub use result::{DotResult, MarkerResult, Tracked};
-pub use write::{CSV_HEADER, DOTS_CSV_HEADER, write_csv, write_dots_csv, write_json};
+pub use write::{CSV_HEADER, DOTS_CSV_HEADER, write_csv, write_dots_csv, write_json, write_json_fields};

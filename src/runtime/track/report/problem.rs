@@ -31,12 +31,22 @@ pub enum Problem {
     /// The gap that tells how the picture lies is not seen, or more than one: broken dots, dirt, or dots of a picture
     /// that is turned or shifted.
     KeyUnsure,
-    /// Marks are much wider than they should be.
+    /// A load beyond its deviations, frame after frame, while the skin shows no touch: camera or mount have moved since the
+    /// calibration, or something holds the platform beside the dome.
+    Drift,
+    /// Edges of marks are much wider than a lens in focus has them: defocus, or motion while the shutter was open.
     Blurred,
-    /// The frame is the last one again, bit by bit.
+    /// Every other row is of another moment.
+    Interlaced,
+    /// Rows above and below one are of two moments.
+    Torn,
+    /// The frame is the last one again: bit by bit, or but for less than the camera's noise, or everything that moved stands
+    /// still in it.
     Frozen,
     /// Frames are missing before this one.
     Gap,
+    /// Much brighter or darker than the last frame.
+    ExposureJump,
     /// The pose rests on three white markers: nothing checks it.
     ThreeMarkers,
     /// A twentieth or more of the dots that should be seen are not.
@@ -45,7 +55,7 @@ pub enum Problem {
 
 impl Problem {
     /// All of them, the gravest first.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 22] = [
         Self::Unreadable,
         Self::WrongSize,
         Self::Dark,
@@ -59,9 +69,13 @@ impl Problem {
         Self::BeyondSprings,
         Self::AmbiguousPose,
         Self::KeyUnsure,
+        Self::Drift,
         Self::Blurred,
+        Self::Interlaced,
+        Self::Torn,
         Self::Frozen,
         Self::Gap,
+        Self::ExposureJump,
         Self::ThreeMarkers,
         Self::DotsLost,
     ];
@@ -82,9 +96,13 @@ impl Problem {
             Self::BeyondSprings => "beyond_springs",
             Self::AmbiguousPose => "ambiguous_pose",
             Self::KeyUnsure => "key_unsure",
+            Self::Drift => "drift",
             Self::Blurred => "blurred",
+            Self::Interlaced => "interlaced",
+            Self::Torn => "torn",
             Self::Frozen => "frozen",
             Self::Gap => "gap",
+            Self::ExposureJump => "exposure_jump",
             Self::ThreeMarkers => "three_markers",
             Self::DotsLost => "dots_lost",
         }

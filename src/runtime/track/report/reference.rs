@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::result::Tracked;
+use crate::track::wrench::WrenchErrors;
 use domecast_springs::Wrench;
 
 /// Means over the reference frames.
@@ -12,24 +13,28 @@ pub(super) struct ReferenceMean {
     wanted: u32,
     frames: u32,
     wrench: Wrench,
+    /// Sums of what the frames' wrenches may be off by; frames without are left out.
+    errors: WrenchErrors,
     displacement: Vec<(DVec3, u32)>,
 }
 
 impl ReferenceMean {
     /// Over the first `wanted` good frames with so many dots.
     pub fn new(wanted: u32, dots: usize) -> Self {
-        Self { wanted, frames: 0, wrench: Wrench::default(), displacement: vec![(DVec3::ZERO, 0); dots] }
+        let displacement = vec![(DVec3::ZERO, 0); dots];
+        Self { wanted, frames: 0, wrench: Wrench::default(), errors: WrenchErrors::default(), displacement }
     }
 
     /// Forgets all frames.
     pub fn restart(&mut self) {
         self.frames = 0;
         self.wrench = Wrench::default();
+        self.errors = WrenchErrors::default();
         self.displacement.fill((DVec3::ZERO, 0));
     }
 
     /// Takes in a frame while the reference is not full, and takes the mean off it; `good`: nothing is wrong with it.
-    pub fn apply(&mut self, result: &mut Tracked, good: bool) {
+    pub fn apply(&mut self, result: &mut Tracked, errors: Option<&WrenchErrors>, good: bool) {
         if self.frames < self.wanted {
             if !good {
                 return;
@@ -37,6 +42,9 @@ impl ReferenceMean {
             self.frames += 1;
             if let Some(wrench) = result.wrench {
                 self.wrench = self.wrench + wrench;
+            }
+            if let Some(errors) = errors {
+                self.errors.add(errors);
             }
             for (dot, (to, count)) in result.black_dots.iter().zip(&mut self.displacement) {
                 if let Some(displacement) = dot.displacement_mm {
@@ -53,6 +61,8 @@ impl ReferenceMean {
             let mean =
                 Wrench { force_n: self.wrench.force_n / frames, moment_nmm: self.wrench.moment_nmm / frames };
             *wrench = *wrench - mean;
+            // What is off for good and in both is taken off too.
+            result.wrench_sd = errors.and_then(|errors| errors.sd_less_mean(&self.errors, frames));
         }
         for (dot, (sum, count)) in result.black_dots.iter_mut().zip(&self.displacement) {
             if let Some(displacement) = dot.displacement_mm.as_mut().filter(|_| *count > 0) {
@@ -80,17 +90,17 @@ mod tests {
     fn the_mean_of_good_frames_is_taken_off() {
         let mut reference = ReferenceMean::new(2, 1);
         let mut bad = frame(9.0, 9.0);
-        reference.apply(&mut bad, false);
+        reference.apply(&mut bad, None, false);
         assert_eq!(bad, frame(9.0, 9.0));
-        reference.apply(&mut frame(1.0, 0.1), true);
-        reference.apply(&mut frame(3.0, 0.3), true);
+        reference.apply(&mut frame(1.0, 0.1), None, true);
+        reference.apply(&mut frame(3.0, 0.3), None, true);
         let mut later = frame(5.0, 0.5);
-        reference.apply(&mut later, false);
+        reference.apply(&mut later, None, false);
         assert_eq!(later.wrench.unwrap().force_n, DVec3::Z * 3.0);
         assert!((later.black_dots[0].displacement_mm.unwrap().x - 0.3).abs() < 1e-12);
         reference.restart();
         let mut again = frame(5.0, 0.5);
-        reference.apply(&mut again, false);
+        reference.apply(&mut again, None, false);
         assert_eq!(again, frame(5.0, 0.5));
     }
 }

@@ -1,18 +1,21 @@
 //! Fills the result of each frame from what the stages found.
 
-use glam::DVec3;
+use glam::DVec2;
 
 use super::checks::DotChecks;
+use super::drift::DriftCheck;
+use super::pace::Pace;
 use super::problem::{Problem, Problems};
 use super::reference::ReferenceMean;
 use super::result::{DotResult, MarkerResult, Tracked};
+use super::tear::TearCheck;
 use crate::track::frame::Exposure;
 use crate::track::identities::{DotsFound, MAX_FALSE_DOTS, Orientation};
 use crate::track::marks::{FittedDisc, MarkState};
 use crate::track::model::SensorModel;
 use crate::track::options::{Reference, TrackOptions};
 use crate::track::pose::PoseEstimate;
-use crate::track::wrench::WrenchEstimate;
+use crate::track::wrench::{DotDisplacement, WrenchErrors, WrenchEstimate};
 
 /// A sharp edge takes at least this part of a frame's contrast in four pixels.
 const MIN_SHARPNESS: f64 = 0.45;
@@ -29,9 +32,11 @@ pub(in crate::track) struct FrameFindings<'a> {
     pub pose: PoseEstimate<'a>,
     /// Where there is a pose.
     pub wrench: Option<WrenchEstimate>,
+    /// How far that may be off, where it is known.
+    pub errors: Option<&'a WrenchErrors>,
     pub dots: DotsFound<'a>,
-    /// Of each dot, mm; where the platform's pose is known.
-    pub displacements_mm: Option<&'a [Option<DVec3>]>,
+    /// Of each dot; where the platform's pose is known.
+    pub displacements: Option<&'a [Option<DotDisplacement>]>,
     /// Sharpness of the frame, measured where neither a pose nor a dot is found.
     pub sharpness: Option<f64>,
 }
@@ -41,7 +46,10 @@ pub(in crate::track) struct FrameFindings<'a> {
 pub(in crate::track) struct Reporter {
     result: Tracked,
     last_number: Option<u64>,
+    pace: Pace,
     checks: DotChecks,
+    drift: DriftCheck,
+    tear: TearCheck,
     reference: ReferenceMean,
     max_misplaced: f64,
     /// Whether the key and the dots around it were once in place.
@@ -65,7 +73,10 @@ impl Reporter {
                 ..Tracked::default()
             },
             last_number: None,
+            pace: Pace::default(),
             checks: DotChecks::new(model.dots.len()),
+            drift: DriftCheck::new(model.max_still_px),
+            tear: TearCheck::new(model.dots.len()),
             reference: ReferenceMean::new(wanted, model.dots.len()),
             max_misplaced: options.max_misplaced,
             was_placed: false,
@@ -80,27 +91,31 @@ impl Reporter {
     /// Forgets all frames.
     pub fn restart(&mut self) {
         self.last_number = None;
+        self.pace = Pace::default();
         self.was_placed = false;
+        self.checks.restart();
+        self.tear.restart();
         self.reference.restart();
+        self.drift.restart();
         for marker in &mut self.result.white_markers {
             marker.state = MarkState::Missing;
         }
     }
 
-    /// Begins a frame; whether frames are missing before it.
-    pub fn begin(&mut self, number: u64) -> bool {
+    /// Begins a frame; `time_s`: when it was taken, if that is known. Whether frames are missing before it.
+    pub fn begin(&mut self, number: u64, time_s: Option<f64>) -> bool {
+        let is_late = self.pace.is_late(time_s);
         let result = &mut self.result;
-        result.frame = number;
+        (result.frame, result.time_s) = (number, time_s);
         result.problems = Problems::default();
-        (result.pose, result.pose_sd, result.pose_rms_px) = (None, None, None);
-        (result.wrench, result.wrench_sd) = (None, None);
+        result.withhold_motion();
         result.camera_turn = None;
         for marker in &mut result.white_markers {
             let seen = marker.state != MarkState::Missing;
             let state = if seen { MarkState::Lost } else { MarkState::Missing };
             *marker = MarkerResult { id: marker.id, state, ..MarkerResult::default() };
         }
-        let has_gap = self.last_number.is_some_and(|last| number != last.wrapping_add(1));
+        let has_gap = is_late || self.last_number.is_some_and(|last| number != last.wrapping_add(1));
         if has_gap {
             self.problem(Problem::Gap);
         }
@@ -122,6 +137,7 @@ impl Reporter {
     /// What the frame's levels say.
     pub fn exposure(&mut self, exposure: &Exposure) {
         self.problem_if(exposure.is_repeated, Problem::Frozen);
+        self.problem_if(exposure.has_jumped, Problem::ExposureJump);
         self.problem_if(exposure.is_dark(), Problem::Dark);
         self.problem_if(exposure.is_saturated(), Problem::Saturated);
         if exposure.is_flat() {
@@ -129,8 +145,8 @@ impl Reporter {
         }
     }
 
-    /// The dots of a frame, also of one in which nothing was looked for; `displacements_mm`: where the pose is known.
-    pub fn dots(&mut self, dots: &DotsFound<'_>, displacements_mm: Option<&[Option<DVec3>]>) {
+    /// The dots of a frame, also of one in which nothing was looked for; `displacements`: where the pose is known.
+    pub fn dots(&mut self, dots: &DotsFound<'_>, displacements: Option<&[Option<DotDisplacement>]>) {
         self.result.searched = dots.searched;
         self.result.false_dots.clear();
         self.result.false_dots.extend_from_slice(dots.false_dots);
@@ -143,14 +159,19 @@ impl Reporter {
                 sd_px: track.spot.map(|spot| spot.sd_px),
                 undeformed_px: None,
                 motion_px: track.motion_px,
-                displacement_mm: None,
+                ..DotResult::default()
             };
-            if track.is_unsure && track.spot.is_some() {
-                *to = DotResult { id: to.id, state: MarkState::IdentityUnsure, ..DotResult::default() };
+            let unsure = track.is_unsure.then_some(MarkState::IdentityUnsure);
+            if let Some(state) = unsure.or(track.fault).filter(|_| track.spot.is_some()) {
+                *to = DotResult { id: to.id, state, ..DotResult::default() };
                 continue;
             }
-            if let Some(displacements_mm) = displacements_mm {
-                to.displacement_mm = displacements_mm[index];
+            if let Some(displacements) = displacements {
+                if let Some(found) = displacements[index] {
+                    to.displacement_mm = Some(found.displacement_mm);
+                    to.displacement_sd_random_mm = Some(found.sd_random_mm);
+                    to.ray = Some(found.ray);
+                }
                 if track.is_wanted() {
                     to.undeformed_px = track.expected_px.map(|p| p - track.offset_px);
                 }
@@ -162,7 +183,10 @@ impl Reporter {
         let found = discs.iter().zip(pose.markers);
         for ((disc, at_pose), to) in found.zip(&mut self.result.white_markers) {
             let Some(disc) = disc else { continue };
-            to.state = MarkState::Ok;
+            to.state = disc.fault.unwrap_or(MarkState::Ok);
+            if disc.fault.is_some() {
+                continue;
+            }
             to.centroid_px = Some(disc.centroid_px);
             to.sd_px = Some(disc.sd_px);
             to.residual_px = at_pose.map(|at| at.residual_px);
@@ -176,16 +200,18 @@ impl Reporter {
         if let Some(refined) = pose.refined {
             self.result.pose = Some(refined.pose);
             self.result.pose_rms_px = Some(refined.rms_px);
-            self.problem_if(pose.sightings == 3, Problem::ThreeMarkers);
+            self.problem_if(pose.seen.len() == 3, Problem::ThreeMarkers);
         } else {
             self.problem(if are_all_found { Problem::MarkersDoNotFit } else { Problem::MarkersMissing });
         }
     }
 
-    fn wrench(&mut self, estimate: &WrenchEstimate) {
+    fn wrench(&mut self, estimate: &WrenchEstimate, errors: Option<&WrenchErrors>) {
         self.result.pose_sd = estimate.displacement_sd;
+        self.result.pose_sd_random = estimate.displacement_sd_random;
         self.result.wrench = estimate.wrench;
-        self.result.wrench_sd = estimate.wrench_sd;
+        self.result.wrench_sd = errors.and_then(WrenchErrors::sd);
+        self.result.wrench_sd_random = errors.and_then(WrenchErrors::sd_random);
         self.problem_if(estimate.is_beyond_springs, Problem::BeyondSprings);
     }
 
@@ -200,8 +226,7 @@ impl Reporter {
             }
         }
         let result = &mut self.result;
-        (result.pose, result.pose_sd, result.pose_rms_px) = (None, None, None);
-        (result.wrench, result.wrench_sd) = (None, None);
+        result.withhold_motion();
         result.false_dots.clear();
         let unsure = |state: MarkState| {
             if state == MarkState::Ok { MarkState::IdentityUnsure } else { state }
@@ -218,14 +243,22 @@ impl Reporter {
     pub fn finish(&mut self, findings: &FrameFindings<'_>, model: &SensorModel) {
         self.markers(findings.discs, &findings.pose);
         if let Some(wrench) = &findings.wrench {
-            self.wrench(wrench);
+            self.wrench(wrench, findings.errors);
         }
-        self.dots(&findings.dots, findings.displacements_mm);
+        self.dots(&findings.dots, findings.displacements);
         let tracks = findings.dots.tracks;
         let known = findings.pose.is_known();
         let is_blurred = self.checks.are_blurred(tracks)
             || findings.sharpness.is_some_and(|sharpness| sharpness < MIN_SHARPNESS);
         self.problem_if(is_blurred, Problem::Blurred);
+        let spec = model.optics.lens().spec();
+        let middle_px = 0.5 * DVec2::new(f64::from(spec.width), f64::from(spec.height));
+        let is_torn = self.tear.is_torn(tracks, middle_px);
+        self.problem_if(is_torn, Problem::Torn);
+        let has_stopped = self.checks.have_stopped(tracks);
+        self.problem_if(has_stopped, Problem::Frozen);
+        let is_woven = self.checks.are_woven(tracks);
+        self.problem_if(is_woven, Problem::Interlaced);
         let misplaced =
             !self.was_placed && known && self.checks.are_misplaced(tracks, &model.dots, self.max_misplaced);
         // Constants that once were the camera's stay so, however far the skin is pulled.
@@ -236,7 +269,15 @@ impl Reporter {
         let unknown = known && wanted >= MIN_EXPECTED_DOTS && 2 * missing > wanted;
         let foreign = findings.pose.refined.is_some_and(|found| found.rms_px > model.markers.foreign_rms_px);
         self.problem_if(misplaced || unknown || foreign, Problem::ForeignConstants);
-        let lost = [MarkState::Lost, MarkState::Merged, MarkState::IdentityUnsure];
+        let lost = [
+            MarkState::Lost,
+            MarkState::Merged,
+            MarkState::IdentityUnsure,
+            MarkState::Dirty,
+            MarkState::Smeared,
+            MarkState::Glare,
+            MarkState::PartlyHidden,
+        ];
         let lost: usize = lost.into_iter().map(|state| self.result.count(state)).sum();
         self.problem_if(lost as f64 > (MAX_LOST_PART * wanted as f64).max(1.0), Problem::DotsLost);
         let nothing =
@@ -244,6 +285,9 @@ impl Reporter {
         self.problem_if(findings.pose.refined.is_none() && nothing, Problem::NoMarks);
         self.orientation(findings.dots.orientation);
         let good = known && self.result.problems.iter().all(|p| p >= Problem::Frozen);
-        self.reference.apply(&mut self.result, good);
+        self.reference.apply(&mut self.result, findings.errors, good);
+        let load = self.result.wrench.zip(self.result.wrench_sd);
+        let is_drift = self.drift.is_drift(load, tracks, &model.dots, middle_px);
+        self.problem_if(is_drift, Problem::Drift);
     }
 }

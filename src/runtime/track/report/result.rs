@@ -20,14 +20,20 @@ pub struct DotResult {
     pub image_px: Option<DVec2>,
     /// Centroid of what is seen, raw px.
     pub centroid_px: Option<DVec2>,
-    /// Standard deviation of the centroid on each axis that the frame's noise means, px.
+    /// Standard deviation of the centroid on each axis that the frame's noise and the mark's looks mean, px.
     pub sd_px: Option<f64>,
     /// Where the undeformed dome would show its centre at this pose, raw px; there for every dot that can be seen.
     pub undeformed_px: Option<DVec2>,
     /// Motion of the centroid since the last frame, px.
     pub motion_px: Option<DVec2>,
-    /// Its ray met with the undeformed dome, the platform's motion removed, less its rest position; mm.
+    /// Its ray met with the undeformed dome, the platform's motion removed, less its rest position; mm. Where the skin is
+    /// pressed in the dot is elsewhere on the same ray.
     pub displacement_mm: Option<DVec3>,
+    /// Standard deviation of that across the ray which the frame's noise means, on each of two axes, mm.
+    pub displacement_sd_random_mm: Option<f64>,
+    /// Unit direction of that ray in the dome, platform's frame, away from the camera: along it nothing is known of the
+    /// displacement.
+    pub ray: Option<DVec3>,
 }
 
 /// A white marker in a frame.
@@ -41,7 +47,7 @@ pub struct MarkerResult {
     pub image_px: Option<DVec2>,
     /// Centroid of what is seen, raw px.
     pub centroid_px: Option<DVec2>,
-    /// Standard deviation of the centroid on each axis that the frame's noise means, px.
+    /// Standard deviation of the centroid on each axis that the frame's noise and the mark's looks mean, px.
     pub sd_px: Option<f64>,
     /// Centroid less where the pose puts it, px.
     pub residual_px: Option<DVec2>,
@@ -52,20 +58,27 @@ pub struct MarkerResult {
 pub struct Tracked {
     /// Number of the frame.
     pub frame: u64,
+    /// When it was taken, s, on the camera's clock; where the source of the frames says.
+    pub time_s: Option<f64>,
     /// What is wrong with it.
     pub problems: Problems,
     /// How the picture lies against the constants' camera, where it is turned or mirrored: all numbers are withheld then.
     pub camera_turn: Option<CameraTurn>,
     /// `rest_from_platform`; nothing is measured of it on a rigid mount, and then there is none, nor a wrench.
     pub pose: Option<Rigid>,
-    /// Standard deviations of the displacement (mm, rad) about the springs' reference point, or the origin.
+    /// Standard deviations of the displacement (mm, rad) about the springs' reference point, or the origin: noise, and how
+    /// far camera, layers and markers may be off the constants.
     pub pose_sd: Option<Displacement>,
+    /// The share of them that changes from frame to frame.
+    pub pose_sd_random: Option<Displacement>,
     /// Root mean square of the white markers' residuals, px.
     pub pose_rms_px: Option<f64>,
     /// What the world puts on dome and platform, rest frame, about the springs' reference point.
     pub wrench: Option<Wrench>,
-    /// Its standard deviations.
+    /// Its standard deviations: noise, and how far camera, layers, markers and springs may be off the constants.
     pub wrench_sd: Option<Wrench>,
+    /// The share of them that changes from frame to frame; the rest stays, and no filter takes it out.
+    pub wrench_sd_random: Option<Wrench>,
     /// The dots.
     pub black_dots: Vec<DotResult>,
     /// The white markers.
@@ -81,6 +94,12 @@ impl Tracked {
     /// `ok`, or the name of the gravest problem.
     pub fn status(&self) -> &'static str {
         self.problems.status()
+    }
+
+    /// Takes back what is said of the platform's motion and its load.
+    pub(in crate::track) fn withhold_motion(&mut self) {
+        (self.pose, self.pose_sd, self.pose_sd_random, self.pose_rms_px) = (None, None, None, None);
+        (self.wrench, self.wrench_sd, self.wrench_sd_random) = (None, None, None);
     }
 
     /// How many dots are in a state.

@@ -190,6 +190,8 @@ mod tests {
             stiffness_at: (0..6).map(|i| at(0.5 * f64::from(i))).collect(),
             law: Some(law),
             offset: None,
+            uncertainty: None,
+            temperature: None,
             plain_runtime: None,
         }
     }

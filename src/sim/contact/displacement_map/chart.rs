@@ -2,11 +2,16 @@
 
 use glam::{DVec3, Vec2, Vec3A, Vec4};
 
+use super::face::Face;
 use crate::contact::between::Between;
 use crate::splines::{cubic_slopes, cubics};
+use domecast_optics::DomeShape;
 
 /// Fewest and most nodes along a side.
 const NODES: [usize; 2] = [12, 160];
+
+/// Widest chart, rad: about the other side of the sphere there is none.
+const MAX_ANGLE_RAD: f64 = 3.0;
 
 /// So many nodes below the rim the table still goes on; deeper no ray looks.
 const BELOW_STEPS: f64 = 8.0;
@@ -45,6 +50,7 @@ pub(super) struct Chart {
     middle: DVec3,
     side: DVec3,
     up: DVec3,
+    face: Face,
     radius_mm: f64,
     /// Half the chart's width, mm.
     half_mm: f64,
@@ -59,7 +65,8 @@ pub(super) struct Chart {
 
 impl Chart {
     /// The empty chart of a cap.
-    pub fn new(radius_mm: f64, middle: DVec3, angle: f64, step_mm: f64) -> Self {
+    pub fn new(dome: DomeShape, middle: DVec3, angle: f64, step_mm: f64) -> Self {
+        let (radius_mm, angle) = (dome.radius_mm(), angle.min(MAX_ANGLE_RAD));
         let side = middle.any_orthonormal_vector();
         let up = middle.cross(side);
         let reach_mm = 2.0 * radius_mm * (0.5 * angle).sin();
@@ -81,6 +88,7 @@ impl Chart {
             middle,
             side,
             up,
+            face: Face::new(dome),
             radius_mm,
             half_mm,
             nodes,
@@ -97,17 +105,21 @@ impl Chart {
     pub fn filled(&self, between: &Between, around: Option<&Self>) -> Self {
         let count = self.nodes * self.nodes;
         let place = |i: usize| i as f64 / self.per_step - self.half_mm;
-        let below_mm = -BELOW_STEPS / self.per_step;
+        let dome = self.face.dome;
+        let (end_rad, below_rad) = (dome.meridian_end_rad(), BELOW_STEPS / (self.per_step * self.radius_mm));
         let mut at_mm: Vec<DVec3> = Vec::with_capacity(count + count / 4);
         let mut below = Vec::new();
-        at_mm.extend((0..count).map(|i| self.point(place(i % self.nodes), place(i / self.nodes))));
+        let round = |i: usize| self.round(place(i % self.nodes), place(i / self.nodes));
+        at_mm.extend((0..count).map(|i| self.face.point_of(round(i))));
         for i in 0..count {
             let Some(at) = at_mm.get_mut(i).filter(|at| at.z < 0.0) else { continue };
-            if at.z > below_mm {
-                at.z = -at.z;
-                let rim = at.truncate().normalize_or_zero() * self.radius_mm;
+            let round_mm = round(i);
+            let over_rad = round_mm.truncate().length().atan2(round_mm.z) - end_rad;
+            if over_rad < below_rad.min(end_rad) {
+                let azimuth_rad = round_mm.y.atan2(round_mm.x);
+                *at = dome.point_mm(end_rad - over_rad, azimuth_rad);
                 below.push((i, at_mm.len()));
-                at_mm.push(rim.extend(0.0));
+                at_mm.push(dome.point_mm(end_rad, azimuth_rad));
             } else {
                 below.push((i, usize::MAX));
             }
@@ -160,16 +172,21 @@ impl Chart {
         self.steepest
     }
 
-    /// The point of the undeformed dome at a place.
-    fn point(&self, x: f64, y: f64) -> DVec3 {
+    /// The place of the sphere at a place of the chart, about its centre.
+    fn round(&self, x: f64, y: f64) -> DVec3 {
         let s = ((x * x + y * y) / (self.radius_mm * self.radius_mm)).min(4.0);
         let k = (1.0 - 0.25 * s).max(0.0).sqrt();
         self.middle * (self.radius_mm * (1.0 - 0.5 * s)) + (self.side * x + self.up * y) * k
     }
 
-    /// The same as short numbers.
+    /// The point of the undeformed dome at a place, as short numbers.
     #[inline]
     pub fn point_near(&self, at: Vec2) -> Vec3A {
+        self.face.point_near(self.round_near(at))
+    }
+
+    #[inline]
+    fn round_near(&self, at: Vec2) -> Vec3A {
         let Rough { middle, side, up, radius_mm, per_radius, .. } = self.rough;
         let s = (at.length_squared() * (per_radius * per_radius)).min(4.0);
         let k = (1.0 - 0.25 * s).max(0.0).sqrt();
@@ -180,6 +197,7 @@ impl Chart {
     #[inline]
     pub fn place(&self, rest_mm: Vec3A) -> Vec2 {
         let Rough { middle, side, up, per_radius, .. } = self.rough;
+        let rest_mm = self.face.round(rest_mm);
         let along = rest_mm.dot(middle) * per_radius;
         let stretch = (2.0 / (1.0 + along).max(1e-6)).sqrt();
         Vec2::new(rest_mm.dot(side), rest_mm.dot(up)) * stretch
@@ -217,6 +235,8 @@ impl Chart {
         let bend = quarter / k;
         let tangent_x = side * (k - x * x * bend) - up * (x * y * bend) - middle * (x * per_radius);
         let tangent_y = up * (k - y * y * bend) - side * (x * y * bend) - middle * (y * per_radius);
+        let round_mm = self.round_near(place);
+        let [tangent_x, tangent_y] = [tangent_x, tangent_y].map(|t| self.face.tangent(round_mm, t));
         Some(Moved {
             displacement_mm: Vec3A::from_vec4(u),
             along_x: tangent_x + Vec3A::from_vec4(by_x) * per_step,

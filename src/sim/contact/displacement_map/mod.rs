@@ -9,12 +9,15 @@
 //! chart with fewer nodes serves.
 
 mod chart;
+mod face;
 
 use glam::{DVec3, Vec2, Vec3A};
 
 use self::chart::{Chart, Moved};
+use self::face::Face;
 use crate::contact::between::Between;
 use domecast_contact::Extent;
+use domecast_optics::DomeShape;
 
 /// Displacements of less than this bend nothing that a picture shows, mm.
 const STILL_MM: f64 = 1e-4;
@@ -33,6 +36,7 @@ const CLOSE_MARGIN_MM: f64 = 1.5;
 /// Tables of the displaced membrane.
 #[derive(Debug, Clone)]
 pub struct DisplacementMap {
+    face: Face,
     close: Option<Chart>,
     wide: Option<Chart>,
 }
@@ -49,6 +53,7 @@ pub struct Displaced {
 /// Where the nodes of the tables lie: one for all the times that are to be mixed.
 #[derive(Debug, Clone)]
 pub struct MapLayout {
+    face: Face,
     close: Option<Chart>,
     wide: Chart,
 }
@@ -59,7 +64,7 @@ impl MapLayout {
     pub fn new(
         extents: &[Extent],
         pressed: Option<(DVec3, f64)>,
-        radius_mm: f64,
+        dome: DomeShape,
         step_mm: f64,
     ) -> Option<Self> {
         let middle = extents.iter().map(|e| e.direction).sum::<DVec3>().normalize_or_zero();
@@ -71,19 +76,21 @@ impl MapLayout {
             return None;
         }
         // Where the rest of the dome moves as well, the chart reaches the farthest point of the rim.
-        let whole = |middle: DVec3| middle.z.clamp(-1.0, 1.0).acos() + std::f64::consts::FRAC_PI_2;
+        let whole = |middle: DVec3| middle.z.clamp(-1.0, 1.0).acos() + dome.meridian_end_rad();
         let far = extents.iter().any(|e| e.beyond_mm > STILL_MM);
         let angle = if far { whole(middle) } else { angle.min(whole(middle)) };
         let pressed = pressed
-            .map(|(at, half)| (at, (half + CLOSE_MARGIN_MM / radius_mm).min(whole(at))))
+            .map(|(at, half)| (at, (half + CLOSE_MARGIN_MM / dome.radius_mm()).min(whole(at))))
             .filter(|(_, half)| *half < 0.7 * angle);
-        let chart = |middle, angle, step_mm| Chart::new(radius_mm, middle, angle, step_mm);
+        let chart = |middle, angle, step_mm| Chart::new(dome, middle, angle, step_mm);
+        let face = Face::new(dome);
         Some(match pressed {
             Some((at, half)) => Self {
+                face,
                 close: Some(chart(at, half, step_mm)),
                 wide: chart(middle, angle, (WIDER * step_mm).max(WIDE_STEP_MM)),
             },
-            None => Self { close: None, wide: chart(middle, angle, step_mm) },
+            None => Self { face, close: None, wide: chart(middle, angle, step_mm) },
         })
     }
 
@@ -91,6 +98,7 @@ impl MapLayout {
     pub fn map(&self, between: &Between) -> DisplacementMap {
         let wide = self.wide.filled(between, None);
         DisplacementMap {
+            face: self.face,
             close: self.close.as_ref().map(|chart| chart.filled(between, Some(&wide))),
             wide: Some(wide),
         }
@@ -100,8 +108,8 @@ impl MapLayout {
 impl DisplacementMap {
     /// The tables of a touched dome, with nodes no further apart than `step_mm` about the pressed part where their
     /// number allows; `None` where nothing moves. The second value is the number of nodes.
-    pub fn new(between: &Between, radius_mm: f64, step_mm: f64) -> Option<(Self, u64)> {
-        let layout = MapLayout::new(&between.extents(), between.pressed_cap(), radius_mm, step_mm)?;
+    pub fn new(between: &Between, dome: DomeShape, step_mm: f64) -> Option<(Self, u64)> {
+        let layout = MapLayout::new(&between.extents(), between.pressed_cap(dome), dome, step_mm)?;
         let map = layout.map(between);
         let nodes = map.node_count();
         Some((map, nodes))
@@ -118,7 +126,7 @@ impl DisplacementMap {
             (Some(a), Some(b)) => Some(a.towards(b, part as f32)),
             _ => None,
         };
-        Self { close: mix(&self.close, &to.close), wide: mix(&self.wide, &to.wide) }
+        Self { face: self.face, close: mix(&self.close, &to.close), wide: mix(&self.wide, &to.wide) }
     }
 
     /// Whether the membrane is so steep somewhere that a ray may meet it more than once: then what a search finds depends
@@ -140,11 +148,11 @@ impl DisplacementMap {
     /// a point nearby moved, or zero: there the search begins.
     ///
     /// Newton's method on the chart: the ray meets the tangent plane of the moved membrane, and the way there along the
-    /// plane is the next step. A step that does not shrink gives way to the plain one, the point of the sphere on the
+    /// plane is the next step. A step that does not shrink gives way to the plain one, the point of the face on the
     /// ray moved back by the displacement, which does as long as the membrane does not fold.
     pub fn meet(&self, rest_mm: Vec3A, inside: Vec3A, near_mm: Vec3A) -> Option<(Vec3A, Displaced)> {
         let mut place =
-            if near_mm == Vec3A::ZERO { rest_mm } else { back_on_sphere(rest_mm, inside, near_mm) };
+            if near_mm == Vec3A::ZERO { rest_mm } else { self.face.meet_back(rest_mm, inside, near_mm) };
         let mut last = f32::INFINITY;
         // At a crease Newton's steps may jump from side to side: then the nearest of them, and from it plain ones.
         let (mut nearest_mm, mut smallest) = (Vec3A::ZERO, f32::INFINITY);
@@ -178,29 +186,16 @@ impl DisplacementMap {
             place = if step >= MAX_STEPS {
                 nearest_mm =
                     nearest_mm.lerp(moved.displacement_mm, if step == MAX_STEPS { 0.0 } else { 0.5 });
-                back_on_sphere(rest_mm, inside, nearest_mm)
+                self.face.meet_back(rest_mm, inside, nearest_mm)
             } else if miss2 < 0.25 * last && miss2 < FARTHEST_MM * FARTHEST_MM {
                 chart.point_near(at + on_plane())
             } else {
-                back_on_sphere(rest_mm, inside, moved.displacement_mm)
+                self.face.meet_back(rest_mm, inside, moved.displacement_mm)
             };
             last = miss2;
         }
         None
     }
-}
-
-/// Where a ray moved back by a displacement meets the sphere that it met at `rest_mm`.
-fn back_on_sphere(rest_mm: Vec3A, inside: Vec3A, displacement_mm: Vec3A) -> Vec3A {
-    let radius_mm = rest_mm.length();
-    let base = rest_mm - displacement_mm;
-    // |base + s inside| = R; the root near zero.
-    let b = base.dot(inside);
-    let c = radius_mm * radius_mm - base.length_squared();
-    let root = (b * b + c).max(0.0).sqrt();
-    let s = if b > 0.0 { c / (b + root) } else { root - b };
-    let next = base + inside * s;
-    next * (radius_mm / next.length().max(1e-6))
 }
 
 /// Repetitions of [`DisplacementMap::meet`]; a slope of 0.5 leaves a thousandth after ten.

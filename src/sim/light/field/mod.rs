@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3A, Vec4};
 use rayon::prelude::*;
 
 use self::own::OwnLight;
-use self::places::{Scale, continued, split};
+use self::places::{Inside, Middle, Scale, continued, split};
 use self::shells::Shells;
 use super::direct::EmitterRule;
 use super::dome_map::{DomeGrid, bicubic};
@@ -33,6 +33,7 @@ pub struct FieldParts {
 /// Light on the membrane for the three channels of the camera, mW/mm^2 weighted by their responses.
 #[derive(Debug, Clone)]
 pub struct LightField {
+    middle: Middle,
     scale: Scale,
     /// Coefficients of a cubic spline.
     still: Vec<Vec4>,
@@ -47,6 +48,7 @@ impl LightField {
     /// Puts the tables of all lights together.
     pub fn new(ways: &Ways, prepared: &Prepared, parts: &FieldParts) -> Self {
         let mut field = Self {
+            middle: Middle::of(ways),
             scale: Scale::of(&DomeGrid::with_cells(8)),
             still: Vec::new(),
             shells: None,
@@ -152,15 +154,14 @@ impl LightField {
     /// Irradiance of a point that was moved to `point_mm` (sensor frame), with the unit normal out of the
     /// elastomer that it has there. Without shells it answers as for a point that was not moved.
     pub fn moved(&self, point_mm: Vec3A, normal: Vec3A) -> Vec4 {
-        let distance_mm = point_mm.length();
-        let direction = if distance_mm > 0.0 { point_mm / distance_mm } else { Vec3A::Z };
-        let change = self.change_at(distance_mm, direction, normal);
-        (self.still(direction) + change.extend(0.0)).max(Vec4::ZERO)
+        let at = self.middle.inside(point_mm);
+        let change = self.change_at(&at, normal);
+        (self.still(at.place) + change.extend(0.0)).max(Vec4::ZERO)
     }
 
     #[inline]
-    fn change_at(&self, distance_mm: f32, direction: Vec3A, normal: Vec3A) -> Vec3A {
-        self.shells.as_ref().map_or(Vec3A::ZERO, |shells| shells.change(distance_mm, direction, normal))
+    fn change_at(&self, at: &Inside, normal: Vec3A) -> Vec3A {
+        self.shells.as_ref().map_or(Vec3A::ZERO, |shells| shells.change(at, normal))
     }
 
     /// Irradiance of the sheet's top beside the dome, from below: a white marker's.

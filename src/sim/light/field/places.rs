@@ -3,6 +3,7 @@
 use glam::{DVec2, Vec2, Vec3A};
 
 use crate::light::dome_map::DomeGrid;
+use crate::light::tables::Ways;
 
 /// What leads from the disc to a grid.
 #[derive(Debug, Clone, Copy)]
@@ -44,6 +45,46 @@ impl Scale {
     #[inline]
     pub fn place(&self, disc: Vec2) -> Vec2 {
         disc * self.cells + Vec2::splat(self.middle)
+    }
+}
+
+/// Where a point lies inside the dome.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Inside {
+    /// Distance from the sphere's centre, in the cylinder from the axis, part of the radius.
+    pub part: f32,
+    /// The place of the face over it, and the outward unit normal there.
+    pub place: Vec3A,
+    pub outward: Vec3A,
+}
+
+/// What a point's place inside the dome is measured from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Middle {
+    center_mm: Vec3A,
+    per_mm: f32,
+    has_wall: bool,
+}
+
+impl Middle {
+    pub fn of(ways: &Ways) -> Self {
+        let dome = ways.optics[1].dome();
+        Self {
+            center_mm: dome.center_mm().as_vec3a(),
+            per_mm: (1.0 / dome.radius_mm()) as f32,
+            has_wall: dome.center_z_mm() > 0.0,
+        }
+    }
+
+    #[inline]
+    pub fn inside(&self, point_mm: Vec3A) -> Inside {
+        let at = (point_mm - self.center_mm) * self.per_mm;
+        let is_on_wall = self.has_wall && at.z < 0.0;
+        let out = if is_on_wall { Vec3A::new(at.x, at.y, 0.0) } else { at };
+        let part = out.length();
+        let outward = if part > 0.0 { out / part } else { Vec3A::Z };
+        let place = if is_on_wall { outward + Vec3A::new(0.0, 0.0, at.z) } else { outward };
+        Inside { part, place, outward }
     }
 }
 

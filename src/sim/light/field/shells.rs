@@ -7,7 +7,7 @@
 
 use glam::{DVec2, Vec2, Vec3A, Vec4};
 
-use super::places::{Scale, continued, split};
+use super::places::{Inside, Scale, continued, split};
 use crate::light::dome_map::{DomeGrid, bicubic};
 use crate::light::tables::{SHELL_CELLS, SHELLS, Tables, Ways};
 use crate::splines::{Degree, quadratics, to_coefficients};
@@ -26,7 +26,7 @@ struct Node {
 /// The tables.
 #[derive(Debug, Clone)]
 pub(super) struct Shells {
-    radius_mm: f32,
+    per_room: f32,
     scale: Scale,
     /// Coefficients.
     nodes: Vec<Node>,
@@ -53,24 +53,24 @@ impl Shells {
         };
         let node = |i: usize| Node { outer: at(&outer, i), second: at(second, i), third: at(third, i) };
         Some(Self {
-            radius_mm: ways.radius_mm() as f32,
+            per_room: (1.0 / ways.room()) as f32,
             scale: Scale::of(&grid),
             nodes: (0..grid.nodes * grid.nodes).map(node).collect(),
         })
     }
 
-    /// What is added to the light on an undeformed point in the same direction where the membrane lies `distance_mm` from the
-    /// dome's centre in a unit direction, with a unit normal of its own.
+    /// What is added to the light on an undeformed point over or under it, where the membrane has a unit normal of its own.
     #[inline]
-    pub fn change(&self, distance_mm: f32, direction: Vec3A, normal: Vec3A) -> Vec3A {
+    pub fn change(&self, at: &Inside, normal: Vec3A) -> Vec3A {
         let nodes = self.scale.nodes;
-        let place = self.scale.place(self.scale.flat(direction)) + Vec2::splat(0.5);
+        let place = self.scale.place(self.scale.flat(at.place)) + Vec2::splat(0.5);
         let ((column, row), part) = split(place, 1.0, self.scale.last_cell);
         let (wx, wy) = quadratics(part);
         let start = (row - 1) * nodes + column - 1;
         let Some(corner) = self.nodes.get(start..start + 2 * nodes + 3) else { return Vec3A::ZERO };
-        let [second, third] = shell_weights(distance_mm / self.radius_mm).map(|weight| normal * weight);
-        let off = normal - direction;
+        let [second, third] =
+            shell_weights(1.0 - (1.0 - at.part) * self.per_room).map(|weight| normal * weight);
+        let off = normal - at.outward;
         let mut light = Vec3A::ZERO;
         for (row, wy) in wy.into_iter().enumerate() {
             let row = &corner[row * nodes..row * nodes + 3];

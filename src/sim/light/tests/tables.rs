@@ -1,6 +1,7 @@
 //! Tables of light over the dome, and bounds of its effects.
 
 use super::*;
+use domecast_optics::DomeShape;
 
 fn scene(more: &str) -> crate::Scene {
     let text = format!(
@@ -60,6 +61,37 @@ fn the_table_of_direct_light_matches_closed_forms_to_a_thousandth() {
         let exact = lambert_polygon(&corners, 1.0 / PI, moved, -normal);
         let found = f64::from(field.moved(moved.as_vec3a(), normal.as_vec3a())[0]);
         assert!((found - exact).abs() < 2e-2 * brightest, "moved {direction}: {found} {exact}");
+    }
+}
+
+#[test]
+fn moved_points_of_caps_and_cylinders_are_lit_as_the_closed_form_has_it() {
+    let parts = FieldParts { falloff: true, albedo: None, moved: true };
+    for dome in [DomeShape::new(11.5, -5.75), DomeShape::new(14.0, -9.9), DomeShape::on_cylinder(8.0, 4.0)] {
+        let optics = sensor_with(&[1.0], 1.0, dome);
+        let source = emitter(DVec3::new(4.0, -3.0, -3.3), DVec3::new(-0.4, 0.3, 1.0), 1.0, 1.0);
+        let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
+            .map(|(x, y)| source.platform_from_emitter.transform_point3(DVec3::new(x, y, 0.0)));
+        let facing = source.platform_from_emitter.matrix3.z_axis;
+        let field = LightField::new(&ways_of(&optics, source), &Prepared::default(), &parts);
+        let brightest = field.brightest()[0];
+        let deep = 0.1 * dome.height_mm().min(dome.radius_mm());
+        for k in 0..200 {
+            let k = f64::from(k);
+            let at = dome.point_mm(k / 210.0 * dome.meridian_end_rad(), 2.4 * k);
+            let outward = dome.normal(at);
+            // As far from the rim as it is pressed in: below the sheet's top there is no dome.
+            for depth_mm in [0.0, deep].into_iter().filter(|depth_mm| at.z > 2.0 * depth_mm) {
+                let moved = at - outward * depth_mm;
+                let normal = (outward + DVec3::new(0.1, -0.2, 0.1)).normalize();
+                if corners.iter().any(|c| (moved - *c).dot(facing) < 0.0) {
+                    continue;
+                }
+                let exact = lambert_polygon(&corners, 1.0 / PI, moved, -normal);
+                let found = f64::from(field.moved(moved.as_vec3a(), normal.as_vec3a())[0]);
+                assert!((found - exact).abs() < 2e-2 * brightest, "{dome:?} {moved}: {found} {exact}");
+            }
+        }
     }
 }
 

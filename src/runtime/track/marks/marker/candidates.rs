@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::view::MarkerView;
+use super::view::{GROUND_PX, MarkerView};
 use crate::track::frame::Plane;
 pub(super) use crate::track::options::MIN_MARKER_RISE_LEVELS as MIN_RISE;
 
@@ -100,7 +100,7 @@ impl MarkerView {
         let (cx, cy) = (start.x.round() as i32, start.y.round() as i32);
         let reach = reach_px.clamp(1.0, 2000.0).ceil() as i32;
         let step = if reach > COARSE_REACH_PX { 2 } else { 1 };
-        let apart_px = 0.7 * f64::from(self.half_px);
+        let apart_px = 1.4 * f64::from(self.half_px) - GROUND_PX;
         let rows = (cy - reach).max(1)..=(cy + reach).min(plane.height() as i32 - 2);
         for y in rows.step_by(step) {
             let columns = (cx - reach).max(1)..=(cx + reach).min(plane.width() as i32 - 2);

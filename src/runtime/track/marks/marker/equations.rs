@@ -21,13 +21,19 @@ const QUANTISATION: f64 = 1.0 / 12.0;
 pub(super) type Unknowns = SVector<f64, 5>;
 pub(super) type Normal = SMatrix<f64, 5, 5>;
 
+/// Octants around a disc's middle.
+const SECTORS: usize = 8;
+
 /// Normal equations over a window, and what is left of its pixels.
 pub(super) struct WindowSums {
     pub normal: Normal,
-    pub right: Unknowns,
+    /// Right side by octants, as [`octant`] numbers them.
+    rights: [Unknowns; SECTORS],
     /// Sum of squared residuals, and the number of pixels.
     pub left: f64,
     pub count: f64,
+    /// The smallest and the largest residual.
+    pub extremes: [f64; 2],
     /// Where no edge is near, on ground, disc and dome: pixels, sum of residuals, sum of squared ones.
     flats: [[f64; 3]; 3],
     /// Slope of the residuals on the disc's flat, levels a px.
@@ -50,6 +56,8 @@ struct Geometry {
 
 /// What the model of a marker says of one pixel.
 struct PixelModel {
+    /// Octant around the disc's middle.
+    sector: usize,
     /// Signed distances from the disc's outline and from the dome's rim, px, positive outside.
     outside_px: f64,
     from_rim_px: f64,
@@ -104,7 +112,16 @@ impl Geometry {
             from_rim_px = ((self.place_mm + u).length() - self.rim_mm) * self.rim_px_by_mm;
             dome = edge(from_rim_px).0;
         }
-        Some(PixelModel { outside_px, from_rim_px, disc, dome, gradient, steep, disc_slope })
+        Some(PixelModel {
+            sector: octant(u),
+            outside_px,
+            from_rim_px,
+            disc,
+            dome,
+            gradient,
+            steep,
+            disc_slope,
+        })
     }
 }
 
@@ -112,8 +129,9 @@ impl Geometry {
 #[derive(Default)]
 struct Accumulator {
     normal: [[f64; 5]; 5],
-    right: [f64; 5],
+    rights: [[f64; 5]; SECTORS],
     left: f64,
+    extremes: [f64; 2],
     count: f64,
     flats: [[f64; 3]; 3],
     /// On the disc's flat, for the slope of the residuals: pixels, sums of x, y, xx, xy, yy, of the residuals, and of
@@ -123,14 +141,16 @@ struct Accumulator {
 
 impl Accumulator {
     #[inline(always)]
-    fn add(&mut self, row: &[f64; 5], rest: f64) {
+    fn add(&mut self, sector: usize, row: &[f64; 5], rest: f64) {
+        let right = &mut self.rights[sector % SECTORS];
         for i in 0..5 {
-            self.right[i] += row[i] * rest;
+            right[i] += row[i] * rest;
             for j in 0..=i {
                 self.normal[i][j] += row[i] * row[j];
             }
         }
         self.left += rest * rest;
+        self.extremes = [self.extremes[0].min(rest), self.extremes[1].max(rest)];
         self.count += 1.0;
     }
 
@@ -184,15 +204,16 @@ impl WindowSums {
                     row[4] = by_place.y;
                     rest -= ground * row[0] + disc * row[1] + dome * beside;
                 }
-                sums.add(&row, rest);
+                sums.add(pixel.sector, &row, rest);
                 sums.add_flat(&pixel, from, rest);
             }
         }
         (sums.count > MIN_PIXELS).then(|| Self {
             normal: Normal::from_fn(|i, j| if i < j { sums.normal[j][i] } else { sums.normal[i][j] }),
-            right: Unknowns::from(sums.right),
+            rights: sums.rights.map(Unknowns::from),
             left: sums.left,
             count: sums.count,
+            extremes: sums.extremes,
             flats: sums.flats,
             slope: slope_of(&sums.lean),
         })
@@ -217,15 +238,37 @@ impl WindowSums {
         (self.left / (self.count - 5.0).max(1.0)).max(QUANTISATION).sqrt()
     }
 
+    fn right(&self) -> Unknowns {
+        self.rights.iter().sum()
+    }
+
+    /// Variance of the place, px2 on each axis, by how far the octants of the outline pull it each its own way: the sum of
+    /// squares of what each octant alone would add to the step (the covariance of clustered residuals of Liang and Zeger,
+    /// Biometrika 73, 1986). What pulls all octants outwards alike is a marker of another size and does not count; an edge
+    /// that is softer than the model's pulls none.
+    pub fn variance_between_octants(&self, view: &MarkerView, inverse: &Normal) -> f64 {
+        let px_by_mm = view.mm_by_px.inverse();
+        let mut pulls = [(DVec2::ZERO, DVec2::ZERO); SECTORS];
+        let (mut outwards, mut square) = (0.0, 0.0);
+        for (sector, (pull, way)) in pulls.iter_mut().enumerate() {
+            let step = inverse * self.rights[sector];
+            (*pull, *way) = (DVec2::new(step[3], step[4]), px_by_mm * octant_middle(sector));
+            outwards += pull.dot(*way);
+            square += way.length_squared();
+        }
+        let outwards = outwards / square;
+        0.5 * pulls.iter().map(|(pull, way)| (pull - outwards * way).length_squared()).sum::<f64>()
+    }
+
     /// The three levels alone.
     pub fn solve_levels(&self) -> Option<SVector<f64, 3>> {
         let matrix = self.floored().fixed_view::<3, 3>(0, 0).into_owned();
-        Some(matrix.cholesky()?.solve(&self.right.fixed_rows::<3>(0).into_owned()))
+        Some(matrix.cholesky()?.solve(&self.right().fixed_rows::<3>(0).into_owned()))
     }
 
     /// A Gauss-Newton step of levels and place.
     pub fn solve_all(&self) -> Option<Unknowns> {
-        let step = self.floored().cholesky()?.solve(&self.right);
+        let step = self.floored().cholesky()?.solve(&self.right());
         step.iter().all(|v| v.is_finite()).then_some(step)
     }
 
@@ -243,6 +286,22 @@ impl WindowSums {
         }
         floored
     }
+}
+
+/// The octant of a place around the middle: bits for the sides of both axes, and for which axis is nearer.
+#[inline(always)]
+fn octant(place: DVec2) -> usize {
+    4 * usize::from(place.x < 0.0)
+        + 2 * usize::from(place.y < 0.0)
+        + usize::from(place.x.abs() < place.y.abs())
+}
+
+/// The direction of an octant's middle, of length one.
+fn octant_middle(octant: usize) -> DVec2 {
+    let (sin, cos) = std::f64::consts::FRAC_PI_8.sin_cos();
+    let first = if octant & 1 == 0 { DVec2::new(cos, sin) } else { DVec2::new(sin, cos) };
+    let side = |bit: usize| if octant & bit == 0 { 1.0 } else { -1.0 };
+    first * DVec2::new(side(4), side(2))
 }
 
 /// The slope of a plane through residuals, from their number, sums of x, y, xx, xy, yy, theirs, and of xr, yr.

@@ -7,6 +7,7 @@ use super::candidates::MIN_RISE;
 use super::equations::WindowSums;
 use super::view::MarkerView;
 use crate::track::frame::Plane;
+use crate::track::marks::MarkState;
 
 /// A fit may go so far from its candidate, px.
 pub(in crate::track) const FIT_REACH_PX: f64 = 4.0;
@@ -19,17 +20,30 @@ const MAX_STEP_PX: f64 = 1.5;
 const MIN_RISE_IN_NOISE: f64 = 3.0;
 /// Largest part of the contrast that the picture of a disc may leave unexplained.
 const MAX_MISFIT: f64 = 0.25;
+/// Noise makes the octants of an outline differ; what is more than this times its variance does not come from it: of sixteen
+/// normal deviates the mean square is beyond three in one case of 40,000.
+const FREE_OF_NOISE: f64 = 3.0;
+/// Markers that may be farther off than this are faulty: px, and in parts of the radius. A tenth of a pixel is hundredths of
+/// a newton.
+const MAX_SD_PX: f64 = 0.1;
+const MAX_SD_RADII: f64 = 0.02;
 /// Pixels between a disc's middle and the frame's border.
 const BORDER_PX: f64 = 2.0;
 
 /// A disc as it was fitted.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(in crate::track) struct FittedDisc {
     pub centroid_px: DVec2,
-    /// Standard deviation of the centroid on each axis, px.
+    /// Standard deviation of the centroid on each axis, px: the frame's noise, and what does not look like a disc.
     pub sd_px: f64,
-    /// Part of the contrast that the picture of a disc leaves unexplained.
+    /// The same from the frame's noise alone, px.
+    pub noise_sd_px: f64,
+    /// Part of the contrast that the picture of a disc leaves unexplained, by rms.
     pub misfit: f64,
+    /// The disc's radius in the image, px.
+    pub radius_px: f64,
+    /// Why it does not look like a marker, if it does not.
+    pub fault: Option<MarkState>,
     /// Levels of ground, disc and dome, the last two counted from the ground: a start for the next frame.
     pub levels: [f64; 3],
     /// By what part of itself the disc's level rises in a px, as this frame shows it; `None` where too little of it is
@@ -70,7 +84,7 @@ impl MarkerView {
             at += shift;
             if shift.length() < CONVERGED_PX {
                 let slope = sums.slope.map(|slope| shading + slope / (known[0] + known[1]).max(MIN_RISE));
-                return accept(&sums, at, &fitted, slope);
+                return accept(self, &sums, at, &fitted, slope);
             }
         }
         None
@@ -84,6 +98,7 @@ fn is_inside(plane: &Plane<'_>, at: DVec2) -> bool {
 
 /// A converged fit, if it is a disc's.
 fn accept(
+    view: &MarkerView,
     sums: &WindowSums,
     at: DVec2,
     levels: &SVector<f64, 3>,
@@ -98,11 +113,21 @@ fn accept(
         return None;
     }
     let inverse = sums.inverse()?;
-    let sd_px = noise * (0.5 * (inverse[(3, 3)] + inverse[(4, 4)])).max(0.0).sqrt();
-    at.is_finite().then_some(FittedDisc {
+    let noise_px2 = (noise * noise * 0.5 * (inverse[(3, 3)] + inverse[(4, 4)])).max(0.0);
+    let radius_px = view.radius_mm / view.mm_by_px.determinant().abs().sqrt().max(1e-9);
+    let unlike_px2 = (sums.variance_between_octants(view, &inverse) - FREE_OF_NOISE * noise_px2).max(0.0);
+    let sd_px = (noise_px2 + unlike_px2).sqrt();
+    let noise_sd_px = noise_px2.sqrt();
+    let is_faulty = unlike_px2.sqrt() > f64::max(MAX_SD_PX, MAX_SD_RADII * radius_px);
+    let [darkest, brightest] = sums.extremes;
+    let reason = if -darkest > brightest { MarkState::PartlyHidden } else { MarkState::Glare };
+    (at.is_finite() && sd_px.is_finite()).then_some(FittedDisc {
         centroid_px: at,
         sd_px,
+        noise_sd_px,
         misfit: rms / contrast,
+        radius_px,
+        fault: is_faulty.then_some(reason),
         levels: (*levels).into(),
         shading,
     })

@@ -14,4 +14,4 @@ pub(in crate::track) use candidates::Candidate;
 pub(in crate::track) use fit::{FIT_REACH_PX, FittedDisc};
 pub(in crate::track) use shading::ShadingSlope;
 pub(crate) use still::marker_in_still;
-pub(in crate::track) use view::MarkerView;
+pub(in crate::track) use view::{MAX_HALF_PX, MarkerView};

@@ -7,8 +7,8 @@ use domecast_optics::pose::Marker;
 
 /// Pixels that far outside of the outline are part of the fit: the ground around.
 pub(super) const GROUND_PX: f64 = 2.6;
-/// Largest half of a window, px.
-const MAX_HALF_PX: i32 = 40;
+/// Largest half of a window, px: that of a marker as wide as a fifth of a 1080 line frame is high.
+pub(in crate::track) const MAX_HALF_PX: i32 = 112;
 
 /// How a marker's surroundings map to the image, to first order, at one pose.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +33,9 @@ impl MarkerView {
         let mm_by_px = px_by_mm.inverse();
         // A point has no picture of its own: a pixel stands for it.
         let radius_mm = radius_mm.max(0.5 / px_by_mm.determinant().abs().sqrt().max(1e-9));
-        let reach = radius_mm * (px_by_mm.x_axis.length() + px_by_mm.y_axis.length());
+        // How far the outline goes along columns and along rows.
+        let rows = px_by_mm.transpose();
+        let reach = radius_mm * rows.x_axis.length().max(rows.y_axis.length());
         let half = (reach + GROUND_PX + 1.0).ceil();
         let usable = mm_by_px.is_finite() && half.is_finite() && half <= f64::from(MAX_HALF_PX);
         usable.then_some(Self {

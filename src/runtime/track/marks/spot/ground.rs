@@ -1,16 +1,25 @@
 //! The ground around a spot: a plane through the levels of a ring.
 
+use super::light_edge::LightEdge;
 use super::stencil::{LANES, Stencil};
 
 /// Part of the ground's level below which a pixel of the ring is another mark, not ground.
 const GROUND_PART: f32 = 0.8;
 
-/// The plane a + b x + c y through ground pixels, and the rms of what is left.
+/// The plane a + b x + c y through ground pixels, the edge of a shadow on it, and the rms of what is left.
 pub(super) struct Ground {
     pub a: f32,
     pub b: f32,
     pub c: f32,
     pub noise: f32,
+    pub edge: Option<LightEdge>,
+}
+
+impl Ground {
+    /// Its level at the middle of the window.
+    pub fn middle(&self) -> f32 {
+        self.a + self.edge.map_or(0.0, |edge| edge.level(0.0, 0.0))
+    }
 }
 
 /// Solves the symmetric 3x3 system of a plane fit; `None` where the pixels do not span it.
@@ -90,5 +99,5 @@ pub(super) fn ground_of(stencil: &Stencil, levels: &[f32], ring: &mut [f32]) -> 
     let freedom = (f64::from(n) - 3.0).max(1.0);
     // Quantisation alone leaves a twelfth.
     let noise = (left / freedom).max(1.0 / 12.0).sqrt() as f32;
-    (a > 0.5 && a.is_finite() && noise.is_finite()).then_some(Ground { a, b, c, noise })
+    (a > 0.5 && a.is_finite() && noise.is_finite()).then_some(Ground { a, b, c, noise, edge: None })
 }

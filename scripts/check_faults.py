@@ -1,0 +1,379 @@
+#!/usr/bin/env python3
+"""What spoils frames that domecast did not draw: named scenarios, each with what may be off and what must be named.
+
+    python3 scripts/check_faults.py target/release/domecast output/thumb24 [...] [--frames N] [--only NAME]
+
+Frames are drawn by scripts/draw_frames.py and spoilt here by NumPy and OpenCV alone; `domecast track` reads the clean and the
+spoilt ones with the build's constants. Each frame is held to the truth:
+
+- no dot called `ok` is both more than 1 px and more than 5 of its `sd_px` from where it was drawn, and none is another's;
+- no frame called `ok` has a wrench that is both 0.1 N (1 N mm) and 5 `wrench_sd` from that of the same frame unspoilt;
+- what the scenario says must be named is named, on the marks or the frames that are spoilt;
+- no more dots are withheld than the scenario allows, and where it says so the frames are `ok` and as exact as clean ones.
+"""
+import sys
+
+import cv2
+import numpy as np
+
+from check_identities import Build, dent
+
+failed = 0
+# A mark that is not as it should be, and why.
+FAULTY = {"dirty", "smeared", "glare", "partly_hidden"}
+OFF_PX, OFF_SDS = 1.0, 5.0
+OFF_N, OFF_NMM = 0.1, 1.0
+
+
+def clip(frame):
+    return np.clip(np.round(frame), 0, 255).astype(np.uint8)
+
+
+def draw_over(frame, paint, level=None, soft=0.6):
+    """Something painted at eight times the frame's resolution, blurred as the lens does; `paint` fills a mask."""
+    fine = 8
+    height, width = frame.shape
+    mask = np.zeros((height * fine, width * fine), np.uint8)
+    paint(mask, lambda p: tuple(int(round(v)) for v in (np.asarray(p, float) + 0.5) * fine - 0.5), fine)
+    part = cv2.resize(mask.astype(np.float32) / 255, (width, height), interpolation=cv2.INTER_AREA)
+    part = cv2.GaussianBlur(part, (0, 0), soft)
+    return clip(frame * (1 - part) + level * part)
+
+
+def speck(frame, at, radius, level=25):
+    return draw_over(frame, lambda m, to, fine: cv2.circle(m, to(at), int(round(radius * fine)), 255, -1), level)
+
+
+def hair(frame, points, width=1.6, level=30):
+    def paint(mask, to, fine):
+        cv2.polylines(mask, [np.array([to(p) for p in points], np.int32)], False, 255, max(1, int(round(width * fine))))
+    return draw_over(frame, paint, level)
+
+
+def bright_blob(frame, at, radius, level=250, soft=1.0):
+    return draw_over(frame, lambda m, to, fine: cv2.circle(m, to(at), int(round(radius * fine)), 255, -1), level, soft)
+
+
+def cover(frame, at, half, level=40):
+    def paint(mask, to, fine):
+        corner = np.array(at) - half, np.array(at) + half
+        cv2.rectangle(mask, to(corner[0]), to(corner[1]), 255, -1)
+    return draw_over(frame, paint, level)
+
+
+def shadow(frame, at, way, depth, soft):
+    """One side of a line through a place darker, over a width."""
+    height, width = frame.shape
+    y, x = np.mgrid[0:height, 0:width]
+    way = np.asarray(way, float) / np.linalg.norm(way)
+    beyond = (x - at[0]) * way[0] + (y - at[1]) * way[1]
+    part = 1 / (1 + np.exp(-np.clip(beyond / (0.3 * soft), -60, 60)))
+    return clip(frame * (1 - depth * part))
+
+
+def defocus(frame, radius):
+    size = 2 * int(np.ceil(radius)) + 3
+    y, x = np.mgrid[:size * 8, :size * 8] / 8 - size / 2 + 1 / 16
+    kernel = cv2.resize((np.hypot(x, y) <= radius).astype(np.float32), (size, size), interpolation=cv2.INTER_AREA)
+    noise = np.random.default_rng(9).normal(0, 0.8, frame.shape)
+    return clip(cv2.filter2D(frame.astype(np.float32), -1, kernel / kernel.sum()) + noise)
+
+
+def jpeg(frame, quality):
+    return cv2.imdecode(cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], 0)
+
+
+class Case:
+    """Frames, clean ones of the same moments, where the dots were drawn, and which dots or markers are spoilt."""
+
+    def __init__(self, build):
+        self.build = build
+        self.frames, self.clean, self.truths = [], [], []
+        self.spoilt_dots, self.spoilt_markers = [], []
+
+    def add(self, frame, clean, truth, dots=(), markers=()):
+        self.frames.append(frame)
+        self.clean.append(clean)
+        self.truths.append(truth)
+        self.spoilt_dots.append(set(dots))
+        self.spoilt_markers.append(set(markers))
+
+
+def moved(i):
+    """The platform's motion in a moment: a push that goes round, and a slow twist."""
+    return {"shift": (0.06 * np.sin(0.5 * i), 0.06 * (1 - np.cos(0.5 * i)), -0.05 * (1 - np.cos(0.4 * i))), "turn": (0, 0, 0.004 * np.sin(0.3 * i))}
+
+
+def judge(case, name, must=None, allowed=None, dots_named=0.0, may_lack=0.02, must_frames=None, exact=None):
+    """`must`: a status that the spoilt frames (`must_frames`; all) must have among their problems; `allowed`: statuses that
+    may be; `dots_named`: the share of spoilt dots that are more than 1 px off in truth or not `ok`, of ..; `exact`: rms px."""
+    global failed
+    build = case.build
+    lines, _ = build.track(case.frames)
+    clean, _ = build.track(case.clean)
+    why = []
+    wrong, worst, swapped, lacking, squares, named, off_wrench = 0, 0.0, 0, 0, [], 0, 0
+    worst_wrench = 0.0
+    states = {}
+    for i, (line, still, truth) in enumerate(zip(lines, clean, case.truths)):
+        lacks = 0
+        for index, dot in enumerate(line["black_dots"]):
+            if dot["state"] != "ok":
+                states[dot["state"]] = states.get(dot["state"], 0) + 1
+                lacks += index not in case.spoilt_dots[i]
+                named += index in case.spoilt_dots[i]
+                continue
+            off = np.hypot(*(np.array(dot["centroid_px"]) - truth[index]))
+            if off > OFF_PX and off > OFF_SDS * dot["sd_px"]:
+                wrong += 1
+            swapped += off > 0.4 * build.spacing[index]
+            worst = max(worst, off)
+            squares.append(off**2)
+        lacking = max(lacking, lacks)
+        for marker in line["white_markers"]:
+            if marker["state"] != "ok":
+                states["marker " + marker["state"]] = states.get("marker " + marker["state"], 0) + 1
+        if line["wrench"] and still["wrench"]:
+            off, sd = np.abs(np.subtract(line["wrench"], still["wrench"])), np.array(line["wrench_sd"])
+            limits = np.maximum([OFF_N] * 3 + [OFF_NMM] * 3, 5 * sd)
+            worst_wrench = max(worst_wrench, off[:3].max())
+            off_wrench += line["status"] == "ok" and bool((off > limits).any())
+    said = [line["status"] for line in lines]
+    if wrong:
+        why.append(f"{wrong} dots wrong at ok")
+    if swapped:
+        why.append(f"{swapped} swapped")
+    if off_wrench:
+        why.append(f"wrench wrong at ok in {off_wrench}")
+    if must is not None:
+        frames = range(len(lines)) if must_frames is None else must_frames
+        without = [i for i in frames if must not in lines[i]["problems"]]
+        if without:
+            why.append(f"{must} not said in {without}")
+    if allowed is not None and not set(said) <= set(allowed):
+        why.append(f"said {sorted(set(said) - set(allowed))}")
+    if lacking > max(may_lack * len(case.truths[0]), 1):
+        why.append(f"{lacking} withheld")
+    rms = np.sqrt(np.mean(squares)) if squares else np.inf
+    if exact is not None and rms > exact:
+        why.append(f"rms {rms:.4f} px")
+    spoilt = sum(map(len, case.spoilt_dots))
+    if spoilt and named < dots_named * spoilt:
+        why.append(f"{named} of {spoilt} spoilt dots named")
+    failed += bool(why)
+    shown = {status: said.count(status) for status in dict.fromkeys(said)}
+    print(f"{'FAIL' if why else 'ok  '} {name:<44} rms {rms:.4f} max {worst:.2f} px, wrench {worst_wrench:.3f} N, {named}/{spoilt} named, "
+          f"{lacking} withheld, {shown} {states}" + (f"  <- {'; '.join(why)}" if why else ""), flush=True)
+
+
+def scenarios(build, count):
+    sensor = build.sensor
+    rng = np.random.default_rng(11)
+    ok = ["ok"]
+    height = sensor.size[1]
+    near = [i for i in range(len(build.rest)) if np.hypot(*(build.rest[i] - build.center)) < 0.42 * height]
+    dot_px = 0.5 * np.median(sensor.diameters) * np.linalg.norm(build.rest[near[0]] - build.rest[near[1]]) / np.linalg.norm(
+        sensor.dots[near[0]] - sensor.dots[near[1]])
+
+    def still(i, **drawing):
+        return sensor.draw(seed=i, **{**({} if build.is_rigid else moved(i)), **drawing})
+
+    def spoil(name, effect, n=count, drawing=None, **what):
+        """`effect(frame, truth, i)` gives the frame and which dots and markers it spoilt."""
+        def run():
+            case = Case(build)
+            for i in range(n):
+                frame, truth = still(i, **(drawing or {}))
+                spoilt = effect(frame, truth, i)
+                if not isinstance(spoilt, tuple):
+                    spoilt = spoilt, (), ()
+                case.add(spoilt[0], frame, truth, *spoilt[1:])
+            judge(case, name, **what)
+        return name, run
+
+    def picked(i, n=10):
+        return np.random.default_rng(100 + i // 3).choice(near, n, replace=False)
+
+    # --- frames that are well, whatever the camera does to them
+    yield spoil("clean", lambda f, t, i: f, allowed=ok, exact=0.035)
+    yield spoil("gamma 0.6", lambda f, t, i: clip(255 * (f / 255.0) ** 0.6), allowed=ok, exact=0.04)
+    yield spoil("gamma 1.6", lambda f, t, i: clip(255 * (f / 255.0) ** 1.6), allowed=ok, exact=0.04)
+    yield spoil("flicker of 5 %", lambda f, t, i: clip(f * (1 + 0.05 * (-1) ** i)), allowed=ok, exact=0.035)
+    yield spoil("noise of 4 levels", lambda f, t, i: clip(f + rng.normal(0, 4, f.shape)), allowed=ok, exact=0.06)
+    yield spoil("JPEG 15", lambda f, t, i: jpeg(f, 15), allowed=ok, exact=0.12)
+    yield spoil("JPEG 60", lambda f, t, i: jpeg(f, 60), allowed=ok, exact=0.05)
+    yield spoil("sharpened by the camera", lambda f, t, i: clip(2 * f.astype(float) - cv2.GaussianBlur(f, (0, 0), 1.2)), allowed=ok, exact=0.04)
+    yield spoil("light from one side", lambda f, t, i: clip(f * np.linspace(0.6, 1.1, f.shape[1])[None]), allowed=ok, exact=0.035)
+    yield spoil("half of the light", lambda f, t, i: clip(0.5 * f), allowed=ok, exact=0.04)
+    yield spoil("a lens a little soft", lambda f, t, i: clip(cv2.GaussianBlur(f, (0, 0), 0.6)), allowed=ok, exact=0.035)
+    for polar in (0, 35):
+        touch = dent(sensor, build.at(polar), 0.1 * sensor.radius, 0.25 * sensor.radius)
+        yield spoil(f"a touch of 1 mm in 10 at {polar} deg", lambda f, t, i: f, drawing={"skin": touch}, allowed=ok, exact=0.04)
+
+    # --- dots
+    def specks(radius, far):
+        def effect(frame, truth, i):
+            dots = picked(i)
+            for k, dot in enumerate(dots):
+                a = 0.7 * k
+                frame = speck(frame, truth[dot] + far * dot_px * np.array([np.cos(a), np.sin(a)]), radius * dot_px)
+            return frame, dots
+        return effect
+
+    usual = ["ok", "dots_lost"]
+    yield spoil("10 specks of dust at dots' edges", specks(0.6, 1.2), allowed=usual, dots_named=0.8)
+    yield spoil("10 small specks at dots' edges", specks(0.3, 1.1), allowed=usual)
+    yield spoil("10 specks of a dot's size beside dots", specks(1.0, 1.9), allowed=usual, dots_named=0.5)
+    yield spoil("10 grey specks", lambda f, t, i: (
+        [f := speck(f, t[d] + dot_px * np.array([1.2, 0.3]), 0.7 * dot_px, 90) for d in picked(i)][-1], picked(i)), allowed=usual)
+
+    def hairs(frame, truth, i):
+        local = np.random.default_rng(50 + i // 3)
+        points = [build.center + 0.3 * height * np.array([np.cos(a), np.sin(a)]) * (1 + 0.2 * local.normal()) for a in np.linspace(0, 4, 12)]
+        spoilt = hair(frame, points)
+        changed = cv2.absdiff(spoilt, frame) > 20
+        dots = [d for d in range(len(truth)) if changed[max(0, int(truth[d][1] - 2 * dot_px)):int(truth[d][1] + 2 * dot_px) + 1,
+                                                        max(0, int(truth[d][0] - 2 * dot_px)):int(truth[d][0] + 2 * dot_px) + 1].any()]
+        return spoilt, dots
+    yield spoil("a hair", hairs, allowed=usual)
+    yield spoil("a thin hair", lambda f, t, i: hair(f, [build.center + np.array([-200, -20 + i]), build.center + np.array([200, 40])], 0.8, 60), allowed=usual, may_lack=0.1)
+
+    def blobs(size, far, level=250):
+        def effect(frame, truth, i):
+            dots = picked(i)
+            for k, dot in enumerate(dots):
+                a = 0.7 * k
+                frame = bright_blob(frame, truth[dot] + far * dot_px * np.array([np.cos(a), np.sin(a)]), size * dot_px, level)
+            return frame, dots
+        return effect
+    yield spoil("10 specular blobs on dots' edges", blobs(0.7, 0.8), allowed=usual, dots_named=0.8)
+    yield spoil("10 specular blobs beside dots", blobs(1.0, 1.6), allowed=usual)
+    yield spoil("10 broad specular blobs", blobs(2.5, 2.0, 220), allowed=usual, may_lack=0.1)
+
+    def prints(steps, length):
+        def effect(frame, truth, i):
+            dots = picked(i)
+            for k, dot in enumerate(dots):
+                a = 0.7 * k
+                for s in np.linspace(0, length, steps + 1)[1:]:
+                    frame = speck(frame, truth[dot] + s * dot_px * np.array([np.cos(a), np.sin(a)]), dot_px)
+            return frame, dots
+        return effect
+    yield spoil("10 dots printed double", prints(1, 1.2), allowed=usual, dots_named=0.8)
+    yield spoil("10 dots printed double, far", prints(1, 1.8), allowed=usual, dots_named=0.8)
+    yield spoil("10 dots smeared", prints(4, 1.6), allowed=usual, dots_named=0.8)
+    yield spoil("10 dots half covered", lambda f, t, i: (
+        [f := cover(f, t[d] + [dot_px, 0], [dot_px, 1.5 * dot_px], 150) for d in picked(i)][-1], picked(i)), allowed=usual, dots_named=0.8)
+
+    # --- light
+    for depth in (0.3, 0.6):
+        for soft in (1.0, 3.0, 8.0):
+            def effect(frame, truth, i, depth=depth, soft=soft):
+                return shadow(frame, build.center + [0.1 * height * np.sin(i), 13.0 * i - 40], [1, 0.4 * np.cos(i)], depth, soft)
+            yield spoil(f"the edge of a shadow of {100 * depth:.0f} %, {soft:g} px wide", effect, allowed=usual + ["exposure_jump"], may_lack=0.06)
+
+    # --- frames
+    yield spoil("defocus of 1 px", lambda f, t, i: defocus(f, 1.0), allowed=["ok", "blurred"])
+    yield spoil("defocus of 2 px", lambda f, t, i: defocus(f, 2.0), must="blurred", may_lack=1)
+    yield spoil("defocus of 3 px", lambda f, t, i: defocus(f, 3.0), must="blurred", may_lack=1)
+    for way in ((5, 1), (1, 5), (9, 1)):
+        yield spoil(f"motion blur {way} of one frame", lambda f, t, i, way=way: cv2.blur(f, way) if i == 3 else f,
+                    n=max(6, count), must="blurred", must_frames=[3], may_lack=1)
+
+    def sequence(name, make, step, n=8, **what):
+        """`make(frames, truths)` changes a sequence that moves by `step` (shift mm, turn rad) a frame."""
+        def run():
+            drawn = [sensor.draw(seed=i, **step(i)) for i in range(n)]
+            frames, truths = [f for f, _ in drawn], [t for _, t in drawn]
+            case = Case(build)
+            for frame, clean, truth in zip(make(list(frames)), frames, truths):
+                case.add(frame, clean, truth)
+            judge(case, name, **what)
+        return name, run
+
+    step = (lambda i: {}) if build.is_rigid else (lambda i: {"shift": (0.05 * i, 0.02 * i, -0.02 * i)})
+    up = (lambda i: {}) if build.is_rigid else (lambda i: {"shift": (0.0, 0.06 * i, 0)})
+
+    def woven(frames):
+        spoilt = [f.copy() for f in frames]
+        for i in range(1, len(frames)):
+            spoilt[i][1::2] = frames[i - 1][1::2]
+        return spoilt
+
+    def torn(at):
+        def make(frames):
+            frames = list(frames)
+            whole = frames[:]
+            frames[4] = frames[4].copy()
+            frames[4][at:] = whole[3][at:]
+            return frames
+        return make
+
+    def again(noise):
+        def make(frames):
+            frames[5] = clip(frames[4] + np.random.default_rng(3).normal(0, noise, frames[4].shape))
+            return frames
+        return make
+
+    def brighter(by):
+        def make(frames):
+            return frames[:4] + [clip(f * by) for f in frames[4:]]
+        return make
+
+    if not build.is_rigid:
+        yield sequence("interlaced, moving sideways", woven, step, must="interlaced", must_frames=range(1, 8), may_lack=1)
+        yield sequence("interlaced, moving along columns", woven, up, must="interlaced", must_frames=range(1, 8), may_lack=1)
+        yield sequence("torn in the middle", torn(height // 2), step, must="torn", must_frames=[4], may_lack=1)
+        yield sequence("torn above", torn(height // 3), step, must="torn", must_frames=[4], may_lack=1)
+        yield sequence("torn, moving along columns", torn(height // 2), up, must="torn", must_frames=[4], may_lack=1)
+        yield sequence("a frame again", again(0), step, must="frozen", must_frames=[5])
+        yield sequence("a frame again, with a little noise", again(0.4), step, must="frozen", must_frames=[5])
+        yield sequence("a frame again, with as much noise", again(1.0), step, must="frozen", must_frames=[5])
+        yield sequence("moving", lambda f: f, step, allowed=ok, exact=0.035)
+        yield sequence("starting and stopping", lambda f: f, lambda i: {"shift": (0.05 * min(max(i - 2, 0), 3), 0, 0)}, allowed=["ok", "frozen"], exact=0.03)
+    for by in (0.6, 1.4):
+        yield sequence(f"exposure jumps to {100 * by:.0f} %", brighter(by), step, must="exposure_jump", must_frames=[4])
+    yield sequence("exposure creeps by 3 % a frame", lambda fs: [clip(f * 0.97**i) for i, f in enumerate(fs)], step, allowed=ok, exact=0.035)
+
+    # --- markers
+    if build.is_rigid:
+        return
+    marker_at = lambda i, k: sensor.project(sensor.markers[k], **{"turn": moved(i).get("turn"), "shift": moved(i)["shift"]})
+    marker_px = 0.5 * sensor.marker_diameters[0] * np.linalg.norm(sensor.project(sensor.markers[0] + [0.1, 0, 0]) - sensor.project(sensor.markers[0])) / 0.1
+
+    def on_marker(effect):
+        return lambda f, t, i: (effect(f, marker_at(i, i // 3 % 4), i), (), [i // 3 % 4])
+    marked = ["ok", "three_markers"]
+    yield spoil("glare beside a marker", on_marker(lambda f, at, i: bright_blob(f, at + marker_px * np.array([1.0, 0.4]), 0.8 * marker_px)), allowed=marked)
+    yield spoil("broad glare on a marker", on_marker(lambda f, at, i: bright_blob(f, at + marker_px * np.array([0.9, -0.5]), 1.2 * marker_px, 235, 2.5)), allowed=marked)
+    yield spoil("a marker a third covered", on_marker(lambda f, at, i: cover(f, at + marker_px * np.array([1.2, 0]), 0.9 * marker_px)), allowed=marked)
+    yield spoil("a marker a tenth covered", on_marker(lambda f, at, i: cover(f, at + marker_px * np.array([1.7, 0]), 0.9 * marker_px)), allowed=marked)
+    yield spoil("dirt on a marker's edge", on_marker(lambda f, at, i: speck(f, at + marker_px * np.array([0.6, 0.7]), 0.4 * marker_px, 50)), allowed=marked)
+    yield spoil("a shadow across a marker", on_marker(lambda f, at, i: shadow(f, at, [1, 0.3], 0.4, 2.0)), allowed=marked + ["exposure_jump", "markers_missing"], may_lack=0.3)
+
+
+def main(program, *arguments):
+    arguments = list(arguments)
+    only, count = None, 4
+    for option in ("--only", "--frames"):
+        if option in arguments:
+            at = arguments.index(option)
+            value = arguments[at + 1]
+            del arguments[at:at + 2]
+            only, count = (value, count) if option == "--only" else (only, int(value))
+    for folder in arguments:
+        print(folder)
+        build = Build(program, folder)
+        listed = list(scenarios(build, count))
+        for name, run in listed:
+            if only is None or only in name:
+                run()
+        print(f"     {len(listed)} scenarios")
+    print("nothing is wrong in silence" if failed == 0 else f"{failed} faults")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    sys.exit(main(*sys.argv[1:]))

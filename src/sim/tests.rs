@@ -371,15 +371,22 @@ fn scene_on(dome: serde_json::Value, more: &str) -> Result<Scene, SimError> {
 }
 
 #[test]
-fn objects_on_a_dome_that_is_no_hemisphere_are_refused_by_name() {
-    let ball = r#", "objects": [{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": 4 },
-        "path": [{ "time_s": 0, "position_mm": [0, 0, 19] }] }]"#;
+fn levels_that_do_not_know_a_dome_refuse_it_by_name() {
+    let ball = |level: &str| {
+        format!(
+            r#", "contact": {{ "level": "{level}" }}, "objects": [{{ "name": "ball",
+            "shape": {{ "kind": "sphere", "radius_mm": 4 }}, "path": [{{ "time_s": 0, "position_mm": [0, 0, 19] }}] }}]"#
+        )
+    };
     let cap = serde_json::json!({ "radius_mm": 10.6, "rim_angle_deg": 70 });
     let pillar = serde_json::json!({ "cylinder_height_mm": 2 });
     for (dome, kind) in [(&cap, "a spherical cap"), (&pillar, "a hemisphere on a cylinder")] {
-        let error = scene_on(dome.clone(), ball).unwrap_err().to_string();
-        assert!(error.contains("scene objects: the dome is") && error.contains(kind), "{error}");
+        for level in ["geometric", "closed_form", "finite_strain"] {
+            let error = scene_on(dome.clone(), &ball(level)).unwrap_err().to_string();
+            assert!(error.contains("the dome is") && error.contains(kind), "{level}: {error}");
+        }
+        assert!(scene_on(dome.clone(), &ball("linear")).is_ok());
         assert!(scene_on(dome.clone(), "").is_ok());
     }
-    assert!(scene_on(serde_json::json!({}), ball).is_ok());
+    assert!(scene_on(serde_json::json!({}), &ball("finite_strain")).is_ok());
 }

@@ -149,17 +149,22 @@ def ting(times, depth, elastic):
 
 
 def check_slow(program, folder):
+    # Ting's contacts slip freely: with friction the force depends on the way there as well.
+    slippery = json.loads(DESIGN.read_text())
+    slippery["elastomer"]["friction"] = 0
+    design = folder / "slippery.json"
+    design.write_text(json.dumps(slippery))
     gel = {"slow_gel": {"terms": [{"part": p, "time_s": t} for p, t in TERMS], "modulus": "instant"}}
     smooth = lambda keys: [ball("ball", [(t, (0, 0, z)) for t, z in keys])]
     down = [(0, 14.0), (1, 12.6)]
-    elastic_run = run(program, folder, "elastic", smooth(down), 61, 60)
+    elastic_run = run(program, folder, "elastic", smooth(down), 61, 60, design)
     d, f = depths(elastic_run, along_axis(down)), np.array([-frame["wrench"][2] for frame in elastic_run])
     order = np.argsort(d)
     elastic = PchipInterpolator(np.concatenate([[-1], d[order]]), np.concatenate([[0], f[order]]))
 
     # A step, held: one frame down, then still. Springs follow, so the depth is the truth's.
     step = [(0, 14.0), (1 / 60, 12.9), (2, 12.9)]
-    held = run(program, folder, "held", smooth(step), 121, 60, **gel)
+    held = run(program, folder, "held", smooth(step), 121, 60, design, **gel)
     times = np.array([frame["time_s"] for frame in held])
     measured = np.array([-frame["wrench"][2] for frame in held])
     depth = depths(held, along_axis(step))
@@ -169,13 +174,13 @@ def check_slow(program, folder):
     off = np.max(np.abs(measured - expected)[1:]) / measured.max()
     fall = measured[-1] / measured.max()
     print(f"held step: force falls to {fall:.3f} of its peak, at most {100 * off:.2f} % from the hereditary integral")
-    assert off < 0.02 and fall < 0.9
+    assert off < 0.01 and fall < 0.9
 
     for name, rate_s, bound in (("ramp", 0.5, 0.02), ("slow-ramp", 3.0, 0.02)):
         keys = [(0, 14.0), (rate_s, 12.8), (2 * rate_s, 14.0)]
         count = 61
         rate_hz = (count - 1) / (2 * rate_s)
-        truth = run(program, folder, name, smooth(keys), count, rate_hz, **gel)
+        truth = run(program, folder, name, smooth(keys), count, rate_hz, design, **gel)
         times = np.array([frame["time_s"] for frame in truth])
         depth = depths(truth, along_axis(keys))
         measured = np.array([-frame["wrench"][2] for frame in truth])

@@ -149,59 +149,81 @@ impl DisplacementMap {
     ///
     /// Newton's method on the chart: the ray meets the tangent plane of the moved membrane, and the way there along the
     /// plane is the next step. A step that does not shrink gives way to the plain one, the point of the face on the
-    /// ray moved back by the displacement, which does as long as the membrane does not fold.
+    /// ray moved back by the displacement, which does as long as the membrane does not fold. Where neither ends, the last
+    /// tries begin at the nearest place so far and take of Newton's step what brings the membrane nearer to the ray.
     pub fn meet(&self, rest_mm: Vec3A, inside: Vec3A, near_mm: Vec3A) -> Option<(Vec3A, Displaced)> {
         let mut place =
             if near_mm == Vec3A::ZERO { rest_mm } else { self.face.meet_back(rest_mm, inside, near_mm) };
         let mut last = f32::INFINITY;
-        // At a crease Newton's steps may jump from side to side: then the nearest of them, and from it plain ones.
-        let (mut nearest_mm, mut smallest) = (Vec3A::ZERO, f32::INFINITY);
-        for step in 1..=MAX_STEPS + PLAIN_STEPS {
+        let mut nearest: Option<Nearest<'_>> = None;
+        for step in 1..=MAX_STEPS + MAX_DAMPED_STEPS {
             let (chart, at, moved) = self.near(place)?;
             let normal = moved.along_x.cross(moved.along_y);
             let surface = place + moved.displacement_mm;
             let along = (surface - rest_mm).dot(normal) / inside.dot(normal);
             let miss = rest_mm + inside * along - surface;
             let miss2 = miss.length_squared();
-            let found = |place: Vec3A, displacement_mm| {
-                let normal = normal.try_normalize().unwrap_or(place.normalize_or(Vec3A::Z));
-                Some((place, Displaced { displacement_mm, normal }))
-            };
-            if miss2 < smallest {
-                (nearest_mm, smallest) = (moved.displacement_mm, miss2);
-            }
-            if step == MAX_STEPS + PLAIN_STEPS {
-                return found(place, moved.displacement_mm);
-            }
-            let on_plane = || {
-                let per = normal.length_squared().recip();
-                Vec2::new(miss.cross(moved.along_y).dot(normal), moved.along_x.cross(miss).dot(normal)) * per
-            };
+            let per = normal.length_squared().recip();
+            let on_plane =
+                Vec2::new(miss.cross(moved.along_y).dot(normal), moved.along_x.cross(miss).dot(normal)) * per;
+            let normal = normal.try_normalize().unwrap_or(place.normalize_or(Vec3A::Z));
             if miss2 < NEAR_MM * NEAR_MM {
                 // So near that the tangent plane is the membrane: the point on it, and where that was.
-                let place = chart.point_near(at + on_plane());
-                return found(place, surface + miss - place);
+                let place = chart.point_near(at + on_plane);
+                return Some((place, Displaced { displacement_mm: surface + miss - place, normal }));
             }
-            // NaN, of a ray along the plane, is no smaller either.
+            let off2 = (surface - rest_mm).reject_from_normalized(inside).length_squared();
+            let here = Nearest {
+                chart,
+                at,
+                on_plane: on_plane.clamp_length_max(FARTHEST_MM),
+                off2,
+                part: 1.0,
+                met: (place, Displaced { displacement_mm: moved.displacement_mm, normal }),
+            };
+            // What is not a number is no nearer.
+            nearest = match nearest {
+                Some(best) if !(off2 < best.off2) => Some(Nearest { part: 0.5 * best.part, ..best }),
+                _ if on_plane.is_finite() => Some(here),
+                best => best,
+            };
             place = if step >= MAX_STEPS {
-                nearest_mm =
-                    nearest_mm.lerp(moved.displacement_mm, if step == MAX_STEPS { 0.0 } else { 0.5 });
-                self.face.meet_back(rest_mm, inside, nearest_mm)
+                nearest?.next()
             } else if miss2 < 0.25 * last && miss2 < FARTHEST_MM * FARTHEST_MM {
-                chart.point_near(at + on_plane())
+                chart.point_near(at + on_plane)
             } else {
                 self.face.meet_back(rest_mm, inside, moved.displacement_mm)
             };
             last = miss2;
         }
-        None
+        nearest.map(|best| best.met)
+    }
+}
+
+/// The place nearest to a ray that a search has seen, and how it goes on from there.
+#[derive(Clone, Copy)]
+struct Nearest<'a> {
+    chart: &'a Chart,
+    at: Vec2,
+    /// Newton's step.
+    on_plane: Vec2,
+    /// Square of the distance from the ray, mm2.
+    off2: f32,
+    /// The part of the step that is tried next.
+    part: f32,
+    met: (Vec3A, Displaced),
+}
+
+impl Nearest<'_> {
+    fn next(&self) -> Vec3A {
+        self.chart.point_near(self.at + self.on_plane * self.part)
     }
 }
 
 /// Repetitions of [`DisplacementMap::meet`]; a slope of 0.5 leaves a thousandth after ten.
 const MAX_STEPS: u32 = 10;
-/// More of them, each half of the plain one's way, where those do not end.
-const PLAIN_STEPS: u32 = 16;
+/// More of them, damped, where those do not end.
+const MAX_DAMPED_STEPS: u32 = 24;
 /// A step no longer than this is the last, mm: over it a membrane turns by a thousandth of a radian where it is sharpest, which
 /// is tenths of a grey level.
 const NEAR_MM: f32 = 4e-4;

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use domecast::springs::Displacement;
-use domecast::track::{CameraFrame, FollowMethod, TrackOptions, Tracker};
+use domecast::track::{CameraFrame, TrackOptions, Tracker};
 use glam::DVec3;
 
 fn frames(criterion: &mut Criterion) {
@@ -30,7 +30,6 @@ fn frames(criterion: &mut Criterion) {
     for (name, options) in [
         ("steady", TrackOptions::default()),
         ("searched", TrackOptions { search_every: 1, ..TrackOptions::default() }),
-        ("flow", TrackOptions { motion: FollowMethod::LucasKanade, ..TrackOptions::default() }),
     ] {
         let mut tracker = Tracker::new(&constants, options).expect("a tracker");
         let mut number = 0;

@@ -168,6 +168,22 @@ fn a_dark_dome_is_refused_and_the_named_flux_cures_it() {
 }
 
 #[test]
+fn a_key_in_the_edge_of_a_shadow_is_refused_and_the_named_pattern_cures_it() {
+    let mut tree = json!({
+        "version": 1, "name": "small", "camera": { "from": "uvc38" }, "camera_body": { "from": "uvc38" },
+        "dome": { "radius_mm": 4.06 }, "pattern": { "kind": "rings" }, "mount": { "kind": "rigid" },
+        "process": { "min_wall_mm": 1 }, "mould": { "fill": { "diameter_mm": 1.07 } }
+    });
+    let judged = |tree: &Value| LightCheck::of(&tree.to_string().parse::<Design>().expect("the design"));
+    let hidden = judged(&tree).unwrap_err();
+    assert!(hidden.to_string().contains("left out as the pattern's key"), "{hidden}");
+    let cure = hidden.cure.expect("a change");
+    assert_eq!(cure.field, "pattern.polar_angle_deg");
+    tree["pattern"]["polar_angle_deg"] = cure.value.clone();
+    assert!(judged(&tree).is_ok());
+}
+
+#[test]
 fn what_is_cut_off_in_shadow_or_dim_is_a_warning_with_its_number() {
     let warned = |check: &LightCheck, field: &str, word: &str| {
         check.warnings.iter().any(|(at, message)| at == field && message.contains(word))

@@ -1,7 +1,7 @@
 //! Many frames: missing, hidden and false dots, fast motion, long runs.
 
 use domecast::numeric::rotation_from_vector;
-use domecast::track::{FollowMethod, MarkState, Reference, Steps, Thresholds, TrackOptions};
+use domecast::track::{MarkState, Reference, Steps, Thresholds, TrackOptions};
 use glam::{DVec2, DVec3};
 
 use super::render::{Picture, still};
@@ -123,25 +123,19 @@ fn sheared(mm: f64) -> impl Fn(DVec3) -> DVec3 {
 #[test]
 fn motion_of_half_a_pitch_is_followed() {
     // 18 px of pitch are 1.3 mm on the dome at the pole.
-    for motion in [FollowMethod::Predicted, FollowMethod::LucasKanade] {
-        let mut tracker = tracker(TrackOptions { motion, ..TrackOptions::default() });
-        let mut at = 0.0;
-        for (number, step) in [0.0, 0.3, 0.62, -0.62, -0.62, 0.5, 0.62, 0.0].into_iter().enumerate() {
-            at += step;
-            let displace = sheared(at);
-            let picture = Picture { displace: &displace, seed: number as u64, ..still(Rigid::identity()) };
-            let drawn = drawn(&picture);
-            let tracked = tracker.track(number as u64, &frame(&drawn.bytes));
-            let s = score(tracked, &drawn);
-            assert_eq!(s.ok, s.wanted, "{motion:?} frame {number}");
-            assert!(s.worst_px < 0.25, "{motion:?} frame {number}: {}", s.worst_px);
-            let pole = tracked.black_dots[0];
-            assert!(
-                (pole.displacement_mm.unwrap().x - at).abs() < 0.03,
-                "{motion:?} {number} {:?}",
-                pole.displacement_mm
-            );
-        }
+    let mut tracker = tracker(TrackOptions::default());
+    let mut at = 0.0;
+    for (number, step) in [0.0, 0.3, 0.62, -0.62, -0.62, 0.5, 0.62, 0.0].into_iter().enumerate() {
+        at += step;
+        let displace = sheared(at);
+        let picture = Picture { displace: &displace, seed: number as u64, ..still(Rigid::identity()) };
+        let drawn = drawn(&picture);
+        let tracked = tracker.track(number as u64, &frame(&drawn.bytes));
+        let s = score(tracked, &drawn);
+        assert_eq!(s.ok, s.wanted, "frame {number}");
+        assert!(s.worst_px < 0.25, "frame {number}: {}", s.worst_px);
+        let pole = tracked.black_dots[0];
+        assert!((pole.displacement_mm.unwrap().x - at).abs() < 0.03, "{number} {:?}", pole.displacement_mm);
     }
 }
 
@@ -170,7 +164,6 @@ fn the_papers_steps_serve_too() {
     let papers = TrackOptions {
         thresholds: Thresholds::Fixed { black: 90, white: 200 },
         steps: Steps { blur: true, sharpen: true, open: true },
-        motion: FollowMethod::LucasKanade,
         search_every: 1,
         ..TrackOptions::default()
     };

@@ -4,30 +4,23 @@ use super::clock::{TimeLimit, time_again};
 use super::frames::Sequence;
 use super::sweep::{Law, Sweep, SweepSample, sizes};
 use domecast_runtime::constants::Constants;
-use domecast_runtime::track::{
-    CameraFrame, Channel, FollowMethod, MarkState, Steps, Thresholds, TrackOptions, Tracker,
-};
+use domecast_runtime::track::{CameraFrame, Channel, MarkState, Steps, Thresholds, TrackOptions, Tracker};
 
 /// The sweep of options; `None` where the frames have no pictures or the constants fit no tracker.
 pub fn sweep(constants: &Constants, frames: &Sequence, time_limit: TimeLimit) -> Option<Sweep> {
     let plain = TrackOptions::default();
-    let flow = |pyramid_levels| TrackOptions { motion: FollowMethod::LucasKanade, pyramid_levels, ..plain };
-    let options: [(&str, TrackOptions); 8] = [
+    let options: [(&str, TrackOptions); 5] = [
         (
-            "the paper's steps on every frame as a whole",
+            "the paper's filters and levels on every frame as a whole",
             TrackOptions {
                 channel: Channel::Luma,
                 thresholds: Thresholds::Fixed { black: 60, white: 200 },
                 steps: Steps { blur: true, sharpen: true, open: true },
-                motion: FollowMethod::LucasKanade,
                 search_every: 1,
                 ..plain
             },
         ),
         ("every frame searched as a whole", TrackOptions { search_every: 1, ..plain }),
-        ("Lucas-Kanade from the last centroid, 1 level", flow(1)),
-        ("Lucas-Kanade, pyramid of 2 levels", flow(2)),
-        ("Lucas-Kanade, pyramid of 3 levels", flow(3)),
         ("green alone", TrackOptions { channel: Channel::Green, ..plain }),
         ("points only, searched where one is lost", TrackOptions { search_every: 0, ..plain }),
         ("as it runs", plain),
@@ -68,7 +61,7 @@ pub fn sweep(constants: &Constants, frames: &Sequence, time_limit: TimeLimit) ->
             }
         });
         samples.push(SweepSample {
-            method: ["paper", "whole", "flow 1", "flow 2", "flow 3", "green", "points", "default"][index],
+            method: ["paper", "whole", "green", "points", "default"][index],
             label: label.to_owned(),
             setting: index as f64 + 1.0,
             max_error,

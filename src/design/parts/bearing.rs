@@ -9,7 +9,7 @@ use serde_json::json;
 use super::assembly::{Body, affine};
 use super::error::Cure;
 use super::measures::polar;
-use super::screws::Thread;
+use super::screws::{THREADS, Thread};
 use super::seats::{min_engaged_mm, unheld};
 use super::{Assembly, Measures, PartError, purchased};
 use domecast_mesh::RayTarget;
@@ -259,7 +259,6 @@ fn set_screw_access(m: &Measures, assembly: &Assembly, found: &mut Vec<PartError
 
 /// The heads of the mounting screws stay clear of the upper platform under every claimed load.
 fn mounting_heads(m: &Measures, upper: &RayTarget, found: &mut Vec<PartError>) {
-    let mounting = &m.platforms.lower.mounting;
     let mut worst: Option<(usize, f64, &str)> = None;
     for (i, head) in purchased::screw_heads(m).iter().enumerate() {
         let Some(bounds) = head.shape.triangulate(&head.name, m.chord).ok().and_then(|mesh| mesh.bounds())
@@ -285,20 +284,43 @@ fn mounting_heads(m: &Measures, upper: &RayTarget, found: &mut Vec<PartError>) {
     }
     if let Some((i, deep, when)) = worst {
         let names = [format!("mounting screw {i}"), "upper_platform".to_owned()];
-        // A counterbore that the head goes into, so much deeper than what there is.
-        let is_sunk = mounting.counterbore_diameter_mm > mounting.hole_diameter_mm;
-        let before = if is_sunk { mounting.counterbore_depth_mm } else { 0.0 };
-        let head_mm = Thread::through(mounting.hole_diameter_mm).map_or(0.0, |t| t.head_mm);
-        let cure = Cure::value(
-            "platforms.lower.mounting",
-            json!({
-                "at_mm": mounting.at_mm,
-                "hole_diameter_mm": mounting.hole_diameter_mm,
-                "counterbore_diameter_mm": mounting.counterbore_diameter_mm.max(head_mm + 0.2),
-                "counterbore_depth_mm": (100.0 * (before + deep + 0.05)).ceil() / 100.0,
-            }),
-        );
+        let cure = lower_head(m, deep).unwrap_or_else(|| deeper_head(m, deep));
         let problem = format!("the screw's head meets the platform {when}; gap");
         found.push(unheld([&names[0], &names[1]], problem, [-deep, 0.0], cure));
     }
+}
+
+/// Room that a cured screw's head has above it, mm.
+const HEAD_ROOM_MM: f64 = 0.05;
+
+/// A thinner screw, whose head is lower: it takes no room beside the hole, as a counterbore does.
+fn lower_head(m: &Measures, missing_mm: f64) -> Option<Cure> {
+    let mounting = &m.platforms.lower.mounting;
+    if mounting.counterbore_depth_mm > 0.0 && mounting.counterbore_diameter_mm > mounting.hole_diameter_mm {
+        return None;
+    }
+    let now = Thread::through(mounting.hole_diameter_mm)?;
+    let is_enough = |t: &&Thread| t.nominal_mm + missing_mm + HEAD_ROOM_MM <= now.nominal_mm;
+    let thinner = THREADS.iter().rev().find(is_enough)?;
+    let hole_mm = thinner.clearance_mm.max(m.process.min_hole_diameter_mm);
+    (Thread::through(hole_mm)?.nominal_mm <= thinner.nominal_mm).then(|| {
+        Cure::length("platforms.lower.mounting.hole_diameter_mm", mounting.hole_diameter_mm, hole_mm)
+    })
+}
+
+/// A counterbore that the head goes into, so much deeper than what there is.
+fn deeper_head(m: &Measures, missing_mm: f64) -> Cure {
+    let mounting = &m.platforms.lower.mounting;
+    let is_sunk = mounting.counterbore_diameter_mm > mounting.hole_diameter_mm;
+    let before = if is_sunk { mounting.counterbore_depth_mm } else { 0.0 };
+    let head_mm = Thread::through(mounting.hole_diameter_mm).map_or(0.0, |t| t.head_mm);
+    Cure::value(
+        "platforms.lower.mounting",
+        json!({
+            "at_mm": mounting.at_mm,
+            "hole_diameter_mm": mounting.hole_diameter_mm,
+            "counterbore_diameter_mm": mounting.counterbore_diameter_mm.max(head_mm + 0.2),
+            "counterbore_depth_mm": (100.0 * (before + missing_mm + HEAD_ROOM_MM)).ceil() / 100.0,
+        }),
+    )
 }

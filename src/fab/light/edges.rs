@@ -21,6 +21,8 @@ const MIN_SEEN: usize = 12;
 pub struct ShadowEdges {
     /// Number of dots on an edge.
     pub dots: usize,
+    /// Whether the place of the dot that is left out as the key lies on an edge: then the gap is not seen.
+    pub is_key_hidden: bool,
     /// Polar angle, about the sphere's centre, within which no place of the dome in view lies on an edge, degrees; `None`
     /// where none does at all.
     pub from_polar_deg: Option<f64>,
@@ -79,12 +81,13 @@ impl ShadowEdges {
         let reach_px = (0.5 * AROUND * wide.get(wide.len() / 2)?).max(f64::from(STEP_PX));
         let is_edge = |at_px: DVec2| grid.contrast(at_px, reach_px).is_some_and(|part| part > MAX_CONTRAST);
         let dots = layout.dots.iter().filter(|dot| is_edge(dot.image_px)).count();
+        let is_key_hidden = layout.key.as_ref().is_some_and(|key| is_edge(key.dot.image_px));
         let center_z_mm = design.optics().dome().center_z_mm();
         let on_edge = light.dome.iter().filter(|place| is_edge(place.image_px));
         let polar_deg = on_edge.map(|place| {
             let at = place.surface_mm;
             at.truncate().length().atan2(at.z - center_z_mm).to_degrees()
         });
-        Some(Self { dots, from_polar_deg: polar_deg.min_by(f64::total_cmp) })
+        Some(Self { dots, is_key_hidden, from_polar_deg: polar_deg.min_by(f64::total_cmp) })
     }
 }

@@ -81,6 +81,27 @@ pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), Desig
     })
 }
 
+/// Refuses a pattern whose key lies on the edge of a shadow: `track` would state nothing of any frame.
+pub(super) fn require_key(design: &Design, report: &LightReport) -> Result<(), DesignError> {
+    let Some(edges) = report.edges.filter(|edges| edges.is_key_hidden) else {
+        return Ok(());
+    };
+    let fault = DesignError::at(
+        "pattern.polar_angle_deg",
+        json!(design.sections().pattern.polar_angle_deg),
+        "the dot left out as the pattern's key lies on the edge of a light's shadow: `track` does not see the gap and states nothing",
+        "a pattern whose key keeps off the edges of shadows",
+    );
+    const ELSE: &str = "let the lights reach more of the dome (leds.center_z_mm, leds.lip_top_z_mm)";
+    let within_deg = edges.from_polar_deg.map_or(0.0, f64::floor);
+    if within_deg <= 0.0 {
+        return Err(fault.with_help(ELSE));
+    }
+    let cure = Cure { field: "pattern.polar_angle_deg".into(), value: json!(within_deg) };
+    let text = format!("{cure}; or {ELSE}");
+    Err(fault.with_cure(cure).with_help(text))
+}
+
 /// Lights so many times brighter.
 fn brighter(design: &Design, factor: f64) -> Cure {
     let [r, g, b] = design.sections().leds.radiant_flux_mw.to_array().map(|mw| round_up(factor * mw));

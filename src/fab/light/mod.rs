@@ -80,11 +80,12 @@ impl LightCheck {
     /// Looks at a design under its own lights.
     ///
     /// # Errors
-    /// No light, lights that do not fit the design, a dome too dark for `track`, or a white marker that `track` cannot
-    /// tell from what is around it.
+    /// No light, lights that do not fit the design, a dome too dark for `track`, a key on the edge of a shadow, or a white
+    /// marker that `track` cannot tell from what is around it.
     pub fn of(design: &Design) -> Result<Self, DesignError> {
         let (light, mut report) = measure(design)?;
         report.edges = ShadowEdges::of(design, &light);
+        judge::require_key(design, &report)?;
         let warnings = judge::warnings(design, &report);
         let map_png = frame::map(design, &light, &report)?;
         let lit = scene(design, report.level_per_mw_mm2, design.sections().exposure.stray_level)?;

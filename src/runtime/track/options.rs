@@ -34,16 +34,6 @@ pub enum Thresholds {
     },
 }
 
-/// How a dot is found again in the next frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum FollowMethod {
-    /// Where the new pose puts it, plus what it was displaced by; the neighbours' motion where that fails.
-    #[default]
-    Predicted,
-    /// Pyramidal Lucas-Kanade from its last centroid, as the paper does.
-    LucasKanade,
-}
-
 /// Where displacements and wrenches are counted from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Reference {
@@ -80,10 +70,6 @@ pub struct TrackOptions {
     pub thresholds: Thresholds,
     /// Steps of that search.
     pub steps: Steps,
-    /// How a dot is found again.
-    pub motion: FollowMethod,
-    /// Levels of the pyramid of [`FollowMethod::LucasKanade`], 1 to 5: each doubles the way that a dot can be followed.
-    pub pyramid_levels: usize,
     /// Where displacements and wrenches are counted from.
     pub reference: Reference,
     /// Largest rms of the white markers' residuals that is still a pose, px. Above what the constants' own tolerances
@@ -107,8 +93,6 @@ impl Default for TrackOptions {
             channel: Channel::Luma,
             thresholds: Thresholds::Adaptive,
             steps: Steps::default(),
-            motion: FollowMethod::Predicted,
-            pyramid_levels: 3,
             reference: Reference::Constants,
             max_residual_px: 2.0,
             max_misplaced: 0.5,

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use super::source::RawSize;
-use domecast_runtime::track::{Channel, Field, FollowMethod, Reference, Steps, Thresholds, TrackOptions};
+use crate::commands::output::Output;
+use domecast_runtime::track::{Channel, Field, Reference, Steps, Thresholds, TrackOptions};
 
 /// What is written for each frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -67,12 +68,11 @@ pub struct TrackArguments {
     /// The paper's fixed levels, BLACK,WHITE (0 to 255), instead of adaptive ones.
     #[arg(long, value_parser = levels)]
     thresholds: Option<[u8; 2]>,
-    /// Follow dots by pyramidal Lucas-Kanade, as the paper does.
-    #[arg(long)]
+    // taken for one version more, without effect
+    #[arg(long, hide = true)]
     flow: bool,
-    /// Levels of its pyramid: each doubles the way that a dot can be followed.
-    #[arg(long, default_value_t = 3, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=5), requires = "flow")]
-    pyramid_levels: usize,
+    #[arg(long, hide = true)]
+    pyramid_levels: Option<u32>,
     /// Sharpen before the whole frame is searched.
     #[arg(long)]
     sharpen: bool,
@@ -132,6 +132,16 @@ impl TrackArguments {
         if self.camera_mirrored { Some(-turned_rad.unwrap_or(0.0)) } else { turned_rad }
     }
 
+    /// Says so where an option is given that has no effect any more.
+    pub fn note_what_is_gone(&self, output: &Output) {
+        if self.flow || self.pyramid_levels.is_some() {
+            output.warn(
+                "--flow and --pyramid-levels have no effect any more: dots are found where the pose puts them; the next version does \
+                 not take them",
+            );
+        }
+    }
+
     /// What the tracker is to do.
     pub fn options(&self) -> TrackOptions {
         TrackOptions {
@@ -145,8 +155,6 @@ impl TrackArguments {
                 .thresholds
                 .map_or(Thresholds::Adaptive, |[black, white]| Thresholds::Fixed { black, white }),
             steps: Steps { blur: !self.no_blur, sharpen: self.sharpen, open: self.open },
-            motion: if self.flow { FollowMethod::LucasKanade } else { FollowMethod::Predicted },
-            pyramid_levels: self.pyramid_levels,
             reference: self.reference.map_or(Reference::Constants, Reference::Frames),
             search_every: self.search_every,
             max_residual_px: self.max_residual_px,

@@ -180,6 +180,7 @@ fn tell_turn(output: &Output, turn: Option<CameraTurn>, tally: &Tally) {
 
 /// Tracks every frame that there is; a frame that cannot be read is reported and skipped.
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
+    arguments.note_what_is_gone(output);
     let constants = read_constants(&arguments.constants)?;
     let mut tracker = Tracker::new(&constants, arguments.options()).map_err(|e| unfit(arguments, &e))?;
     let named = arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times);

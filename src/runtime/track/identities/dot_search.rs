@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::dot_track::DotTrack;
 use super::skin;
 use crate::track::frame::Plane;
-use crate::track::marks::{DarkSpot, Flow, MarkState, SpotFault, SpotMeter};
+use crate::track::marks::{DarkSpot, MarkState, SpotFault, SpotMeter};
 use crate::track::model::DotModel;
 
 /// How far from its prediction a spot is a dot without asking its neighbours, in parts of its spacing: with motions up
@@ -47,8 +47,8 @@ impl DotSearch<'_, '_> {
         self.meter.measure(self.plane, start, &self.tracks[index].outline, stray_px, known)
     }
 
-    /// Each dot where its own past puts it: what the pose expects and it was displaced by, or the flow.
-    pub fn follow(&mut self, flow: Option<&Flow>, turn: usize) {
+    /// Each dot where its own past puts it: what the pose expects and it was displaced by.
+    pub fn follow(&mut self, turn: usize) {
         for index in 0..self.tracks.len() {
             let track = &mut self.tracks[index];
             // The looks of some are taken anew in each frame, and of all whose size has changed.
@@ -58,9 +58,7 @@ impl DotSearch<'_, '_> {
                 continue;
             }
             track.state = track.absent();
-            let by_flow = flow.and_then(|flow| flow.follow(track.last_px?));
-            let by_pose = track.expected_px.zip(track.displaced_px).map(|(e, d)| e + d);
-            let Some(start) = by_flow.or(by_pose) else { continue };
+            let Some(start) = track.expected_px.zip(track.displaced_px).map(|(e, d)| e + d) else { continue };
             track.start_px = Some(start);
             let reach = OWN_REACH * self.models[index].spacing_px;
             match self.measure(index, start, reach, known.as_ref()) {

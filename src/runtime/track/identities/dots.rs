@@ -11,9 +11,9 @@ use super::dot_track::DotTrack;
 use super::false_dots::{MAX_FALSE_DOTS, find_false_dots};
 use super::key_check::{KeyCheck, KeyFrame, Orientation};
 use crate::track::frame::{Mask, Plane};
-use crate::track::marks::{BlobScan, DarkBlob, Flow, ScanSettings, SpotMeter};
+use crate::track::marks::{BlobScan, DarkBlob, ScanSettings, SpotMeter};
 use crate::track::model::{DotModel, SensorModel};
-use crate::track::options::{FollowMethod, Thresholds, TrackOptions};
+use crate::track::options::{Thresholds, TrackOptions};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 
@@ -100,7 +100,6 @@ impl Dots {
 pub(in crate::track) struct DotIdentities {
     dots: Dots,
     prediction: DotPrediction,
-    flow: Option<Flow>,
     scan: BlobScan,
     scan_settings: ScanSettings,
     matcher: BlobMatcher,
@@ -131,12 +130,10 @@ impl DotIdentities {
         }
         let count = models.len();
         let widest_px = models.iter().map(|model| model.outline.radius_px).fold(0.0, f64::max);
-        let follows = options.motion == FollowMethod::LucasKanade;
         let steps = options.steps;
         Self {
             dots: Dots { meter, tracks: vec![DotTrack::default(); count], order: Vec::with_capacity(count) },
             prediction: DotPrediction::default(),
-            flow: follows.then(|| Flow::new(width, height, options.pyramid_levels)),
             scan: BlobScan::new(width, height, widest_px),
             scan_settings: ScanSettings {
                 blur: steps.blur,
@@ -166,10 +163,6 @@ impl DotIdentities {
         let models = &model.dots;
         self.searched = false;
         self.false_dots.clear();
-        if let Some(flow) = &mut self.flow {
-            let has_last = self.dots.tracks.iter().any(|t| t.last_px.is_some());
-            flow.take(plane, has_last);
-        }
         match pose {
             Some(pose) => {
                 self.prediction.predict(pose, optics, mask, models, &mut self.dots.tracks);
@@ -198,7 +191,7 @@ impl DotIdentities {
         let (known, wanted) =
             wanted.fold((0, 0), |(known, all), t| (known + usize::from(t.displaced_px.is_some()), all + 1));
         let mut search = self.dots.search(frame.plane, models);
-        search.follow(self.flow.as_ref(), self.turn);
+        search.follow(self.turn);
         self.turn = self.turn.wrapping_add(1);
         search.spread();
         let torn = search.check();
@@ -283,9 +276,6 @@ impl DotIdentities {
     /// The last frame does not count: the next one has nothing to be followed from.
     pub fn forget_last(&mut self) {
         self.dots.tracks.iter_mut().for_each(DotTrack::forget_last);
-        if let Some(flow) = &mut self.flow {
-            flow.forget();
-        }
     }
 
     /// Forgets all frames.

@@ -5,13 +5,11 @@
 //! measured on the camera's own bytes, into buffers that are kept.
 
 mod filter;
-mod flow;
 mod marker;
 mod scan;
 mod spot;
 mod state;
 
-pub(super) use flow::Flow;
 pub(crate) use marker::marker_in_still;
 pub(super) use marker::{Candidate, FIT_REACH_PX, FittedDisc, MAX_HALF_PX, MarkerView, ShadingSlope};
 pub(super) use scan::{BlobScan, DarkBlob, ScanSettings};

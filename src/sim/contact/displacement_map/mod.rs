@@ -182,10 +182,11 @@ impl DisplacementMap {
                 met: (place, Displaced { displacement_mm: moved.displacement_mm, normal }),
             };
             // What is not a number is no nearer.
-            nearest = match nearest {
-                Some(best) if !(off2 < best.off2) => Some(Nearest { part: 0.5 * best.part, ..best }),
-                _ if on_plane.is_finite() => Some(here),
-                best => best,
+            let is_nearer = on_plane.is_finite() && nearest.is_none_or(|best| off2 < best.off2);
+            nearest = if is_nearer {
+                Some(here)
+            } else {
+                nearest.map(|best| Nearest { part: 0.5 * best.part, ..best })
             };
             place = if step >= MAX_STEPS {
                 nearest?.next()

@@ -7,6 +7,7 @@ pub mod compare;
 pub mod constants;
 mod hash;
 pub mod html;
+pub mod illuminate;
 pub mod light;
 pub mod numbers;
 pub mod report;

@@ -41,6 +41,14 @@ pub fn fill(picture: &mut Pixmap, corners: &[DVec2], rgb: [u8; 3]) {
     }
 }
 
+/// The same with hard edges: neighbours that share an edge leave no seam, and a picture of few colours packs well.
+pub fn fill_hard(picture: &mut Pixmap, corners: &[DVec2], rgb: [u8; 3]) {
+    if let Some(path) = run(corners, true) {
+        let paint = Paint { anti_alias: false, ..paint(rgb) };
+        picture.fill_path(&path, &paint, FillRule::Winding, Transform::identity(), None);
+    }
+}
+
 /// Draws a line through corners in px.
 pub fn stroke(picture: &mut Pixmap, corners: &[DVec2], close: bool, width_px: f32, rgb: [u8; 3]) {
     if let Some(path) = run(corners, close) {

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::edges::ShadowEdges;
 use super::rest::{luma, marker_outlines};
+use super::separation::Separation;
 use domecast_design::Design;
 use domecast_design::sections::ExposureSection;
 use domecast_sim::light::RestLight;
@@ -31,6 +32,8 @@ pub struct LightReport {
     pub markers: Vec<MarkerLevels>,
     /// Edges of the platform's shadows; `None` where the dots cannot be laid out.
     pub edges: Option<ShadowEdges>,
+    /// How well the lights tell normals; `None` where only the levels were asked for.
+    pub separation: Option<Separation>,
 }
 
 /// Grey levels of the dome between the dots, inside of the mask.

@@ -17,6 +17,7 @@ mod frame;
 mod judge;
 mod levels;
 mod rest;
+mod separation;
 
 use serde_json::json;
 
@@ -26,7 +27,10 @@ use domecast_sim::light::RestLight;
 pub use edges::ShadowEdges;
 pub use levels::{DomeLevels, LightReport, MarkerLevels};
 use levels::{dome_levels, marker_levels};
-use rest::{fault, pixels, scene};
+pub(crate) use rest::scene;
+use rest::{fault, pixels};
+pub use separation::Separation;
+pub(crate) use separation::{lacking, normal_error_deg, percentile_of};
 
 /// The report with the frame, a map, and what its maker should know.
 #[derive(Debug, Clone)]
@@ -71,6 +75,7 @@ fn measure(design: &Design) -> Result<(RestLight, LightReport), DesignError> {
         dome: dome_levels(&light, level_per_mw_mm2, exposure),
         markers: marker_levels(design, &light, level_per_mw_mm2),
         edges: None,
+        separation: None,
     };
     judge::require(design, &report)?;
     Ok((light, report))
@@ -89,6 +94,7 @@ impl LightCheck {
         let warnings = judge::warnings(design, &report);
         let map_png = frame::map(design, &light, &report)?;
         let lit = scene(design, report.level_per_mw_mm2, design.sections().exposure.stray_level)?;
+        report.separation = Separation::of(&lit, report.level_per_mw_mm2)?;
         Ok(Self { frame_png: frame::frame(&lit)?, map_png, report, warnings })
     }
 

@@ -23,7 +23,7 @@ pub(super) fn luma(level: [f64; 3]) -> f64 {
 }
 
 /// The sensor at rest under its lights with an exposure.
-pub(super) fn scene(design: &Design, level_per_mw_mm2: f64, stray_level: f64) -> Result<Scene, DesignError> {
+pub(crate) fn scene(design: &Design, level_per_mw_mm2: f64, stray_level: f64) -> Result<Scene, DesignError> {
     let exposure = &design.sections().exposure;
     let file: SceneFile = serde_json::from_value(json!({
         "version": 1,

@@ -2,7 +2,7 @@
 
 use super::subject::ReportSubject;
 use crate::html::{Html, figure, html, table};
-use crate::light::MarkerLevels;
+use crate::light::{MarkerLevels, Separation};
 use crate::numbers::{percent, typeset};
 
 /// The frame, how even the dome is, and how the markers stand out.
@@ -20,6 +20,7 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
     ]
     .map(|(name, value)| vec![name.into(), value.into()])
     .into();
+    let separation = report.separation.map(separation_rows).unwrap_or_default();
     let marker = |marker: &MarkerLevels| {
         vec![
             html!("{}", marker.id),
@@ -30,7 +31,7 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
     };
     let markers: Vec<Vec<Html>> = report.markers.iter().map(marker).collect();
     html!(
-        "<div class=\"row\">\n{}{}</div>\n<p>Exposure and gain: level {} for each mW/mm² on a white surface{}.</p>\n{}{}",
+        "<div class=\"row\">\n{}{}</div>\n<p>Exposure and gain: level {} for each mW/mm² on a white surface{}.</p>\n{}{}{}",
         figure(
             &subject.shown("report/light-frame.png", "The sensor at rest under its own lights"),
             "The frame at rest, with every effect of light.",
@@ -43,9 +44,33 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
         if report.is_exposure_at_limit { ", the camera's largest" } else { "" },
         table("Grey level of the dome in view, of 255", &["", "value"], &rows),
         table(
+            "What the colours tell of the dome's normals; domecast illuminate has the maps",
+            &["", "value"],
+            &separation
+        ),
+        table(
             "White markers, levels of 255",
             &["marker", "level", "above what is around", "centroid known to"],
             &markers,
         ),
     )
+}
+
+/// What the lights' colours tell of normals; a dash where one place in twenty lacks a colour.
+fn separation_rows(separation: Separation) -> Vec<Vec<Html>> {
+    let or_dash = |value: Option<f64>| value.map_or("–".to_owned(), typeset);
+    let error = separation.normal_error_deg_per_level_p95_to_60_deg;
+    let degrees = error.map_or("–".to_owned(), |deg| format!("{}°", typeset(deg)));
+    let rows = [
+        ("error of a normal for one grey level, 95th percentile to 60° from the pole", degrees),
+        (
+            "condition number of crosstalk and direct light, 95th percentile to 60°",
+            or_dash(separation.condition_number_p95_to_60_deg),
+        ),
+        (
+            "crescents: area within 75° where a colour is below a twentieth of its median",
+            percent(separation.crescent_share_to_75_deg),
+        ),
+    ];
+    rows.map(|(name, value)| vec![name.into(), value.into()]).into()
 }

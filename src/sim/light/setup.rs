@@ -1,6 +1,6 @@
 //! From the design's lights and the scene's to the sources of a field.
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 use super::cavity::Cavities;
 use super::direct::Emitter;
@@ -35,6 +35,12 @@ fn seen(color: ColorChannel, crosstalk: f64) -> Channels {
         1 => crosstalk,
         _ => 0.0,
     })
+}
+
+/// What each channel (row) sees of each colour (column).
+pub fn crosstalk_matrix(crosstalk: f64) -> DMat3 {
+    let [red, green, blue] = ColorChannel::ALL.map(|color| DVec3::from_array(seen(color, crosstalk)));
+    DMat3::from_cols(red, green, blue)
 }
 
 /// The brightness that the scene gives each light of the design.

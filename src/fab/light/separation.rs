@@ -34,7 +34,8 @@ pub struct Separation {
 impl Separation {
     /// Of a scene under its own lights; `None` where it has none.
     pub(super) fn of(scene: &Scene, level_per_mw_mm2: f64) -> Result<Option<Self>, DesignError> {
-        let Some(light) = Illumination::of(scene, SUMMARY_GRID).map_err(fault)? else { return Ok(None) };
+        let light = Illumination::direct(scene, SUMMARY_GRID, CRESCENT_POLAR_DEG).map_err(fault)?;
+        let Some(light) = light else { return Ok(None) };
         let p95 = |of: &dyn Fn(&LitPlace) -> Option<Option<f64>>| {
             let within = light.places.iter().filter(|place| place.polar_deg <= SUMMARY_POLAR_DEG);
             percentile_of(within.filter_map(of).collect(), 0.95)

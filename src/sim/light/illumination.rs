@@ -10,6 +10,7 @@ use super::gloss::Gloss;
 use super::parts::LightUse;
 use super::setup::{self, Channels};
 use super::shade::{ShadedDome, leaves};
+use super::tables::Ways;
 use crate::SimError;
 use crate::scene::Scene;
 use crate::work::Work;
@@ -28,6 +29,12 @@ impl PlaceGrid {
     pub fn on_unit_dome(&self, face: DomeFace, ring: f64, place: f64) -> DVec3 {
         let azimuth = std::f64::consts::TAU * place / self.places as f64;
         face.place(azimuth, face.level((ring / self.rings as f64).clamp(0.0, 1.0)))
+    }
+
+    /// Middle of a place on the unit dome.
+    pub fn middle(&self, face: DomeFace, index: usize) -> DVec3 {
+        let (ring, place) = (index / self.places.max(1), index % self.places.max(1));
+        self.on_unit_dome(face, ring as f64 + 0.5, place as f64 + 0.5)
     }
 
     /// How many places in all; place `p` of ring `r` is number `r * places + p`.
@@ -56,6 +63,30 @@ pub struct LitPlace {
 }
 
 impl LitPlace {
+    /// The direct light on a point of the dome; its angles and normal are left to the caller.
+    fn of(scene: &Scene, ways: &Ways, point_mm: DVec3, rule: &EmitterRule) -> Self {
+        let mut vector_mw_mm2 = [DVec3::ZERO; 3];
+        for source in &ways.sources {
+            let color = source.optics.channel() as usize;
+            // What its own channel sees of a colour is all of it.
+            if let (Some(sum), Some(mw)) = (vector_mw_mm2.get_mut(color), source.seen_mw.get(color)) {
+                *sum += ways.flux(source, point_mm, rule) * *mw;
+            }
+        }
+        let view = view(scene, point_mm);
+        // The channels' ways differ by dispersion alone, far less than what Fresnel's share would notice.
+        let momentum = view.map_or(0.0, |(_, momentum)| momentum);
+        Self {
+            polar_deg: 0.0,
+            azimuth_deg: 0.0,
+            normal: DVec3::Z,
+            image_px: view.map(|(pixel, _)| pixel),
+            passed: std::array::from_fn(|c| leaves(&ways.optics[c], momentum, false)),
+            vector_mw_mm2,
+            total_mw_mm2: [0.0; 3],
+        }
+    }
+
     /// `L`: its rows are the vector irradiances of the three colours, mW/mm^2.
     pub fn light(&self) -> DMat3 {
         let [red, green, blue] = self.vector_mw_mm2;
@@ -90,40 +121,38 @@ impl Illumination {
     /// # Errors
     /// Lights that do not fit the design, or a platform that cannot be made.
     pub fn of(scene: &Scene, grid: PlaceGrid) -> Result<Option<Self>, SimError> {
-        let Some(light) = &scene.file().light.leds else { return Ok(None) };
+        let Some(mut light) = Self::direct(scene, grid, 180.0)? else { return Ok(None) };
         let Some(shaded) = ShadedDome::new(scene, &LightUse::ALL, &mut Work::default())? else {
             return Ok(None);
         };
+        for (index, place) in light.places.iter_mut().enumerate() {
+            let total = shaded.field().still(grid.middle(light.face, index).as_vec3a());
+            place.total_mw_mm2 = [total.x, total.y, total.z].map(f64::from);
+        }
+        Ok(Some(light))
+    }
+
+    /// The same without what the dome adds (`total_mw_mm2` is 0), in a fraction of the time; of places beyond a polar
+    /// angle there is nothing.
+    ///
+    /// # Errors
+    /// As [`Illumination::of`].
+    pub fn direct(scene: &Scene, grid: PlaceGrid, max_polar_deg: f64) -> Result<Option<Self>, SimError> {
+        let Some(light) = &scene.file().light.leds else { return Ok(None) };
         let ways = setup::ways(scene, &LightUse::ALL)?;
         let face = ways.face();
         let rule = EmitterRule::default();
         let one = |index: usize| {
-            let (ring, around) = (index / grid.places, index % grid.places);
-            let place = grid.on_unit_dome(face, ring as f64 + 0.5, around as f64 + 0.5);
-            let point_mm = ways.point(place, 1.0);
-            let mut vector_mw_mm2 = [DVec3::ZERO; 3];
-            for source in &ways.sources {
-                let color = source.optics.channel() as usize;
-                // What its own channel sees of a colour is all of it.
-                if let (Some(sum), Some(mw)) = (vector_mw_mm2.get_mut(color), source.seen_mw.get(color)) {
-                    *sum += ways.flux(source, point_mm, &rule) * *mw;
-                }
-            }
-            let total = shaded.field().still(place.as_vec3a());
-            LitPlace {
-                polar_deg: place.truncate().length().atan2(place.z).to_degrees(),
-                azimuth_deg: 360.0 * (around as f64 + 0.5) / grid.places as f64,
+            let place = grid.middle(face, index);
+            let polar_deg = place.truncate().length().atan2(place.z).to_degrees();
+            (polar_deg <= max_polar_deg).then(|| LitPlace {
+                polar_deg,
+                azimuth_deg: 360.0 * ((index % grid.places) as f64 + 0.5) / grid.places as f64,
                 normal: face.normal(place),
-                image_px: image_px(scene, point_mm),
-                passed: std::array::from_fn(|c| {
-                    let optics = &ways.optics[c];
-                    leaves(optics, setup::momentum_to_camera(optics, point_mm), false)
-                }),
-                vector_mw_mm2,
-                total_mw_mm2: [total.x, total.y, total.z].map(f64::from),
-            }
+                ..LitPlace::of(scene, &ways, ways.point(place, 1.0), &rule)
+            })
         };
-        let places = (0..grid.count()).into_par_iter().map(one).collect();
+        let places = (0..grid.count()).into_par_iter().filter_map(one).collect();
         let reflectance = scene.design().sections().elastomer.membrane_reflectance.to_array();
         Ok(Some(Self {
             grid,
@@ -154,14 +183,20 @@ impl Illumination {
     }
 }
 
-/// Where the camera sees a point of the dome at rest.
-pub fn image_px(scene: &Scene, point_mm: DVec3) -> Option<DVec2> {
+/// Where the camera sees a point of the dome at rest, and the sine of the way's angle in air; `None` outside of the image.
+fn view(scene: &Scene, point_mm: DVec3) -> Option<(DVec2, f64)> {
     let optics = scene.optics();
-    let spec = optics.lens().spec();
     let pixel = optics.project(point_mm).ok()?;
+    let ray = optics.lens().unproject(pixel).ok()?;
+    let direction = optics.sensor_from_camera().vector(ray);
+    is_in_image(scene, pixel).then(|| (pixel, direction.truncate().length().min(1.0)))
+}
+
+/// Whether a place is in the raw image, pixel centres being whole numbers.
+fn is_in_image(scene: &Scene, pixel: DVec2) -> bool {
+    let spec = scene.optics().lens().spec();
     let size = DVec2::new(f64::from(spec.width), f64::from(spec.height));
-    let is_inside = pixel.cmpge(DVec2::splat(-0.5)).all() && pixel.cmplt(size - 0.5).all();
-    is_inside.then_some(pixel)
+    pixel.cmpge(DVec2::splat(-0.5)).all() && pixel.cmplt(size - 0.5).all()
 }
 
 /// A light's image in the faces of sheet and silicone, as the camera sees it.
@@ -179,12 +214,9 @@ pub struct Reflection {
 /// Lights that do not fit the design.
 pub fn reflections(scene: &Scene) -> Result<Vec<Reflection>, SimError> {
     let Some(gloss) = Gloss::of(scene)? else { return Ok(Vec::new()) };
-    let spec = scene.optics().lens().spec();
-    let size = DVec2::new(f64::from(spec.width), f64::from(spec.height));
     let seen = gloss.glints(scene.optics()).into_iter().filter_map(|glint| {
         let image_px = glint.corners_px.iter().sum::<DVec2>() / 4.0;
-        let is_inside = image_px.cmpge(DVec2::splat(-0.5)).all() && image_px.cmplt(size - 0.5).all();
-        is_inside.then_some(Reflection { image_px, level: glint.level })
+        is_in_image(scene, image_px).then_some(Reflection { image_px, level: glint.level })
     });
     Ok(seen.collect())
 }

@@ -88,7 +88,7 @@ pub struct Places {
 pub struct LightsSeen {
     /// Pieces of the lights, 36 each, that it sees mirrored in the faces of sheet and silicone, one for each face.
     pub mirrored_pieces: usize,
-    /// Level, of 255, that the brightest of them adds in any channel.
+    /// Level, of 255, that the brightest of them adds in any channel, not cut off at full scale.
     pub brightest_mirrored_level: Option<f64>,
     /// Where that one is in the raw image, px.
     pub brightest_mirrored_px: Option<[f64; 2]>,

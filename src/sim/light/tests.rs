@@ -172,6 +172,26 @@ fn light_bent_by_the_sheet_keeps_its_flux() {
 }
 
 #[test]
+fn a_small_lambert_light_under_a_flat_sheet_has_its_closed_form() {
+    // A cone of air angle with sine s comes to r(s), the sum of h s / sqrt(n^2 - s^2) over the layers. Of flux 1 what
+    // passes within it is s^2, so the irradiance of the level plane is 2 s ds / (2 pi r dr).
+    let optics = sensor(&[1.49], 1.41);
+    let source = emitter(DVec3::new(0.0, 0.0, -2.0), DVec3::Z, 1e-3, 1.0);
+    let layers = |z: f64| [(1.0, 1.0), (1.0, 1.49), (z, 1.41)];
+    for (z, sine) in [(3.0, 0.2_f64), (3.0, 0.6), (1.5, 0.85), (6.0, 0.8)] {
+        let over = |n: f64| (n * n - sine * sine).sqrt();
+        let radius: f64 = layers(z).iter().map(|(h, n)| h * sine / over(*n)).sum();
+        let change: f64 = layers(z).iter().map(|(h, n)| h * n * n / over(*n).powi(3)).sum();
+        let exact = sine / (std::f64::consts::PI * radius * change);
+        let point = DVec3::new(radius * 0.6, radius * 0.8, z);
+        let found = light(&optics).vector_irradiance(&source, point, &EmitterRule::default());
+        assert!((found.z / exact - 1.0).abs() < 1e-5, "{z} {sine}: {} {exact}", found.z);
+        let tangent = found.truncate().length() / found.z;
+        assert!((tangent * over(1.41) / sine - 1.0).abs() < 1e-5, "{z} {sine}: {tangent}");
+    }
+}
+
+#[test]
 fn diffusers_keep_the_energy() {
     for exponent in [0.0, 1.0, 3.5, 20.0] {
         let bare = Lobe::cosine_power(exponent);

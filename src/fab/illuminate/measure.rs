@@ -3,10 +3,12 @@
 use serde_json::json;
 
 use super::crescents::{COLORS, crescents};
-use super::numbers::{DotContrast, Evenness, IlluminationReport, LightsSeen, Percentiles, Places, Within};
+use super::numbers::{
+    DotContrast, IlluminationReport, LightEvenness, LightsSeen, Percentiles, Places, Within,
+};
 use crate::light::{LightReport, lacking, normal_error_deg, percentile_of, scene};
 use domecast_design::{Design, DesignError};
-use domecast_sim::light::illumination::{Illumination, LitPlace, PlaceGrid, reflections};
+use domecast_sim::light::illumination::{IlluminatedPlace, Illumination, PlaceGrid, reflections};
 use domecast_sim::light::separation::condition_number;
 use domecast_sim::{Scene, SimError};
 
@@ -110,13 +112,15 @@ fn require_colors(design: &Design) -> Result<(), DesignError> {
 fn places(light: &Illumination, checked: &LightReport, stray_levels: f64, lacks: &[[bool; 3]]) -> Places {
     let exposure = checked.level_per_mw_mm2;
     let each = light.places.iter();
-    let grey =
-        |place: &LitPlace| -> [f64; 3] { std::array::from_fn(|c| light.grey_per_mw_mm2(place, c, exposure)) };
-    let level = |place: &LitPlace| {
+    let grey = |place: &IlluminatedPlace| -> [f64; 3] {
+        std::array::from_fn(|c| light.grey_per_mw_mm2(place, c, exposure))
+    };
+    let level = |place: &IlluminatedPlace| {
         let grey = grey(place);
         place.image_px.map(|_| std::array::from_fn(|c| grey[c] * place.total_mw_mm2[c] + stray_levels))
     };
-    let error = |place: &LitPlace| place.image_px.and_then(|_| normal_error_deg(light, place, exposure));
+    let error =
+        |place: &IlluminatedPlace| place.image_px.and_then(|_| normal_error_deg(light, place, exposure));
     Places {
         rings: light.grid.rings,
         per_ring: light.grid.places,
@@ -168,7 +172,7 @@ fn percentiles(values: Vec<Option<f64>>) -> Percentiles {
     Percentiles { p5, p50, p95 }
 }
 
-fn evenness(inside: &[usize], value: &dyn Fn(usize) -> [f64; 3]) -> Evenness {
+fn evenness(inside: &[usize], value: &dyn Fn(usize) -> [f64; 3]) -> LightEvenness {
     let values: Vec<[f64; 3]> = inside.iter().map(|i| value(*i)).collect();
     let irradiance_mw_mm2: [Percentiles; 3] =
         std::array::from_fn(|c| percentiles(values.iter().map(|v| Some(v[c])).collect()));
@@ -178,7 +182,7 @@ fn evenness(inside: &[usize], value: &dyn Fn(usize) -> [f64; 3]) -> Evenness {
     let count = sums.len().max(1) as f64;
     let mean = sums.iter().sum::<f64>() / count;
     let variance = sums.iter().map(|sum| (sum - mean).powi(2)).sum::<f64>() / count;
-    Evenness {
+    LightEvenness {
         p95_over_p5: irradiance_mw_mm2.map(ratio),
         irradiance_mw_mm2,
         sum_coefficient_of_variation: (mean > 0.0).then(|| variance.sqrt() / mean),

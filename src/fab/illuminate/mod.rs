@@ -10,7 +10,7 @@ mod page;
 pub use crescents::Crescent;
 pub use maps::Map;
 pub use measure::{GRID, POLAR_ANGLES_DEG};
-pub use numbers::{DotContrast, Evenness, IlluminationReport, LightsSeen, Percentiles, Places, Within};
+pub use numbers::{DotContrast, IlluminationReport, LightEvenness, LightsSeen, Percentiles, Places, Within};
 
 use domecast_design::{Design, DesignError};
 

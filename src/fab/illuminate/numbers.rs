@@ -18,7 +18,7 @@ pub struct Percentiles {
 
 /// How even one kind of light is; colours and channels are red, green, blue.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Evenness {
+pub struct LightEvenness {
     /// Irradiance, mW/mm^2.
     pub irradiance_mw_mm2: [Percentiles; 3],
     /// 95th percentile over the 5th of each; null where the 5th is 0.
@@ -37,9 +37,9 @@ pub struct Within {
     /// Those of them that the camera sees at rest.
     pub places_seen: usize,
     /// By the lights directly, for each colour of light, without crosstalk.
-    pub direct: Evenness,
+    pub direct: LightEvenness,
     /// With the dome lighting itself, for each channel of the camera, with crosstalk.
-    pub total: Evenness,
+    pub total: LightEvenness,
     /// Condition number of `C L`.
     pub condition_number: Percentiles,
     /// Error of a normal in each tangential direction for one grey level of noise in each channel, degrees, of the places

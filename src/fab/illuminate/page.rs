@@ -2,7 +2,7 @@
 
 use super::crescents::{COLORS, Crescent};
 use super::maps::{Map, SCALE};
-use super::numbers::{Evenness, IlluminationReport, Percentiles, Within};
+use super::numbers::{IlluminationReport, LightEvenness, Percentiles, Within};
 use crate::html::{Html, STYLE, figure, html, picture, table};
 use crate::light::MarkerLevels;
 use crate::numbers::{percent, typeset};
@@ -77,7 +77,7 @@ fn numbers(report: &IlluminationReport) -> Html {
     let row = |name: &str, cell: &dyn Fn(&Within) -> Html| -> Vec<Html> {
         std::iter::once(Html::from(name)).chain(report.within.iter().map(cell)).collect()
     };
-    let channel = |c: usize, of: &dyn Fn(&Within) -> &Evenness, name: &str| {
+    let channel = |c: usize, of: &dyn Fn(&Within) -> &LightEvenness, name: &str| {
         row(&format!("{name}, {}: 95th over 5th percentile (factor)", COLORS[c]), &|one| {
             or_dash(of(one).p95_over_p5[c], "").into()
         })

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::rest::fault;
 use domecast_design::DesignError;
 use domecast_sim::Scene;
-use domecast_sim::light::illumination::{Illumination, LitPlace, PlaceGrid};
+use domecast_sim::light::illumination::{IlluminatedPlace, Illumination, PlaceGrid};
 use domecast_sim::light::separation::{condition_number, normal_error_rad, percentile};
 
 /// A colour below this part of its median leaves a crescent: the camera's noise is as large as what it sees of the colour.
@@ -36,7 +36,7 @@ impl Separation {
     pub(super) fn of(scene: &Scene, level_per_mw_mm2: f64) -> Result<Option<Self>, DesignError> {
         let light = Illumination::direct(scene, SUMMARY_GRID, CRESCENT_POLAR_DEG).map_err(fault)?;
         let Some(light) = light else { return Ok(None) };
-        let p95 = |of: &dyn Fn(&LitPlace) -> Option<Option<f64>>| {
+        let p95 = |of: &dyn Fn(&IlluminatedPlace) -> Option<Option<f64>>| {
             let within = light.places.iter().filter(|place| place.polar_deg <= SUMMARY_POLAR_DEG);
             percentile_of(within.filter_map(of).collect(), 0.95)
         };
@@ -55,7 +55,11 @@ impl Separation {
 
 /// Standard deviation of a normal in each tangential direction for one grey level of noise, degrees; `None` where a colour
 /// is missing.
-pub fn normal_error_deg(light: &Illumination, place: &LitPlace, level_per_mw_mm2: f64) -> Option<f64> {
+pub fn normal_error_deg(
+    light: &Illumination,
+    place: &IlluminatedPlace,
+    level_per_mw_mm2: f64,
+) -> Option<f64> {
     let levels = light.seen_levels(place, level_per_mw_mm2);
     normal_error_rad(&levels, place.normal).map(f64::to_degrees)
 }
@@ -69,13 +73,13 @@ pub fn percentile_of(values: Vec<Option<f64>>, part: f64) -> Option<f64> {
 
 /// For each place, which colours have too little direct light; none beyond a polar angle, within which medians are taken.
 pub fn lacking(light: &Illumination, polar_deg: f64) -> Vec<[bool; 3]> {
-    let is_within = |place: &&LitPlace| place.polar_deg <= polar_deg;
+    let is_within = |place: &&IlluminatedPlace| place.polar_deg <= polar_deg;
     let median = |color: usize| {
         let values = light.places.iter().filter(is_within).map(|place| Some(place.direct_mw_mm2()[color]));
         percentile_of(values.collect(), 0.5).unwrap_or(0.0)
     };
     let medians: [f64; 3] = std::array::from_fn(median);
-    let lacks = |place: &LitPlace| {
+    let lacks = |place: &IlluminatedPlace| {
         let direct = place.direct_mw_mm2();
         // A colour of which half the places have nothing is missing wherever there is none of it.
         let is_lacking = |c: usize| direct[c] < CRESCENT_PART * medians[c] || direct[c] <= 0.0;

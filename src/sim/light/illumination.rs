@@ -45,7 +45,7 @@ impl PlaceGrid {
 
 /// The light on a place of the dome.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LitPlace {
+pub struct IlluminatedPlace {
     /// Angle between the axis and the way from the sphere's centre to the place, degrees.
     pub polar_deg: f64,
     /// Angle about the axis from x, degrees, 0 to 360.
@@ -62,7 +62,7 @@ pub struct LitPlace {
     pub total_mw_mm2: Channels,
 }
 
-impl LitPlace {
+impl IlluminatedPlace {
     /// The direct light on a point of the dome; its angles and normal are left to the caller.
     fn of(scene: &Scene, ways: &Ways, point_mm: DVec3, rule: &EmitterRule) -> Self {
         let mut vector_mw_mm2 = [DVec3::ZERO; 3];
@@ -107,7 +107,7 @@ pub struct Illumination {
     /// The face that they lie on.
     pub face: DomeFace,
     /// The places.
-    pub places: Vec<LitPlace>,
+    pub places: Vec<IlluminatedPlace>,
     /// `C`: what each channel (row) sees of each colour (column).
     pub crosstalk: DMat3,
     /// Level, of full scale, for each mW/mm^2 on the membrane at an exposure of 1 and with nothing lost at the sheet:
@@ -145,11 +145,11 @@ impl Illumination {
         let one = |index: usize| {
             let place = grid.middle(face, index);
             let polar_deg = place.truncate().length().atan2(place.z).to_degrees();
-            (polar_deg <= max_polar_deg).then(|| LitPlace {
+            (polar_deg <= max_polar_deg).then(|| IlluminatedPlace {
                 polar_deg,
                 azimuth_deg: 360.0 * ((index % grid.places) as f64 + 0.5) / grid.places as f64,
                 normal: face.normal(place),
-                ..LitPlace::of(scene, &ways, ways.point(place, 1.0), &rule)
+                ..IlluminatedPlace::of(scene, &ways, ways.point(place, 1.0), &rule)
             })
         };
         let places = (0..grid.count()).into_par_iter().filter_map(one).collect();
@@ -166,18 +166,18 @@ impl Illumination {
     }
 
     /// `C L` of a place, mW/mm^2.
-    pub fn seen(&self, place: &LitPlace) -> DMat3 {
+    pub fn seen(&self, place: &IlluminatedPlace) -> DMat3 {
         self.crosstalk * place.light()
     }
 
     /// `C L` of a place in grey levels of a full scale of 255, for an exposure; levels are this times the normal.
-    pub fn seen_levels(&self, place: &LitPlace, level_per_mw_mm2: f64) -> DMat3 {
+    pub fn seen_levels(&self, place: &IlluminatedPlace, level_per_mw_mm2: f64) -> DMat3 {
         let gain: Channels = std::array::from_fn(|c| self.grey_per_mw_mm2(place, c, level_per_mw_mm2));
         DMat3::from_diagonal(DVec3::from_array(gain)) * self.seen(place)
     }
 
     /// Grey levels, of 255, of a channel for each mW/mm^2 on a place.
-    pub fn grey_per_mw_mm2(&self, place: &LitPlace, channel: usize, level_per_mw_mm2: f64) -> f64 {
+    pub fn grey_per_mw_mm2(&self, place: &IlluminatedPlace, channel: usize, level_per_mw_mm2: f64) -> f64 {
         let of = |values: &Channels| values.get(channel).copied().unwrap_or(0.0);
         255.0 * level_per_mw_mm2 * of(&self.level_per_irradiance) * of(&place.passed)
     }

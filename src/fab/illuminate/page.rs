@@ -100,7 +100,7 @@ fn numbers(report: &IlluminationReport) -> Html {
         vec![
             one.color.into(),
             percent(one.share_of_dome).into(),
-            format!("{}°", typeset(one.azimuth_deg)).into(),
+            format!("{}°", typeset(one.azimuth_deg.round() % 360.0)).into(),
             format!("{}° to {}°", typeset(one.min_polar_deg), typeset(one.max_polar_deg)).into(),
         ]
     };

@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use serde_json::json;
 
+use super::of_a_design;
 use super::output::{Failure, Output};
 use crate::accuracy;
 use crate::accuracy::{Accuracy, AccuracyError};
 use domecast_design::DesignError;
-use domecast_fab::build::{DESIGN_NAME, DesignRecord, MANIFEST_NAME, Manifest, Tree, sha256_hex};
 use domecast_fab::numbers::{duration, significant};
 use domecast_files::StagedFolder;
 use domecast_sim::{Scene, SimError};
@@ -50,21 +50,7 @@ pub fn run(
             AccuracyError::Design(error) => Failure::from(error.in_file(design_file)),
             AccuracyError::Part(error) => Failure::from(DesignError::from(error).in_file(design_file)),
         })?;
-    let mut tree = Tree::default();
-    for (name, bytes) in accuracy::accuracy_files(&measured) {
-        tree.add(name, bytes);
-    }
-    tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
-    let record =
-        DesignRecord { name: design.name().to_owned(), sha256: sha256_hex(design.text().as_bytes()) };
-    let manifest = Manifest::new(record, Vec::new(), Vec::new(), Vec::new(), tree.files());
-    let text =
-        serde_json::to_string_pretty(&manifest).map_err(|error| Failure::Internal(error.to_string()))?;
-    tree.add(MANIFEST_NAME, text.into_bytes());
-    output.step("writing");
-    tree.fill(&staged)?;
-    output.kept(staged.commit()?);
-    output.steps_done();
+    of_a_design::write(output, staged, &design, accuracy::accuracy_files(&measured))?;
     summarize(output, &measured)?;
     output.say(&format!(
         "{:.1} s; look at {}",

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use serde_json::json;
 
+use super::of_a_design;
 use super::output::{Failure, Output};
-use domecast_fab::build::{DESIGN_NAME, DesignRecord, MANIFEST_NAME, Manifest, Tree, sha256_hex};
 use domecast_fab::illuminate::{IlluminationCheck, IlluminationReport};
 use domecast_fab::numbers::{percent, significant};
 use domecast_files::StagedFolder;
@@ -21,21 +21,7 @@ pub fn run(output: &Output, design_file: &Path, out: Option<&Path>) -> Result<()
     let staged = StagedFolder::new(&out, "illuminate", &output.rules(&[design_file]))?;
     output.step("lighting the dome");
     let check = IlluminationCheck::of(&design).map_err(|error| Failure::from(error.in_file(design_file)))?;
-    let mut tree = Tree::default();
-    for (name, bytes) in check.files() {
-        tree.add(name, bytes);
-    }
-    tree.add(DESIGN_NAME, design.text().as_bytes().to_vec());
-    let record =
-        DesignRecord { name: design.name().to_owned(), sha256: sha256_hex(design.text().as_bytes()) };
-    let manifest = Manifest::new(record, Vec::new(), Vec::new(), Vec::new(), tree.files());
-    let text =
-        serde_json::to_string_pretty(&manifest).map_err(|error| Failure::Internal(error.to_string()))?;
-    tree.add(MANIFEST_NAME, text.into_bytes());
-    output.step("writing");
-    tree.fill(&staged)?;
-    output.kept(staged.commit()?);
-    output.steps_done();
+    of_a_design::write(output, staged, &design, check.files())?;
     summarize(output, &check.report)?;
     output.say(&format!(
         "{:.1} s; look at {}",

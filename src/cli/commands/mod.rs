@@ -13,6 +13,7 @@ mod input;
 mod list;
 mod new;
 mod new_scene;
+mod of_a_design;
 mod output;
 mod points;
 mod schema;

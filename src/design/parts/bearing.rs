@@ -296,7 +296,7 @@ const HEAD_ROOM_MM: f64 = 0.05;
 /// A thinner screw, whose head is lower: it takes no room beside the hole, as a counterbore does.
 fn lower_head(m: &Measures, missing_mm: f64) -> Option<Cure> {
     let mounting = &m.platforms.lower.mounting;
-    if mounting.counterbore_depth_mm > 0.0 && mounting.counterbore_diameter_mm > mounting.hole_diameter_mm {
+    if purchased::sunk_mm(m) > 0.0 {
         return None;
     }
     let now = Thread::through(mounting.hole_diameter_mm)?;
@@ -311,8 +311,6 @@ fn lower_head(m: &Measures, missing_mm: f64) -> Option<Cure> {
 /// A counterbore that the head goes into, so much deeper than what there is.
 fn deeper_head(m: &Measures, missing_mm: f64) -> Cure {
     let mounting = &m.platforms.lower.mounting;
-    let is_sunk = mounting.counterbore_diameter_mm > mounting.hole_diameter_mm;
-    let before = if is_sunk { mounting.counterbore_depth_mm } else { 0.0 };
     let head_mm = Thread::through(mounting.hole_diameter_mm).map_or(0.0, |t| t.head_mm);
     Cure::value(
         "platforms.lower.mounting",
@@ -320,7 +318,7 @@ fn deeper_head(m: &Measures, missing_mm: f64) -> Cure {
             "at_mm": mounting.at_mm,
             "hole_diameter_mm": mounting.hole_diameter_mm,
             "counterbore_diameter_mm": mounting.counterbore_diameter_mm.max(head_mm + 0.2),
-            "counterbore_depth_mm": (100.0 * (before + missing_mm + HEAD_ROOM_MM)).ceil() / 100.0,
+            "counterbore_depth_mm": (100.0 * (purchased::sunk_mm(m) + missing_mm + HEAD_ROOM_MM)).ceil() / 100.0,
         }),
     )
 }

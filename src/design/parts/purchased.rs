@@ -48,12 +48,18 @@ pub(super) fn camera_housing(m: &Measures) -> Option<Construction> {
     Some(Construction { added: vec![barrel(m)], cut: vec![cut] })
 }
 
+/// How deep the heads of the mounting screws lie in their counterbores, mm; 0 without any.
+pub(super) fn sunk_mm(m: &Measures) -> f64 {
+    let mounting = &m.platforms.lower.mounting;
+    let is_sunk = mounting.counterbore_diameter_mm > mounting.hole_diameter_mm;
+    if is_sunk { mounting.counterbore_depth_mm } else { 0.0 }
+}
+
 /// The cap heads of the mounting screws, on the lower platform's top or in their counterbores, rest frame.
 pub(super) fn screw_heads(m: &Measures) -> Vec<Piece> {
     let mounting = &m.platforms.lower.mounting;
     let Some(thread) = Thread::through(mounting.hole_diameter_mm) else { return Vec::new() };
-    let is_sunk = mounting.counterbore_diameter_mm > mounting.hole_diameter_mm;
-    let floor = m.lower_top_z_mm - if is_sunk { mounting.counterbore_depth_mm } else { 0.0 };
+    let floor = m.lower_top_z_mm - sunk_mm(m);
     let head = |i: usize, at: &[f64; 2]| {
         let shape = Shape::cylinder(0.5 * thread.head_mm, floor, floor + thread.nominal_mm, Fit::Inside);
         Piece::new(format!("mounting screw {i}"), shape).at(at[0], at[1])

@@ -83,9 +83,9 @@ fn require_colors(design: &Design) -> Result<(), DesignError> {
         // The check of the light names it, with a cure.
         return Ok(());
     }
-    let wanted = [LedColor::Red, LedColor::Green, LedColor::Blue];
+    let wanted = [(LedColor::Red, "r"), (LedColor::Green, "g"), (LedColor::Blue, "b")];
     let fluxes = leds.radiant_flux_mw.to_array();
-    for ((color, name), flux_mw) in wanted.into_iter().zip(COLORS).zip(fluxes) {
+    for (((color, field), name), flux_mw) in wanted.into_iter().zip(COLORS).zip(fluxes) {
         if !leds.list.iter().any(|led| led.color == color || led.color == LedColor::White) {
             return Err(DesignError::at(
                 "leds.list",
@@ -96,7 +96,6 @@ fn require_colors(design: &Design) -> Result<(), DesignError> {
             .with_help(format!("add a light of colour {name}, best 120 degrees from the others")));
         }
         if flux_mw <= 0.0 {
-            let field = ["r", "g", "b"][wanted.iter().position(|one| *one == color).unwrap_or(0)];
             return Err(DesignError::at(
                 format!("leds.radiant_flux_mw.{field}"),
                 flux_mw,

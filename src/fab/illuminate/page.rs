@@ -4,8 +4,8 @@ use super::crescents::{COLORS, Crescent};
 use super::maps::{Map, SCALE};
 use super::numbers::{IlluminationReport, LightEvenness, Percentiles, Within};
 use crate::html::{Html, STYLE, figure, html, picture, table};
-use crate::light::MarkerLevels;
 use crate::numbers::{percent, typeset};
+use crate::report::markers;
 
 /// Crescents that the page lists; the JSON has all.
 const MAX_CRESCENTS: usize = 12;
@@ -118,25 +118,12 @@ fn numbers(report: &IlluminationReport) -> Html {
 }
 
 fn seen(report: &IlluminationReport) -> Html {
-    let marker = |marker: &MarkerLevels| {
-        vec![
-            html!("{}", marker.id),
-            typeset(marker.level).into(),
-            typeset(marker.contrast_levels).into(),
-            format!("{} px", typeset(marker.centroid_sd_px)).into(),
-        ]
-    };
-    let markers: Vec<Vec<Html>> = report.markers.iter().map(marker).collect();
     let dots = &report.dots;
     let seen = &report.lights_seen;
-    let markers = if markers.is_empty() {
+    let markers = if report.markers.is_empty() {
         html!("<p>No white markers.</p>\n")
     } else {
-        table(
-            "White markers, levels of 255",
-            &["marker", "level", "above what is around", "centroid known to"],
-            &markers,
-        )
+        markers(&report.markers)
     };
     let at = seen.brightest_mirrored_px.map_or(String::new(), |[x, y]| {
         format!(

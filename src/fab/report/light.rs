@@ -21,15 +21,6 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
     .map(|(name, value)| vec![name.into(), value.into()])
     .into();
     let separation = report.separation.map(separation_rows).unwrap_or_default();
-    let marker = |marker: &MarkerLevels| {
-        vec![
-            html!("{}", marker.id),
-            typeset(marker.level).into(),
-            typeset(marker.contrast_levels).into(),
-            format!("{} px", typeset(marker.centroid_sd_px)).into(),
-        ]
-    };
-    let markers: Vec<Vec<Html>> = report.markers.iter().map(marker).collect();
     html!(
         "<div class=\"row\">\n{}{}</div>\n<p>Exposure and gain: level {} for each mW/mm² on a white surface{}.</p>\n{}{}{}",
         figure(
@@ -48,11 +39,25 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Html {
             &["", "value"],
             &separation
         ),
-        table(
-            "White markers, levels of 255",
-            &["marker", "level", "above what is around", "centroid known to"],
-            &markers,
-        ),
+        markers(&report.markers),
+    )
+}
+
+/// How the white markers stand out.
+pub(crate) fn markers(markers: &[MarkerLevels]) -> Html {
+    let row = |marker: &MarkerLevels| {
+        vec![
+            html!("{}", marker.id),
+            typeset(marker.level).into(),
+            typeset(marker.contrast_levels).into(),
+            format!("{} px", typeset(marker.centroid_sd_px)).into(),
+        ]
+    };
+    let rows: Vec<Vec<Html>> = markers.iter().map(row).collect();
+    table(
+        "White markers, levels of 255",
+        &["marker", "level", "above what is around", "centroid known to"],
+        &rows,
     )
 }
 

@@ -25,6 +25,7 @@ mod subject;
 mod verdict;
 mod watch;
 
+pub(crate) use light::markers;
 pub use making::{MakingStep, making_steps};
 pub use measured::MEASURED;
 pub use page::page;

@@ -70,7 +70,7 @@ fn without_lights_or_with_drivers_of_their_own_there_are_no_circuits() {
     assert_eq!(Electrical::of_leds(&leds(&[("/electrical/drive", json!("own_driver"))])), Ok(None));
     // a light without flux stays dark and needs nothing
     let found = solved(&[("/radiant_flux_mw/g", json!(0))]);
-    assert_eq!((found.lights[1].current_ma, found.lights[1].resistor_ohm), (0.0, None));
+    assert_eq!((found.lights[2].current_ma, found.lights[2].resistor_ohm), (0.0, None));
     assert!(found.lights[0].current_ma > 0.0);
 }
 

@@ -3,7 +3,7 @@
 use super::traced::{PoseSight, trace_sight};
 use super::{
     Assembly, Measures, Part, PartError, bearing, board_seat, build, check_assembly, mount, openings, seats,
-    trial,
+    trial, upper,
 };
 use crate::layout::{Dot, PrintPass};
 use crate::spec::{Design, DesignWarning};
@@ -33,6 +33,16 @@ pub fn build_seated(design: &Design, m: &Measures, passes: &[PrintPass]) -> Resu
     }
     PartError::all(faults)?;
     made
+}
+
+/// Looks at the seats and makes the upper platform alone: a fraction of all parts' time, and what most changes of the lights
+/// fail at.
+///
+/// # Errors
+/// Faults of the seats, or why that platform cannot be made.
+pub fn check_upper_platform(design: &Design, m: &Measures) -> Result<(), PartError> {
+    PartError::all(seats::faults(design, m))?;
+    upper::blueprint(m)?.build(m).map(|_| ())
 }
 
 /// The faults of [`build_seated`], each that names fields and no change with the first change that was tried and helps.

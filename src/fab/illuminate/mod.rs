@@ -5,6 +5,7 @@ mod crescents;
 mod maps;
 mod measure;
 mod numbers;
+pub mod optimize;
 mod page;
 
 pub use crescents::Crescent;
@@ -13,6 +14,7 @@ pub use measure::{GRID, POLAR_ANGLES_DEG};
 pub use numbers::{DotContrast, IlluminationReport, LightEvenness, LightsSeen, Percentiles, Places, Within};
 
 use domecast_design::{Design, DesignError};
+use optimize::Optimization;
 
 /// Numbers and maps of a design's light.
 #[derive(Debug, Clone)]
@@ -35,13 +37,15 @@ impl IlluminationCheck {
         Ok(Self { report, maps })
     }
 
-    /// Name and content of each file: `illuminate.json`, the maps, the page.
-    pub fn files(&self) -> Vec<(String, Vec<u8>)> {
+    /// Name and content of each file: `illuminate.json`, `tilt.json`, the maps, the page; those of a search besides.
+    pub fn files(&self, searched: Option<&Optimization>) -> Vec<(String, Vec<u8>)> {
         // numbers, strings and lists only: nothing here can fail to be written
         let numbers = serde_json::to_string(&self.report).unwrap_or_default() + "\n";
         let mut files = vec![("illuminate.json".to_owned(), numbers.into_bytes())];
         files.extend(self.maps.iter().map(|map| (format!("{}.png", map.name), map.png.clone())));
-        files.push(("index.html".into(), page::page(&self.report, &self.maps).into_bytes()));
+        files.extend(searched.into_iter().flat_map(Optimization::files));
+        let page = page::page(&self.report, &self.maps, searched);
+        files.push(("index.html".into(), page.into_bytes()));
         files
     }
 }

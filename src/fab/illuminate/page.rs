@@ -3,6 +3,7 @@
 use super::crescents::{COLORS, Crescent};
 use super::maps::{Map, SCALE};
 use super::numbers::{IlluminationReport, LightEvenness, Percentiles, Within};
+use super::optimize::Optimization;
 use crate::html::{Html, STYLE, figure, html, picture, table};
 use crate::numbers::{percent, typeset};
 use crate::report::markers;
@@ -11,7 +12,8 @@ use crate::report::markers;
 const MAX_CRESCENTS: usize = 12;
 
 /// The numbers in short, the maps, then the tables.
-pub(super) fn page(report: &IlluminationReport, maps: &[Map]) -> Html {
+pub(super) fn page(report: &IlluminationReport, maps: &[Map], searched: Option<&Optimization>) -> Html {
+    let _ = searched;
     let figures = |kind: &str| -> Html {
         let of_kind = maps.iter().filter(|map| map.name.starts_with(kind));
         of_kind

@@ -1,0 +1,381 @@
+//! The search itself: choices outside, CMA-ES over the lights' place inside, the design's own checks as the judge.
+
+use std::cmp::Ordering;
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::SearchOptions;
+use super::candidate::{Choice, Given, LightPlace, Violation, height_mm};
+use super::choices::{Arrangement, DiffuserKind, diffusers};
+use super::cma::{Cma, SearchPoint};
+use super::score::LightScore;
+use crate::build::verify;
+use domecast_design::Design;
+use domecast_optics::numeric::SeededRandom;
+use domecast_sim::light::lobe::Lobe;
+use domecast_sim::light::setup;
+
+/// Points of a generation: an even number shares well between two cores.
+const POPULATION: usize = 8;
+/// A search whose distribution is narrower than this, in the units of its coordinates, has converged: below what a file says.
+const NARROW: f64 = 0.02;
+/// A candidate must be better than the best by this part to be worth the build's checks.
+const WORTH: f64 = 1e-4;
+/// Half arcs at which an arrangement is first tried, degrees.
+const FIRST_ARCS_DEG: [f64; 5] = [10.0, 20.0, 30.0, 40.0, 50.0];
+/// Share of the evaluations that the arrangements get together; the rest refines the best.
+const BROAD_SHARE: f64 = 0.7;
+/// Step of a place and an angle at which the last refinement begins, and ends: what a file says.
+const STEPS: [[f64; 2]; 4] = [[0.16, 1.6], [0.08, 0.8], [0.04, 0.4], [0.02, 0.2]];
+
+/// How a search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SearchStatus {
+    /// No step that a file can say makes the best better.
+    Converged,
+    /// As many lights as allowed were looked at.
+    EvaluationsUsedUp,
+    /// Someone asked it to stop.
+    Interrupted,
+}
+
+/// Lights that were looked at.
+#[derive(Debug, Clone)]
+pub struct Looked {
+    /// What they were made of.
+    pub choice: Choice,
+    /// Where they stand.
+    pub place: LightPlace,
+    /// How good they are; `None` where that was not found out.
+    pub score: Option<LightScore>,
+    /// Why they cannot be; `None` where nothing is known against them.
+    pub violation: Option<Violation>,
+    /// How many they are.
+    pub lights: usize,
+    /// Height of the whole sensor, mm; 0 where that was not found out.
+    pub height_mm: f64,
+    /// Distance from the bounds in coordinates, where the point lay outside.
+    outside: f64,
+}
+
+impl Looked {
+    /// What is made small: worse for a point that lay outside the bounds.
+    pub fn objective(&self) -> f64 {
+        self.score.as_ref().map_or(f64::INFINITY, LightScore::objective) * (1.0 + self.outside * self.outside)
+    }
+
+    /// The better first: what can be before what cannot, then by the objective or by what is missing.
+    fn order(&self, other: &Self) -> Ordering {
+        match (&self.violation, &other.violation) {
+            (None, None) => self.objective().total_cmp(&other.objective()),
+            (None, Some(_)) => Ordering::Less,
+            (Some(_), None) => Ordering::Greater,
+            (Some(one), Some(two)) => one
+                .stage
+                .cmp(&two.stage)
+                .then(one.missing.total_cmp(&two.missing))
+                .then(self.outside.total_cmp(&other.outside)),
+        }
+    }
+}
+
+/// What a search found.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The best that the build's checks let pass.
+    pub best: Option<Looked>,
+    /// All that nothing is known against, in the order in which they were looked at.
+    pub feasible: Vec<Looked>,
+    /// The best of each arrangement, where it fits.
+    pub arrangements: Vec<(Arrangement, Option<Looked>)>,
+    /// How many lights were looked at.
+    pub evaluations: usize,
+    /// How many of them went through the build's checks.
+    pub verified: usize,
+    /// How it ended.
+    pub status: SearchStatus,
+}
+
+/// A search in progress.
+pub struct Search<'a> {
+    given: &'a Given<'a>,
+    options: &'a SearchOptions,
+    step: &'a mut dyn FnMut(&str),
+    is_stopped: &'a dyn Fn() -> bool,
+    start_objective: f64,
+    lobes: Vec<(DiffuserKind, Lobe)>,
+    found: Found,
+}
+
+impl<'a> Search<'a> {
+    /// A search for lights that are better than those of objective `start_objective`.
+    pub fn new(
+        given: &'a Given<'a>,
+        options: &'a SearchOptions,
+        start_objective: f64,
+        step: &'a mut dyn FnMut(&str),
+        is_stopped: &'a dyn Fn() -> bool,
+    ) -> Self {
+        let leds = &given.design.sections().leds;
+        let lobe = |kind: DiffuserKind| {
+            let mut leds = leds.clone();
+            leds.diffuser = kind.diffuser;
+            (kind, setup::lobe(&leds))
+        };
+        let found = Found {
+            best: None,
+            feasible: Vec::new(),
+            arrangements: Vec::new(),
+            evaluations: 0,
+            verified: 0,
+            status: SearchStatus::EvaluationsUsedUp,
+        };
+        let lobes = diffusers(given.design).into_iter().map(lobe).collect();
+        Self { given, options, step, is_stopped, start_objective, lobes, found }
+    }
+
+    /// Searches until it converges, the evaluations are used up, or it is stopped.
+    pub fn run(mut self) -> Found {
+        let start = LightPlace::of(self.given.design);
+        let arrangements = Arrangement::all(self.given.design);
+        let own = Choice { arrangement: arrangements[0], diffuser: self.lobes[0].0 };
+        let diffuser = self.best_diffuser(own, start).unwrap_or(own.diffuser);
+        let mut starts = vec![(Choice { diffuser, ..own }, start)];
+        for arrangement in arrangements.into_iter().skip(1) {
+            let choice = Choice { arrangement, diffuser };
+            let arcs: &[f64] = if arrangement.has_arc() { &FIRST_ARCS_DEG } else { &[0.0] };
+            let tried: Vec<(Choice, LightPlace)> =
+                arcs.iter().map(|arc| (choice, LightPlace { half_arc_deg: *arc, ..start })).collect();
+            let looked = self.look(&tried, true);
+            let first = looked.into_iter().min_by(Looked::order).filter(|one| one.violation.is_none());
+            match first {
+                Some(first) => starts.push((choice, first.place)),
+                None => self.found.arrangements.push((arrangement, None)),
+            }
+        }
+        let broad = (BROAD_SHARE * self.options.evaluations as f64) as usize;
+        let share = broad.saturating_sub(self.found.evaluations) / starts.len();
+        for (index, (choice, place)) in starts.into_iter().enumerate() {
+            let before = self.found.feasible.len();
+            self.descend(choice, place, 1.0, share, index as u64);
+            let own = self.found.feasible.iter().skip(before);
+            let best = own.filter(|one| one.violation.is_none()).min_by(|a, b| a.order(b)).cloned();
+            self.found.arrangements.push((choice.arrangement, best));
+        }
+        self.refine();
+        self.found
+    }
+
+    /// The diffuser that is best at a place.
+    fn best_diffuser(&mut self, choice: Choice, place: LightPlace) -> Option<DiffuserKind> {
+        let tried: Vec<(Choice, LightPlace)> =
+            self.lobes.iter().map(|(diffuser, _)| (Choice { diffuser: *diffuser, ..choice }, place)).collect();
+        let looked = self.look(&tried, false);
+        let can_be = looked.into_iter().filter(|one| one.violation.is_none());
+        can_be.min_by(Looked::order).map(|one| one.choice.diffuser)
+    }
+
+    /// From the best: its diffuser again, a narrower search, then single steps until none helps.
+    fn refine(&mut self) {
+        let Some(best) = self.found.best.clone() else { return };
+        let diffuser = self.best_diffuser(best.choice, best.place).unwrap_or(best.choice.diffuser);
+        let choice = Choice { diffuser, ..best.choice };
+        let left = self.options.evaluations.saturating_sub(self.found.evaluations);
+        self.descend(choice, best.place, 0.3, left / 2, 100);
+        let mut level = 0;
+        while let (Some(best), Some(steps)) = (self.found.best.clone(), STEPS.get(level)) {
+            if self.is_over() {
+                return;
+            }
+            let tried: Vec<(Choice, LightPlace)> =
+                neighbours(&best, *steps).into_iter().map(|place| (best.choice, place)).collect();
+            self.look(&tried, false);
+            let is_better = self.found.best.as_ref().is_some_and(|now| now.objective() < best.objective());
+            if !is_better {
+                level += 1;
+            }
+        }
+        self.found.status = SearchStatus::Converged;
+    }
+
+    /// Whether it must end, and why.
+    fn is_over(&mut self) -> bool {
+        if (self.is_stopped)() {
+            self.found.status = SearchStatus::Interrupted;
+        }
+        self.found.status == SearchStatus::Interrupted || self.found.evaluations >= self.options.evaluations
+    }
+
+    /// CMA-ES from a place, with so many evaluations at most.
+    fn descend(&mut self, choice: Choice, from: LightPlace, sigma: f64, evaluations: usize, stream: u64) {
+        let axes = Axes::of(self.given.design, choice.arrangement.has_arc(), from);
+        let random = SeededRandom::stream(self.options.seed, stream);
+        let mut cma = Cma::new(DVector::zeros(axes.count()), sigma, POPULATION, random);
+        let until = self.found.evaluations + evaluations;
+        while self.found.evaluations + POPULATION <= until && cma.width() > NARROW && !self.is_over() {
+            let points = cma.ask();
+            let places: Vec<(LightPlace, f64)> = points.iter().map(|point| axes.place(point)).collect();
+            let tried: Vec<(Choice, LightPlace)> = places.iter().map(|(place, _)| (choice, *place)).collect();
+            let mut looked = self.look(&tried, false);
+            for (one, (_, outside)) in looked.iter_mut().zip(places) {
+                one.outside = outside;
+            }
+            let mut ordered: Vec<(&Looked, &SearchPoint)> = looked.iter().zip(&points).collect();
+            ordered.sort_by(|a, b| a.0.order(b.0));
+            cma.tell(&ordered.into_iter().map(|(_, point)| point).collect::<Vec<_>>());
+        }
+    }
+
+    /// Looks at lights, in parallel; those that would be the best are verified, the best of them first. With `makes_all` the
+    /// platform of each is made, not only of those.
+    fn look(&mut self, tried: &[(Choice, LightPlace)], makes_all: bool) -> Vec<Looked> {
+        let room = self.options.evaluations.saturating_sub(self.found.evaluations);
+        let tried = tried.get(..tried.len().min(room)).unwrap_or_default();
+        let goal = self.goal();
+        let (given, options, lobes) = (self.given, self.options, &self.lobes);
+        let mut looked: Vec<Looked> = tried
+            .par_iter()
+            .map(|(choice, place)| {
+                let lobe = lobes.iter().find(|(kind, _)| *kind == choice.diffuser);
+                let lobe = lobe.map(|(_, lobe)| lobe);
+                look_at(given, options, (*choice, *place), lobe, if makes_all { f64::INFINITY } else { goal })
+            })
+            .collect();
+        self.found.evaluations += looked.len();
+        let mut order: Vec<usize> = (0..looked.len()).collect();
+        order.sort_by(|a, b| looked[*a].order(&looked[*b]));
+        for index in order {
+            let one = &mut looked[index];
+            if one.violation.is_some() || one.objective() >= self.goal() {
+                break;
+            }
+            self.found.verified += 1;
+            let design = self.given.candidate(&one.choice, one.place).map(|made| made.design);
+            if design.is_ok_and(|design| verify(&design).is_ok()) {
+                self.found.best = Some(one.clone());
+            } else {
+                one.violation = Some(Violation { stage: Violation::BUILD, missing: 0.0 });
+            }
+        }
+        self.found.feasible.extend(looked.iter().filter(|one| one.violation.is_none()).cloned());
+        self.tell();
+        looked
+    }
+
+    /// What is worth the build's checks.
+    fn goal(&self) -> f64 {
+        let best = self.found.best.as_ref().map_or(f64::INFINITY, Looked::objective);
+        (1.0 - WORTH) * best.min(self.start_objective)
+    }
+
+    fn tell(&mut self) {
+        let best = self.found.best.as_ref().map_or(self.start_objective, Looked::objective);
+        (self.step)(&format!(
+            "searching lights: {} of {}, {} degrees a grey level ({} as given)",
+            self.found.evaluations,
+            self.options.evaluations,
+            crate::numbers::significant(best),
+            crate::numbers::significant(self.start_objective),
+        ));
+    }
+}
+
+/// One look: the design that follows, its light, and the upper platform where the light is better than `goal`.
+fn look_at(
+    given: &Given<'_>,
+    options: &SearchOptions,
+    (choice, place): (Choice, LightPlace),
+    lobe: Option<&Lobe>,
+    goal: f64,
+) -> Looked {
+    let mut looked = Looked { choice, place, score: None, violation: None, lights: 0, height_mm: 0.0, outside: 0.0 };
+    let mut judge = || -> Result<(), Violation> {
+        let candidate = given.candidate(&choice, place)?;
+        looked.lights = candidate.design.sections().leds.list.len();
+        looked.height_mm = height_mm(&candidate.design);
+        let Some(lobe) = lobe else { return Ok(()) };
+        let score = given.score(&candidate, lobe, options.polar_angle_deg)?;
+        let objective = score.objective();
+        looked.score = Some(score);
+        if objective < goal { candidate.check_platform() } else { Ok(()) }
+    };
+    looked.violation = judge().err();
+    looked
+}
+
+/// Places one step away along each axis.
+fn neighbours(best: &Looked, [step_mm, step_deg]: [f64; 2]) -> Vec<LightPlace> {
+    let at = best.place;
+    let mut found = Vec::new();
+    for sign in [1.0, -1.0] {
+        let (mm, deg) = (sign * step_mm, sign * step_deg);
+        found.push(LightPlace { center_radius_mm: at.center_radius_mm + mm, ..at });
+        found.push(LightPlace { center_z_mm: at.center_z_mm + mm, ..at });
+        found.push(LightPlace { tilt_deg: (at.tilt_deg + deg).clamp(MIN_TILT_DEG, MAX_TILT_DEG), ..at });
+        // along the wall of the view and along the sheet's underside, where the best mostly lies
+        found.push(LightPlace {
+            center_radius_mm: at.center_radius_mm + mm,
+            center_z_mm: at.center_z_mm + mm,
+            ..at
+        });
+        found.push(LightPlace {
+            center_radius_mm: at.center_radius_mm + mm,
+            center_z_mm: at.center_z_mm - mm,
+            ..at
+        });
+        if best.choice.arrangement.has_arc() {
+            found.push(LightPlace { half_arc_deg: (at.half_arc_deg + deg).max(0.0), ..at });
+        }
+    }
+    found.into_iter().map(LightPlace::rounded).filter(|place| *place != at.rounded()).collect()
+}
+
+/// What the schema allows of `leds.tilt_deg`.
+const MIN_TILT_DEG: f64 = 30.0;
+const MAX_TILT_DEG: f64 = 90.0;
+const MAX_ARC_DEG: f64 = 55.0;
+
+/// The coordinates of a search: place over a length of the sensor, angles over some degrees, about where it begins.
+struct Axes {
+    from: [f64; 4],
+    scale: [f64; 4],
+    low: [f64; 4],
+    high: [f64; 4],
+    has_arc: bool,
+}
+
+impl Axes {
+    fn of(design: &Design, has_arc: bool, from: LightPlace) -> Self {
+        let sections = design.sections();
+        let rim_mm = sections.dome.shape().rim_radius_mm();
+        let [x, y] = sections.platforms.outer_mm;
+        let sheet_mm = design.sheet_underside_z_mm();
+        Self {
+            from: [from.center_radius_mm, from.center_z_mm, from.tilt_deg, from.half_arc_deg],
+            scale: [0.05 * rim_mm, 0.05 * rim_mm, 8.0, 6.0],
+            low: [0.3 * rim_mm, sheet_mm - 2.0 * rim_mm, MIN_TILT_DEG, 0.0],
+            high: [0.5 * x.max(y), sheet_mm, MAX_TILT_DEG, MAX_ARC_DEG],
+            has_arc,
+        }
+    }
+
+    fn count(&self) -> usize {
+        if self.has_arc { 4 } else { 3 }
+    }
+
+    /// The place of a point within the bounds, and how far outside it lay.
+    fn place(&self, point: &SearchPoint) -> (LightPlace, f64) {
+        let mut outside = 0.0_f64;
+        let value: [f64; 4] = std::array::from_fn(|i| {
+            let wanted = self.from[i] + self.scale[i] * point.get(i).copied().unwrap_or(0.0);
+            let kept = wanted.clamp(self.low[i].min(self.from[i]), self.high[i].max(self.from[i]));
+            outside = outside.hypot((wanted - kept) / self.scale[i]);
+            kept
+        });
+        let [center_radius_mm, center_z_mm, tilt_deg, half_arc_deg] = value;
+        (LightPlace { center_radius_mm, center_z_mm, tilt_deg, half_arc_deg }.rounded(), outside)
+    }
+}

@@ -13,7 +13,7 @@ use super::bearing::behind_lip_mm;
 use super::error::infeasible;
 use super::measures::Measures;
 use super::view::sight_lines;
-use super::{Assembly, Part, PartError, Pose, process, purchased, undercut};
+use super::{Assembly, Part, PartError, Pose, hood, process, purchased, undercut};
 use crate::spec::Cure;
 use domecast_mesh::{BoundingBox, Chord, MeshError, Piece, RayTarget, Solid, TriMesh};
 use domecast_optics::numeric::Rigid;
@@ -32,7 +32,8 @@ const CHORD_MM: f64 = 0.03;
 /// # Errors
 /// The failures, the first of each check: which parts, where, value, limit, which design field.
 pub fn check_assembly(m: &Measures, parts: &[Part], assembly: &Assembly) -> Result<(), PartError> {
-    let checks = [process::check(m, parts), undercut::check(m, parts), envelope(m, assembly)];
+    let checks =
+        [process::check(m, parts), undercut::check(m, parts), envelope(m, assembly), hood::keeps_light(m)];
     let mut faults: Vec<PartError> = checks.into_iter().filter_map(Result::err).collect();
     faults.extend(assembled(m, assembly).err());
     PartError::all(faults)
@@ -222,15 +223,16 @@ impl Spring {
 struct Scene {
     fixed: Vec<Thing>,
     moving: Vec<Thing>,
-    /// The upper platform, which could stand in a ray.
+    /// The platforms, which could stand in a ray; the upper one in its own frame.
     upper: RayTarget,
+    lower: RayTarget,
 }
 
 impl Scene {
     fn of(m: &Measures, assembly: &Assembly, chord: Chord) -> Result<Self, PartError> {
         let coarse = |piece: &Piece| piece.solid(chord).map_err(|e| mesh_error(&piece.name, e));
-        let mut scene =
-            Self { fixed: Vec::new(), moving: Vec::new(), upper: RayTarget::new(&TriMesh::default()) };
+        let nothing = || RayTarget::new(&TriMesh::default());
+        let mut scene = Self { fixed: Vec::new(), moving: Vec::new(), upper: nothing(), lower: nothing() };
         for item in &assembly.items {
             let solid = match item.name.as_str() {
                 "dome" => coarse(&purchased::dome(m))?,
@@ -238,8 +240,10 @@ impl Scene {
                 _ if item.body == Body::Spring => continue,
                 _ => item.solid().map_err(|e| mesh_error(&item.name, e))?,
             };
-            if item.name == "upper_platform" {
-                scene.upper = RayTarget::new(&item.mesh);
+            match item.name.as_str() {
+                "upper_platform" => scene.upper = RayTarget::new(&item.mesh),
+                "lower_platform" => scene.lower = RayTarget::new(&item.mesh),
+                _ => {}
             }
             let list = if item.body == Body::Fixed { &mut scene.fixed } else { &mut scene.moving };
             list.extend(Thing::new(&item.name, solid));
@@ -330,7 +334,9 @@ impl Scene {
                 let from = led.transform_point3(DVec3::new(x, y, 1e-3 * h));
                 for &to in &lens_points {
                     let faces_away = (to - from).dot(led.matrix3.z_axis) <= 0.0;
-                    if faces_away || self.upper.is_hit(from, to) {
+                    let is_hidden =
+                        || self.upper.is_hit(from, to) || self.lower.is_hit(pose.point(from), pose.point(to));
+                    if faces_away || is_hidden() {
                         continue;
                     }
                     let place = format!(

@@ -4,8 +4,8 @@ use glam::{DAffine3, DVec3};
 
 use super::board::BoardSeat;
 use super::measures::{Measures, polar};
-use super::mount;
 use super::{Blueprint, Feature, PartError};
+use super::{hood, mount};
 use domecast_mesh::{Fit, Profile, Shape};
 
 /// A bore is crossed by what leads into it; push-out holes may end in the cable's channel or the board's pocket.
@@ -57,6 +57,8 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
         "platforms.outer_mm",
         Shape::cuboid(DVec3::new(-h.x, -h.y, bottom), DVec3::new(h.x, h.y, top)),
     ));
+
+    hood::add(m, &mut b)?;
 
     // The bore follows the camera's own axis, through the whole block.
     let reach = 2.0 * (h.length() + (top - bottom) + m.pupil_mm().length());

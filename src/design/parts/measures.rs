@@ -110,7 +110,9 @@ fn lower_view(design: &Design, poses: &[Pose], markers_mm: &[DVec2]) -> Result<O
     const LOW: f64 = 0.05;
     let sections = design.sections();
     let body = &sections.camera_body;
-    let (pupil_z, top) = (design.sensor_from_camera().translation_mm.z, design.lower_top_z_mm());
+    let pupil_z = design.sensor_from_camera().translation_mm.z;
+    let hood_mm = sections.platforms.lower.hood.map_or(f64::NEG_INFINITY, |hood| hood.rim_from_pupil_mm);
+    let top = design.lower_top_z_mm().max(pupil_z + hood_mm);
     let low = (pupil_z + body.front_from_pupil_mm)
         .max(pupil_z + LOW * (top - pupil_z))
         .max(sections.platforms.lower.underside_z_mm);
@@ -210,6 +212,12 @@ impl Measures {
     /// The camera's entrance pupil on the axis, mm.
     pub fn pupil_mm(&self) -> DVec3 {
         self.sensor_from_camera.translation
+    }
+
+    /// Height of the middle of the hood's rim, mm; `None` where there is no hood.
+    pub fn hood_rim_z_mm(&self) -> Option<f64> {
+        let hood = self.platforms.lower.hood?;
+        Some(self.sensor_from_camera.transform_point3(DVec3::Z * hood.rim_from_pupil_mm).z)
     }
 
     /// Radius of the camera's bore, mm.

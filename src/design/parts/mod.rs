@@ -31,6 +31,7 @@ mod drawing;
 mod error;
 mod feature;
 mod files;
+mod hood;
 mod image_rays;
 mod lip;
 mod lower;

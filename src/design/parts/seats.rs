@@ -63,10 +63,11 @@ fn body_z_mm(m: &Measures) -> [f64; 2] {
     [front.min(back), front.max(back)]
 }
 
-/// The part of the body's height that the block stands round, mm: none if the second is below the first.
+/// The part of the body's height that block and hood stand round, mm: none if the second is below the first.
 fn held_z_mm(m: &Measures) -> [f64; 2] {
     let [low, high] = body_z_mm(m);
-    [low.max(m.platforms.lower.underside_z_mm), high.min(m.lower_top_z_mm)]
+    let top = m.hood_rim_z_mm().map_or(m.lower_top_z_mm, |rim| rim.max(m.lower_top_z_mm));
+    [low.max(m.platforms.lower.underside_z_mm), high.min(top)]
 }
 
 /// Least length of the bore round the camera: half its diameter, which keeps its tilt in a bore of a tenth of a
@@ -124,6 +125,7 @@ fn set_screws(m: &Measures, found: &mut Vec<PartError>) {
     let off = (near - clamp.z_mm).max(clamp.z_mm - far);
     if off > 1e-9 {
         // In the middle of what the bore holds, or of the body where it holds nothing.
+        let high = high.min(m.lower_top_z_mm);
         let to = if high > low { 0.5 * (low + high) } else { 0.5 * (body_low + body_high) };
         let cure = Cure::value("platforms.lower.clamp.z_mm", json!((100.0 * to).round() / 100.0));
         found.push(unheld(

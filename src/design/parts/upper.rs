@@ -3,8 +3,8 @@
 use glam::{DAffine3, DVec3};
 
 use super::measures::Measures;
-use super::mount;
 use super::{Blueprint, Feature, PartError};
+use super::{hood, mount};
 use domecast_mesh::{Fit, Profile, Shape};
 
 /// The light channel is wider than the pit by this share on each side: their
@@ -15,7 +15,7 @@ const CHANNEL_STEP: f64 = 0.04;
 const SKIN_MM: f64 = 1e-3;
 
 /// Cuts that may run into each other.
-const OPEN_TO_EACH_OTHER: [(&str, &str); 20] = [
+const OPEN_TO_EACH_OTHER: [(&str, &str); 31] = [
     ("sheet recess", "window"),
     ("sheet recess", "push-out hole"),
     ("sheet recess", "LED pit"),
@@ -36,6 +36,17 @@ const OPEN_TO_EACH_OTHER: [(&str, &str); 20] = [
     ("LED pit", "LED wire hole"),
     ("light channel", "rim notch"),
     ("light channel", "light channel"),
+    ("light well", "sheet recess"),
+    ("light well", "window"),
+    ("light well", "marker window"),
+    ("light well", "LED pit"),
+    ("light well", "light channel"),
+    ("light well", "push-out hole"),
+    ("light well", "rim notch"),
+    ("hood room", "window"),
+    ("hood room", "marker window"),
+    ("hood room", "light channel"),
+    ("hood room", "light well"),
 ];
 
 pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
@@ -95,10 +106,15 @@ pub(super) fn blueprint(m: &Measures) -> Result<Blueprint, PartError> {
         b.cut.push(beam.numbered(i).placed(placed));
     }
     b.genus += 1;
+    hood::make_room(m, &mut b);
 
     // Their push-out holes lead up into window, recess or rim: open above.
     m.cut_magnet_pockets(&mut b, bottom, top + over);
     mount::upper(m, &mut b);
+    if let Some(radius) = m.leds.well_radius_mm.filter(|_| !m.leds.list.is_empty()) {
+        let well = Shape::cylinder(radius, m.leds.lip_top_z_mm, top + over, Fit::Outside);
+        b.cut.push(Feature::new("light well", "leds.well_radius_mm", well));
+    }
     for i in 0..m.leds.list.len() {
         led_seat(m, i, &mut b);
     }

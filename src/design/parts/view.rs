@@ -279,6 +279,31 @@ impl ViewCone {
                 .all(|b| reach(b.low_mm, b.low_radius_mm) && reach(b.high_mm, b.high_radius_mm))
     }
 
+    /// The height up to which all of it is within a distance of the axis, between those that were followed, mm.
+    pub(super) fn highest_within(&self, radius_mm: f64) -> f64 {
+        let (Some(first), Some(last)) = (self.cone_mm.first(), self.cone_mm.last()) else {
+            return f64::INFINITY;
+        };
+        let reach = |z: f64| {
+            let part = (z - first.y) / (last.y - first.y).max(f64::MIN_POSITIVE);
+            let beam = |b: &Beam| {
+                let radius = b.low_radius_mm + part * (b.high_radius_mm - b.low_radius_mm);
+                b.low_mm.lerp(b.high_mm, part).length() + radius
+            };
+            self.beams.iter().map(beam).fold(self.radius_mm(z), f64::max)
+        };
+        let (mut low, mut high) = (first.y, last.y);
+        if reach(high) <= radius_mm {
+            return high;
+        }
+        // The view widens upwards, but for the beams' rounding.
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if reach(middle) <= radius_mm { low = middle } else { high = middle }
+        }
+        low
+    }
+
     /// Largest distance from the axis that the view needs, with the margin, mm.
     pub fn max_radius_mm(&self) -> f64 {
         let cone = self.cone_mm.last().map_or(0.0, |p| self.radius_mm(p.y));

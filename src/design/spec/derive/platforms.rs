@@ -92,7 +92,7 @@ pub(super) const LIGHT_PLACES: &[Rule] = &[
     ),
     follows(
         "leds.lip_top_z_mm",
-        "on the line from the light's upper edge to the far edge of the camera's front at full travel",
+        "on the line from the light's upper edge to the far edge of the camera's front at full travel, or over the hood's rim",
         lip,
     ),
     follows(
@@ -249,7 +249,13 @@ fn lip(k: &Known<'_>) -> Option<Value> {
     // the platform comes down on the camera, at most until the sheet's gap closes
     let front = k.n("camera_body.front_from_pupil_mm") - depth_mm(k) + travel_mm(k);
     let inner = view_mm(k, top).min(radius - 0.2);
-    let line = top - (top - front).max(0.0) * (radius - inner) / (radius + lens);
+    let mut slope = (top - front).max(0.0) / (radius + lens);
+    if k.has("platforms.lower.hood") {
+        // of the flattest way over the near rim of the hood into the lens; flatter ones need no lip
+        let rise = k.n("platforms.lower.hood.rim_from_pupil_mm") - k.n("camera_body.front_from_pupil_mm");
+        slope = slope.max(rise / (bore_mm(k) + lens));
+    }
+    let line = top - slope * (radius - inner);
     // and a quarter of the package behind it, which keeps the light's foot dark
     let covers = k.n("leds.center_z_mm") - 0.25 * k.at("leds.package_mm", 1) + 0.02;
     k.number(up((line + 0.05).max(covers), 0.01).min(top))

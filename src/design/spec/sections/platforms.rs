@@ -48,6 +48,9 @@ pub struct LowerPlatform {
     pub mounting: MountingSection,
     /// The channel that lets the cable out.
     pub cable_exit: CableExitSection,
+    /// A tube round the lens that hides the lights from it at any position of the springs; left out: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hood: Option<HoodSection>,
     /// Diameter of the vertical holes for the wires of the lights, one under each, mm; 0 for none.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub wire_hole_diameter_mm: f64,
@@ -101,6 +104,21 @@ pub struct CableExitSection {
     /// Its height above the underside, mm.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub height_mm: f64,
+}
+
+/// The camera's bore, continued as a tube above the block; it goes along the camera's axis and moves with the camera.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HoodSection {
+    /// How far its rim stands above the entrance pupil, along the camera's axis, mm.
+    #[schemars(range(min = -1000.0, max = 1000.0))]
+    pub rim_from_pupil_mm: f64,
+    /// Thickness of its wall, mm.
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 100.0))]
+    pub wall_mm: f64,
+    /// Gap at rest between it and the upper platform, whose window is widened to that where it is too narrow, mm.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub gap_mm: f64,
 }
 
 /// The sheet's outline; its thickness is that of its optical layer.
@@ -238,6 +256,11 @@ pub struct LedsSection {
     pub board_offset_mm: f64,
     /// Height of the lip's top edge in the sensor frame, mm: light passes above it, the lens hides below it.
     pub lip_top_z_mm: f64,
+    /// Radius of the room that is open to all lights above the lip's height, mm; left out: each light has a channel of
+    /// its board's width towards the axis, whose walls take what goes sideways.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1000.0))]
+    pub well_radius_mm: Option<f64>,
     /// Diameter of the wire hole through the pit's floor, mm; 0 for none.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub wire_hole_diameter_mm: f64,

@@ -87,7 +87,9 @@ pub fn tidy_on_signals() {
         let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
         std::thread::spawn(move || {
             let is_wish = |signal: &i32| *signal == SIGINT && IS_HEEDED.load(Relaxed);
-            if let Some(signal) = signals.forever().find(|signal| !(is_wish(signal) && !IS_WISHED.swap(true, Relaxed))) {
+            if let Some(signal) =
+                signals.forever().find(|signal| !(is_wish(signal) && !IS_WISHED.swap(true, Relaxed)))
+            {
                 super::staging::abandon_all();
                 // ends the process as the signal would have, so that a shell sees it
                 let _ = signal_hook::low_level::emulate_default_handler(signal);

@@ -56,7 +56,7 @@ pub fn run(
     let searched = if search.optimize {
         let wish = StopWish::heed();
         let step = &mut |doing: &str| output.step(doing);
-        Some(optimize(&design, &check, &options, step, &|| wish.came()).map_err(in_file)?)
+        Some(optimize(&design, &check.report, &options, step, &|| wish.came()).map_err(in_file)?)
     } else {
         None
     };

@@ -222,7 +222,7 @@ fn boards(m: &Measures, upper: &RayTarget, found: &mut Vec<PartError>) {
 /// Distance from the axis at which an LED's face has a lip of a height before it, mm.
 pub(super) fn behind_lip_mm(m: &Measures, lip_top_z_mm: f64) -> f64 {
     let front = m.leds.diffuser_thickness_mm + m.leds.clearance_mm;
-    m.view.radius_mm(lip_top_z_mm) + m.process.min_wall_mm + front
+    m.view.radius_mm(lip_top_z_mm).max(super::hood::room_mm(m)) + m.process.min_wall_mm + front
 }
 
 /// A straight way for the driver from outside to each set screw.

@@ -7,6 +7,8 @@ mod measure;
 mod numbers;
 pub mod optimize;
 mod page;
+mod search_page;
+mod tilt;
 
 pub use crescents::Crescent;
 pub use maps::Map;
@@ -15,6 +17,7 @@ pub use numbers::{DotContrast, IlluminationReport, LightEvenness, LightsSeen, Pe
 
 use domecast_design::{Design, DesignError};
 use optimize::Optimization;
+pub use tilt::{TiltCurve, TiltPoint, TiltStudy};
 
 /// Numbers and maps of a design's light.
 #[derive(Debug, Clone)]
@@ -23,6 +26,8 @@ pub struct IlluminationCheck {
     pub report: IlluminationReport,
     /// Maps over the dome and in the image.
     pub maps: Vec<Map>,
+    /// What tilt and diffuser would do.
+    pub tilt: TiltStudy,
 }
 
 impl IlluminationCheck {
@@ -34,7 +39,7 @@ impl IlluminationCheck {
     pub fn of(design: &Design) -> Result<Self, DesignError> {
         let (report, light) = measure::measure(design)?;
         let maps = maps::maps(design, &light, &report)?;
-        Ok(Self { report, maps })
+        Ok(Self { report, maps, tilt: TiltStudy::of(design)? })
     }
 
     /// Name and content of each file: `illuminate.json`, `tilt.json`, the maps, the page; those of a search besides.
@@ -43,8 +48,9 @@ impl IlluminationCheck {
         let numbers = serde_json::to_string(&self.report).unwrap_or_default() + "\n";
         let mut files = vec![("illuminate.json".to_owned(), numbers.into_bytes())];
         files.extend(self.maps.iter().map(|map| (format!("{}.png", map.name), map.png.clone())));
+        files.push(("tilt.json".into(), self.tilt.to_json().into_bytes()));
         files.extend(searched.into_iter().flat_map(Optimization::files));
-        let page = page::page(&self.report, &self.maps, searched);
+        let page = page::page(&self.report, &self.maps, &self.tilt, searched);
         files.push(("index.html".into(), page.into_bytes()));
         files
     }

@@ -141,14 +141,20 @@ impl Illumination {
         if scene.file().light.leds.is_none() {
             return Ok(None);
         }
-        Ok(Self::along(scene, &setup::ways(scene, &LightUse::ALL)?, grid, max_polar_deg))
+        let ways = setup::ways(scene, &LightUse::ALL)?;
+        Ok(Self::along(scene, &ways, grid, max_polar_deg, &EmitterRule::default()))
     }
 
     /// [`Illumination::direct`] for lights and ways of the caller's: other places, tilts and diffusers than the design's.
-    pub fn along(scene: &Scene, ways: &Ways, grid: PlaceGrid, max_polar_deg: f64) -> Option<Self> {
+    pub fn along(
+        scene: &Scene,
+        ways: &Ways,
+        grid: PlaceGrid,
+        max_polar_deg: f64,
+        rule: &EmitterRule,
+    ) -> Option<Self> {
         let light = scene.file().light.leds.as_ref()?;
         let face = ways.face();
-        let rule = EmitterRule::default();
         let one = |index: usize| {
             let place = grid.middle(face, index);
             let polar_deg = place.truncate().length().atan2(place.z).to_degrees();
@@ -156,7 +162,7 @@ impl Illumination {
                 polar_deg,
                 azimuth_deg: 360.0 * ((index % grid.places) as f64 + 0.5) / grid.places as f64,
                 normal: face.normal(place),
-                ..IlluminatedPlace::of(scene, ways, ways.point(place, 1.0), &rule)
+                ..IlluminatedPlace::of(scene, ways, ways.point(place, 1.0), rule)
             })
         };
         let places = (0..grid.count()).into_par_iter().filter_map(one).collect();

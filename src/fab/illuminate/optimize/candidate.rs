@@ -4,12 +4,12 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::choices::{Arrangement, DiffuserKind, diffuser_fields};
-use super::score::{GRID, LightScore};
+use super::score::{ComparedLight, LightScore};
 use crate::light::scene;
-use domecast_design::parts::{HidingLip, Measures, PartError, check_upper_platform};
+use domecast_design::parts::{HidingLip, Measures, PartError, check_light_room};
 use domecast_design::{Cure, Design, DesignError};
 use domecast_sim::Scene;
-use domecast_sim::light::illumination::Illumination;
+use domecast_sim::light::LightUse;
 use domecast_sim::light::lobe::Lobe;
 use domecast_sim::light::setup;
 
@@ -57,6 +57,8 @@ pub struct Choice {
     pub arrangement: Arrangement,
     /// The diffuser.
     pub diffuser: DiffuserKind,
+    /// Whether a hood round the lens is added to a design that has none, with a well for the light.
+    pub adds_hood: bool,
 }
 
 /// Why lights cannot be; ordered by how far they got, then by how much is missing.
@@ -73,7 +75,7 @@ impl Violation {
     const UNRESOLVED: u8 = 4;
     /// No lip hides the lights, or it leaves no wall.
     const LIP: u8 = 3;
-    /// The upper platform cannot be made.
+    /// No room for pits and seats.
     const PLATFORM: u8 = 2;
     /// The build refuses it.
     pub const BUILD: u8 = 1;
@@ -88,8 +90,9 @@ impl Violation {
 pub struct Candidate {
     /// The changes of the file.
     pub changes: Vec<Cure>,
-    /// The design with them.
-    pub design: Design,
+    /// The design with them, but for the lip, which the rules give it.
+    with_rules: Design,
+    /// Its measures, with the lip.
     measures: Measures,
 }
 
@@ -98,13 +101,21 @@ pub struct Given<'a> {
     /// The design.
     pub design: &'a Design,
     scene: Scene,
+    text: Value,
+    hood: Option<Value>,
 }
 
 impl<'a> Given<'a> {
     /// # Errors
     /// A design without light, or one that cannot be lit.
     pub fn new(design: &'a Design) -> Result<Self, DesignError> {
-        Ok(Self { design, scene: scene(design, 1.0, 0.0)? })
+        let text = serde_json::from_str(design.text()).unwrap_or_default();
+        Ok(Self { design, scene: scene(design, 1.0, 0.0)?, text, hood: hood_for(design) })
+    }
+
+    /// Whether a hood can be added.
+    pub fn takes_hood(&self) -> bool {
+        self.hood.is_some()
     }
 
     /// The design with lights at a place, the lip as low as hides them, and the platform's underside where its rule or the
@@ -138,8 +149,19 @@ impl<'a> Given<'a> {
         let lip_mm = (100.0 * lip.top_z_mm).ceil() / 100.0;
         changes.push(change(LIP, json!(lip_mm)));
         measures.leds.lip_top_z_mm = lip_mm;
-        let design = resolve(&changes)?;
-        Ok(Candidate { changes, design, measures })
+        check_light_room(&design, &measures)
+            .map_err(|error| Violation::of_part(Violation::PLATFORM, &error))?;
+        Ok(Candidate { changes, with_rules: design, measures })
+    }
+
+    /// The design of a choice and a place.
+    ///
+    /// # Errors
+    /// As [`Given::candidate`].
+    pub fn design_of(&self, choice: &Choice, place: LightPlace) -> Result<Design, Violation> {
+        let made = self.candidate(choice, place)?;
+        let design = self.design.with_changes(&made.changes);
+        design.map_err(|_| Violation { stage: Violation::UNRESOLVED, missing: f64::MAX })
     }
 
     /// The fields that a choice and a place set, and those that then follow from rules.
@@ -157,9 +179,25 @@ impl<'a> Given<'a> {
         if choice.diffuser.diffuser != leds.diffuser {
             changes.extend(diffuser_fields(&choice.diffuser).map(|(field, value)| change(field, value)));
         }
-        let text: Value = serde_json::from_str(self.design.text()).unwrap_or_default();
-        let is_given = |field: &&str| field.split('.').try_fold(&text, |at, key| at.get(key)).is_some();
-        changes.extend([UNDERSIDE, LIP].into_iter().filter(is_given).map(|field| change(field, Value::Null)));
+        let is_given = |field: &&str| field.split('.').try_fold(&self.text, |at, key| at.get(key)).is_some();
+        let follow = |fields: &[&'static str]| -> Vec<Cure> {
+            fields
+                .iter()
+                .copied()
+                .filter(|field| is_given(field))
+                .map(|field| change(field, Value::Null))
+                .collect()
+        };
+        changes.extend(follow(&[UNDERSIDE, LIP]));
+        if let Some(hood) = self.hood.as_ref().filter(|_| choice.adds_hood) {
+            let [x, y] = self.design.sections().sheet.size_mm;
+            changes.push(change("platforms.lower.hood", json!(hood)));
+            // so wide that the sheet's border still lies on its seat
+            let well_mm = (100.0 * WELL_SHARE * 0.5 * x.min(y)).floor() / 100.0;
+            changes.push(change("leds.well_radius_mm", json!(well_mm)));
+            // the block below a deeper platform is lower
+            changes.extend(follow(&["platforms.lower.clamp"]));
+        }
         changes
     }
 
@@ -177,17 +215,23 @@ impl<'a> Given<'a> {
     ///
     /// # Errors
     /// As [`Given::candidate`].
-    pub fn score(&self, candidate: &Candidate, lobe: &Lobe, polar_angle_deg: f64) -> Result<LightScore, Violation> {
+    pub fn score(
+        &self,
+        candidate: &Candidate,
+        lobe: &Lobe,
+        polar_angle_deg: f64,
+    ) -> Result<LightScore, Violation> {
         let dark = Violation { stage: Violation::LIP, missing: f64::MAX };
         let own;
-        let scene = if self.sees_alike(&candidate.design) {
+        let design = &candidate.with_rules;
+        let scene = if self.sees_alike(design) {
             &self.scene
         } else {
-            own = scene(&candidate.design, 1.0, 0.0).map_err(|_| dark)?;
+            own = scene(design, 1.0, 0.0).map_err(|_| dark)?;
             &own
         };
-        let light = light_of(scene, &candidate.measures, lobe).ok_or(dark)?;
-        let score = LightScore::of(&light, &candidate.design, polar_angle_deg);
+        let light = light_of(scene, &candidate.measures, lobe, polar_angle_deg).ok_or(dark)?;
+        let score = LightScore::of(&light, &design.sections().exposure);
         if score.objective().is_finite() { Ok(score) } else { Err(dark) }
     }
 
@@ -202,11 +246,11 @@ impl<'a> Given<'a> {
 }
 
 /// The direct light of measures on a scene's dome; `None` where the lights stand in the sheet or no platform can be made.
-fn light_of(scene: &Scene, measures: &Measures, lobe: &Lobe) -> Option<Illumination> {
+fn light_of(scene: &Scene, measures: &Measures, lobe: &Lobe, polar_angle_deg: f64) -> Option<ComparedLight> {
     let sources = setup::sources_of(scene, &measures.leds, lobe).ok()?;
     let cavities = setup::cavities_of(measures).ok()?;
     let ways = setup::ways_among(scene, sources, Some(cavities));
-    Illumination::along(scene, &ways, GRID, 180.0)
+    ComparedLight::along(scene, &ways, polar_angle_deg)
 }
 
 /// How good the light of a design is as it stands.
@@ -215,19 +259,16 @@ fn light_of(scene: &Scene, measures: &Measures, lobe: &Lobe) -> Option<Illuminat
 /// Lights that do not fit the design.
 pub fn score_of(design: &Design, polar_angle_deg: f64) -> Result<LightScore, DesignError> {
     let scene = scene(design, 1.0, 0.0)?;
-    let light = Illumination::direct(&scene, GRID, 180.0).map_err(crate::light::fault)?;
+    let ways = setup::ways(&scene, &LightUse::ALL).map_err(crate::light::fault)?;
+    let light = ComparedLight::along(&scene, &ways, polar_angle_deg);
     let light = light.ok_or_else(|| DesignError::at("leds.list", "[]", "there is no light", "lights"))?;
-    Ok(LightScore::of(&light, design, polar_angle_deg))
+    Ok(LightScore::of(&light, &design.sections().exposure))
 }
 
 impl Candidate {
-    /// Seats, and the upper platform with its walls: what most candidates fail at.
-    ///
-    /// # Errors
-    /// By how much.
-    pub fn check_platform(&self) -> Result<(), Violation> {
-        check_upper_platform(&self.design, &self.measures)
-            .map_err(|error| Violation::of_part(Violation::PLATFORM, &error))
+    /// Lights in all, and height of the whole sensor, mm.
+    pub fn count_and_height_mm(&self) -> (usize, f64) {
+        (self.measures.leds.list.len(), height_mm(&self.with_rules))
     }
 }
 
@@ -236,6 +277,26 @@ pub fn height_mm(design: &Design) -> f64 {
     let [low, high] = design.bounds_mm();
     (1e6 * (high.z - low.z)).round() / 1e6
 }
+
+/// A hood for a design that has none: as high as the camera's view leaves room for; `None` where the design has one, or the
+/// view leaves no room above the lens.
+fn hood_for(design: &Design) -> Option<Value> {
+    let sections = design.sections();
+    if sections.platforms.lower.hood.is_some() {
+        return None;
+    }
+    let wall_mm = (10.0 * (sections.process.min_wall_mm + 0.1)).ceil() / 10.0;
+    // higher than any view leaves room for
+    let tall_mm = -design.sensor_from_camera().translation_mm.z;
+    let hood = |rim_mm: f64| json!({ "rim_from_pupil_mm": rim_mm, "wall_mm": wall_mm, "gap_mm": 0.5 });
+    let with = design.with_changes(&[change("platforms.lower.hood", hood(tall_mm))]).ok()?;
+    let highest = Measures::of(&with).ok()?.highest_hood_rim_mm()?;
+    let rim_mm = (100.0 * highest - 1.0).floor() / 100.0;
+    (rim_mm > sections.camera_body.front_from_pupil_mm + wall_mm).then(|| hood(rim_mm))
+}
+
+/// Share of the sheet's half width that a light well takes: the rest is the seat.
+const WELL_SHARE: f64 = 0.945;
 
 const UNDERSIDE: &str = "platforms.upper.underside_z_mm";
 const LIP: &str = "leds.lip_top_z_mm";

@@ -99,7 +99,9 @@ impl Arrangement {
             match per_color {
                 1 if given == 1 => {}
                 1 => found.push(Self { per_color, spread: Spread::AboutMiddle }),
-                2 => found.extend([Spread::AboutMiddle, Spread::FromFirst].map(|spread| Self { per_color, spread })),
+                2 => found.extend(
+                    [Spread::AboutMiddle, Spread::FromFirst].map(|spread| Self { per_color, spread }),
+                ),
                 _ => found.push(Self { per_color, spread: Spread::AboutMiddle }),
             }
         }
@@ -120,8 +122,8 @@ impl Arrangement {
         let colors = [LedColor::Red, LedColor::Green, LedColor::Blue];
         let middles = azimuths_deg(given);
         let of_color = |(color, middle): (LedColor, Option<f64>)| {
-            let middle = middle.unwrap_or(0.0)
-                + if self.spread == Spread::FromFirst { half_arc_deg } else { 0.0 };
+            let middle =
+                middle.unwrap_or(0.0) + if self.spread == Spread::FromFirst { half_arc_deg } else { 0.0 };
             let count = self.per_color;
             (0..count).map(move |k| {
                 let share = if count > 1 { 2.0 * k as f64 / (count - 1) as f64 - 1.0 } else { 0.0 };
@@ -137,7 +139,8 @@ impl Arrangement {
 fn azimuths_deg(list: &[LedSection]) -> [Option<f64>; 3] {
     [LedColor::Red, LedColor::Green, LedColor::Blue].map(|color| {
         let of_color = || list.iter().filter(|led| led.color == color);
-        let sum = of_color().map(|led| glam::DVec2::from_angle(led.azimuth_deg.to_radians())).sum::<glam::DVec2>();
+        let sum =
+            of_color().map(|led| glam::DVec2::from_angle(led.azimuth_deg.to_radians())).sum::<glam::DVec2>();
         let is_one = of_color().count() == 1;
         let only = of_color().next().map(|led| led.azimuth_deg).filter(|_| is_one);
         only.or_else(|| (sum.length() > 1e-6).then(|| sum.to_angle().to_degrees()))

@@ -73,11 +73,8 @@ impl Cma {
         let c_one = 2.0 / ((n + 1.3).powi(2) + effective);
         let c_mu =
             (2.0 * (effective - 2.0 + 1.0 / effective) / ((n + 2.0).powi(2) + effective)).min(1.0 - c_one);
-        let steps: Vec<SearchPoint> = ordered
-            .iter()
-            .take(self.weights.len())
-            .map(|point| (*point - &self.mean) / self.sigma)
-            .collect();
+        let steps: Vec<SearchPoint> =
+            ordered.iter().take(self.weights.len()).map(|point| (*point - &self.mean) / self.sigma).collect();
         let step = steps
             .iter()
             .zip(&self.weights)
@@ -131,7 +128,8 @@ mod tests {
         while cma.width() > 1e-9 && looks < 20_000 {
             let points = cma.ask();
             looks += points.len();
-            let mut valued: Vec<(f64, &SearchPoint)> = points.iter().map(|point| (of(point), point)).collect();
+            let mut valued: Vec<(f64, &SearchPoint)> =
+                points.iter().map(|point| (of(point), point)).collect();
             valued.sort_by(|a, b| a.0.total_cmp(&b.0));
             best = best.min(valued[0].0);
             cma.tell(&valued.iter().map(|(_, point)| *point).collect::<Vec<_>>());

@@ -15,12 +15,14 @@ use serde_json::json;
 
 pub use candidate::LightPlace;
 pub use choices::{Arrangement, Spread};
+pub(super) use choices::{DiffuserKind, diffusers};
 pub use outcome::{FieldChange, FrontPoint, Lights, OptimizationReport, Sensitivity};
+pub(super) use score::ComparedLight;
 pub use score::LightScore;
 pub use search::SearchStatus;
 
-use super::IlluminationCheck;
-use super::measure::{p95_to, require_colors};
+use super::measure::{measure, p95_to, require_colors};
+use super::numbers::IlluminationReport;
 use crate::build::{BuildError, build, verify};
 use candidate::{Given, score_of};
 use domecast_design::{Design, DesignError};
@@ -44,6 +46,8 @@ impl Default for SearchOptions {
 }
 
 impl SearchOptions {
+    /// Whether these make a search.
+    ///
     /// # Errors
     /// A search without a look, or of no part of a dome.
     pub fn check(&self) -> Result<(), DesignError> {
@@ -76,8 +80,6 @@ pub struct Optimization {
     pub report: OptimizationReport,
     /// The design with better lights, which builds; `None` where none was found.
     pub proposal: Option<Design>,
-    /// The proposal's light.
-    pub light: Option<IlluminationCheck>,
 }
 
 impl Optimization {
@@ -108,7 +110,7 @@ impl fmt::Display for SearchStatus {
     }
 }
 
-/// Searches for lights that are better than those of `design`, of which `check` is the light; `step` gets what is being
+/// Searches for lights that are better than those of `design`, of which `light` is what `illuminate` says; `step` gets what is being
 /// done, and the search ends early, with the best so far, where `is_stopped`.
 ///
 /// # Errors
@@ -116,15 +118,15 @@ impl fmt::Display for SearchStatus {
 /// what can be made.
 pub fn optimize(
     design: &Design,
-    check: &IlluminationCheck,
+    light: &IlluminationReport,
     options: &SearchOptions,
     step: &mut dyn FnMut(&str),
     is_stopped: &dyn Fn() -> bool,
 ) -> Result<Optimization, DesignError> {
     options.check()?;
     require_colors(design)?;
-    let start_p95 = p95_to(&check.report, options.polar_angle_deg);
-    if check.report.places.polar_deg.iter().all(|polar_deg| *polar_deg > options.polar_angle_deg) {
+    let start_p95 = p95_to(light, options.polar_angle_deg);
+    if light.places.polar_deg.iter().all(|polar_deg| *polar_deg > options.polar_angle_deg) {
         return Err(DesignError::at(
             "--polar-angle-deg",
             options.polar_angle_deg,
@@ -141,7 +143,7 @@ pub fn optimize(
 
     step("checking the best");
     let mut proposal = None;
-    let mut light = None;
+    let mut best_p95 = None;
     let mut chosen = None;
     for one in candidates(&found.best, &found.feasible, start.objective()) {
         let Ok(made) = given.candidate(&one.choice, one.place) else { continue };
@@ -154,27 +156,26 @@ pub fn optimize(
             }
             Err(BuildError::Design(_)) => continue,
         }
-        let Ok(lit) = IlluminationCheck::of(&named) else { continue };
-        let p95 = p95_to(&lit.report, options.polar_angle_deg);
+        let Ok((lit, _)) = measure(&named) else { continue };
+        let p95 = p95_to(&lit, options.polar_angle_deg);
         let is_better = match (p95, start_p95) {
             (Some(found), Some(start)) => found <= (1.0 - MIN_GAIN) * start,
             (found, None) => found.is_some(),
             (None, Some(_)) => false,
         };
         if is_better {
-            (proposal, light, chosen) = (Some(named), Some(lit), Some(one));
+            (proposal, best_p95, chosen) = (Some(named), p95, Some(one));
             break;
         }
     }
     step("trying what is off by a little");
-    let report = outcome::report(&given, options, &found, outcome::Ends {
-        start,
-        start_p95,
-        best: chosen,
-        proposal: proposal.as_ref(),
-        best_p95: light.as_ref().and_then(|lit| p95_to(&lit.report, options.polar_angle_deg)),
-    })?;
-    Ok(Optimization { report, proposal, light })
+    let report = outcome::report(
+        &given,
+        options,
+        &found,
+        outcome::Ends { start, start_p95, best: chosen, proposal: proposal.as_ref(), best_p95 },
+    )?;
+    Ok(Optimization { report, proposal })
 }
 
 /// Candidates tried at most where the build refuses the best, each clearly another.

@@ -50,6 +50,8 @@ pub struct FieldChange {
 pub struct ArrangementResult {
     /// Lights of each colour, and how they stand.
     pub arrangement: Arrangement,
+    /// Whether a hood was added.
+    pub adds_hood: bool,
     /// The least error of normals found with it, degrees a grey level; null where boards, springs and walls leave no room.
     pub normal_error_p95_deg_per_level: Option<f64>,
 }
@@ -63,6 +65,8 @@ pub struct FrontPoint {
     pub arrangement: Arrangement,
     /// Name of the diffuser.
     pub diffuser: &'static str,
+    /// Whether a hood was added.
+    pub adds_hood: bool,
     /// Error of normals, 95th percentile, degrees a grey level.
     pub normal_error_p95_deg_per_level: f64,
     /// Standard deviation over mean of the three colours' sum.
@@ -145,15 +149,22 @@ pub(super) fn report(
         _ => None,
     };
     let changes = ends.best.iter().filter_map(|best| given.candidate(&best.choice, best.place).ok());
-    let changes = changes.flat_map(|made| made.changes).fold(Vec::new(), |mut all: Vec<FieldChange>, Cure { field, value }| {
-        all.retain(|change| change.field != field);
-        all.push(FieldChange { field, value });
-        all
-    });
+    let changes = changes.flat_map(|made| made.changes).fold(
+        Vec::new(),
+        |mut all: Vec<FieldChange>, Cure { field, value }| {
+            all.retain(|change| change.field != field);
+            all.push(FieldChange { field, value });
+            all
+        },
+    );
     let ratio = ends.best_p95.zip(ends.start_p95).map(|(best, start)| best / start);
-    let arrangement = |(arrangement, best): &(Arrangement, Option<Looked>)| ArrangementResult {
-        arrangement: *arrangement,
-        normal_error_p95_deg_per_level: best.as_ref().and_then(|one| one.score.as_ref()).map(LightScore::objective),
+    let arrangement = |(choice, best): &(Choice, Option<Looked>)| ArrangementResult {
+        arrangement: choice.arrangement,
+        adds_hood: choice.adds_hood,
+        normal_error_p95_deg_per_level: best
+            .as_ref()
+            .and_then(|one| one.score.as_ref())
+            .map(LightScore::objective),
     };
     let sensitivities = match (ends.proposal, &best) {
         (Some(proposal), Some(best)) => sensitivities(proposal, &best.score, options.polar_angle_deg),
@@ -207,6 +218,7 @@ fn front(given: &Given<'_>, found: &Found) -> Vec<FrontPoint> {
                 place: one.place,
                 arrangement: one.choice.arrangement,
                 diffuser: one.choice.diffuser.name,
+                adds_hood: one.choice.adds_hood,
                 normal_error_p95_deg_per_level: score.objective(),
                 sum_coefficient_of_variation: score.sum_coefficient_of_variation?,
                 lights: one.lights,
@@ -219,9 +231,7 @@ fn front(given: &Given<'_>, found: &Found) -> Vec<FrontPoint> {
     let mut kept: Vec<(FrontPoint, Choice)> = Vec::new();
     let mut free: Vec<&(FrontPoint, Choice)> =
         all.iter().filter(|one| !all.iter().any(|other| other.0.dominates(&one.0))).collect();
-    free.sort_by(|a, b| {
-        a.0.normal_error_p95_deg_per_level.total_cmp(&b.0.normal_error_p95_deg_per_level)
-    });
+    free.sort_by(|a, b| a.0.normal_error_p95_deg_per_level.total_cmp(&b.0.normal_error_p95_deg_per_level));
     for one in free {
         if !kept.iter().any(|known| known.0.is_near(&one.0)) {
             kept.push(one.clone());
@@ -235,7 +245,7 @@ fn front(given: &Given<'_>, found: &Found) -> Vec<FrontPoint> {
         .filter_map(|index| kept.get(index).cloned())
         .collect();
     let passes = |(point, choice): &(FrontPoint, Choice)| {
-        given.candidate(choice, point.place).is_ok_and(|made| verify(&made.design).is_ok())
+        given.design_of(choice, point.place).is_ok_and(|design| verify(&design).is_ok())
     };
     let checked: Vec<bool> = thinned.par_iter().map(passes).collect();
     thinned.into_iter().zip(checked).filter(|(_, passes)| *passes).map(|((point, _), _)| point).collect()
@@ -296,11 +306,7 @@ fn sensitivities(best: &Design, score: &LightScore, polar_angle_deg: f64) -> Vec
         .map(|(change, cures)| {
             let score = best.with_changes(&cures).and_then(|design| score_of(&design, polar_angle_deg));
             let p95 = score.ok().and_then(|score| score.normal_error_deg_per_level.p95);
-            Sensitivity {
-                change,
-                normal_error_p95_deg_per_level: p95,
-                ratio: p95.map(|p95| p95 / unchanged),
-            }
+            Sensitivity { change, normal_error_p95_deg_per_level: p95, ratio: p95.map(|p95| p95 / unchanged) }
         })
         .collect()
 }

@@ -46,9 +46,14 @@ pub fn explained(
         .map(|field| (field, if field == "lip_top_z_mm" { lip } else { reason.as_str() }))
         .collect();
     changes.extend(reasons("leds", start.sections().leds.why.as_ref(), &leds));
-    let [now, then] = [&made.design, start].map(|design| design.sections().platforms.upper.underside_z_mm);
+    let deeper = start.with_changes(&made.changes)?;
+    let [now, then] = [&deeper, start].map(|design| design.sections().platforms.upper.underside_z_mm);
     if now != then {
-        changes.extend(reasons("platforms", start.sections().platforms.why.as_ref(), &[("upper", underside)]));
+        changes.extend(reasons(
+            "platforms",
+            start.sections().platforms.why.as_ref(),
+            &[("upper", underside)],
+        ));
     }
     start.with_changes(&changes)
 }
@@ -73,7 +78,9 @@ fn reasons(section: &str, given: Option<&Why>, new: &[(&str, &str)]) -> Option<C
             all.extend(new.iter().map(|(field, reason)| ((*field).to_owned(), json!(reason))));
             Value::Object(all)
         }
-        None => Value::Object(new.iter().map(|(field, reason)| ((*field).to_owned(), json!(reason))).collect()),
+        None => {
+            Value::Object(new.iter().map(|(field, reason)| ((*field).to_owned(), json!(reason))).collect())
+        }
     };
     Some(Cure { field: format!("{section}.why"), value })
 }

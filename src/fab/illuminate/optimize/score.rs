@@ -4,13 +4,35 @@ use serde::Serialize;
 
 use super::super::numbers::Percentiles;
 use crate::light::{lacking, normal_error_deg, percentile_of};
-use domecast_design::Design;
+use domecast_design::sections::ExposureSection;
+use domecast_sim::Scene;
+use domecast_sim::light::direct::EmitterRule;
 use domecast_sim::light::illumination::{IlluminatedPlace, Illumination, PlaceGrid};
 use domecast_sim::light::separation::condition_number;
+use domecast_sim::light::tables::Ways;
 
-/// Places at which lights are compared: so few cost some milliseconds; percentiles are within a few percent of
-/// `illuminate`'s.
-pub const GRID: PlaceGrid = PlaceGrid { rings: 24, places: 36 };
+/// Places at which the normals' error is compared, as far as it counts, and coarser ones over the whole dome for exposure and
+/// crescents: so few cost some hundredths of a second.
+const FINE: PlaceGrid = PlaceGrid { rings: 20, places: 30 };
+const COARSE: PlaceGrid = PlaceGrid { rings: 12, places: 24 };
+/// Places across an emitter, each way: lights are compared to a part in a thousand.
+const EMITTER_PLACES: usize = 2;
+
+/// The light as far as it is compared.
+#[derive(Debug, Clone)]
+pub struct ComparedLight {
+    fine: Illumination,
+    coarse: Illumination,
+}
+
+impl ComparedLight {
+    /// Along the ways of a scene, to a polar angle; `None` where the scene is not lit by lights.
+    pub fn along(scene: &Scene, ways: &Ways, polar_angle_deg: f64) -> Option<Self> {
+        let rule = EmitterRule::with_places(EMITTER_PLACES);
+        let light = |grid, polar_deg| Illumination::along(scene, ways, grid, polar_deg, &rule);
+        Some(Self { fine: light(FINE, polar_angle_deg)?, coarse: light(COARSE, 180.0)? })
+    }
+}
 
 /// Polar angle within which crescents are looked for, degrees.
 const CRESCENT_POLAR_DEG: f64 = 75.0;
@@ -34,28 +56,29 @@ pub struct LightScore {
 }
 
 impl LightScore {
-    /// Of a light on the whole dome; the exposure is `design`'s.
-    pub fn of(light: &Illumination, design: &Design, polar_angle_deg: f64) -> Self {
-        let exposure = &design.sections().exposure;
-        let brightest = light.places.iter().filter(|place| place.image_px.is_some());
+    /// Of a light; the exposure is as `exposure` says.
+    pub fn of(light: &ComparedLight, exposure: &ExposureSection) -> Self {
+        let ComparedLight { fine: light, coarse } = light;
+        let brightest = coarse.places.iter().chain(&light.places).filter(|place| place.image_px.is_some());
         let brightest = brightest.map(|place| brightest_level(light, place)).fold(0.0, f64::max);
         let wanted = exposure.brightest_level / brightest.max(f64::MIN_POSITIVE);
         let largest = exposure.max_level_per_mw_mm2;
         let level_per_mw_mm2 = exposure.level_per_mw_mm2.unwrap_or(wanted).min(largest);
-        let inside = || light.places.iter().filter(|place| place.polar_deg <= polar_angle_deg);
         let percentiles = |values: Vec<Option<f64>>| {
             let [p5, p50, p95] = [0.05, 0.5, 0.95].map(|part| percentile_of(values.clone(), part));
             Percentiles { p5, p50, p95 }
         };
-        let seen = inside().filter(|place| place.image_px.is_some());
+        let seen = light.places.iter().filter(|place| place.image_px.is_some());
         let errors = seen.map(|place| normal_error_deg(light, place, level_per_mw_mm2)).collect();
-        let sums: Vec<f64> = inside().map(|place| place.direct_mw_mm2().iter().sum()).collect();
-        let lacks = lacking(light, CRESCENT_POLAR_DEG);
-        let around = light.places.iter().filter(|place| place.polar_deg <= CRESCENT_POLAR_DEG).count();
+        let sums: Vec<f64> = light.places.iter().map(|place| place.direct_mw_mm2().iter().sum()).collect();
+        let lacks = lacking(coarse, CRESCENT_POLAR_DEG);
+        let around = coarse.places.iter().filter(|place| place.polar_deg <= CRESCENT_POLAR_DEG).count();
         let dark = lacks.iter().filter(|colors| colors.contains(&true)).count();
         Self {
             normal_error_deg_per_level: percentiles(errors),
-            condition_number: percentiles(inside().map(|place| condition_number(&light.seen(place))).collect()),
+            condition_number: percentiles(
+                light.places.iter().map(|place| condition_number(&light.seen(place))).collect(),
+            ),
             sum_coefficient_of_variation: coefficient_of_variation(&sums),
             crescent_share_to_75_deg: dark as f64 / around.max(1) as f64,
             level_per_mw_mm2,

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::SearchOptions;
-use super::candidate::{Choice, Given, LightPlace, Violation, height_mm};
+use super::candidate::{Choice, Given, LightPlace, Violation};
 use super::choices::{Arrangement, DiffuserKind, diffusers};
 use super::cma::{Cma, SearchPoint};
 use super::score::LightScore;
@@ -21,12 +21,19 @@ use domecast_sim::light::setup;
 const POPULATION: usize = 8;
 /// A search whose distribution is narrower than this, in the units of its coordinates, has converged: below what a file says.
 const NARROW: f64 = 0.02;
-/// A candidate must be better than the best by this part to be worth the build's checks.
-const WORTH: f64 = 1e-4;
+
+/// A candidate must be better than the best by this part to be worth the build's checks: while the search is broad, and when
+/// it refines.
+const WORTH_BROAD: f64 = 0.02;
+const WORTH_NARROW: f64 = 1e-3;
 /// Half arcs at which an arrangement is first tried, degrees.
-const FIRST_ARCS_DEG: [f64; 5] = [10.0, 20.0, 30.0, 40.0, 50.0];
+const FIRST_ARCS_DEG: [f64; 3] = [15.0, 30.0, 40.0];
+/// Depths below the given lights at which a hood is first tried, over the radius of the dome's rim.
+const FIRST_DEPTHS: [f64; 2] = [0.0, 0.2];
 /// Share of the evaluations that the arrangements get together; the rest refines the best.
 const BROAD_SHARE: f64 = 0.7;
+/// Lights that the build may refuse, one after another, before a search goes on.
+const MAX_REFUSED: usize = 4;
 /// Step of a place and an angle at which the last refinement begins, and ends: what a file says.
 const STEPS: [[f64; 2]; 4] = [[0.16, 1.6], [0.08, 0.8], [0.04, 0.4], [0.02, 0.2]];
 
@@ -89,8 +96,8 @@ pub struct Found {
     pub best: Option<Looked>,
     /// All that nothing is known against, in the order in which they were looked at.
     pub feasible: Vec<Looked>,
-    /// The best of each arrangement, where it fits.
-    pub arrangements: Vec<(Arrangement, Option<Looked>)>,
+    /// The best of each arrangement, with and without a hood, where it fits.
+    pub arrangements: Vec<(Choice, Option<Looked>)>,
     /// How many lights were looked at.
     pub evaluations: usize,
     /// How many of them went through the build's checks.
@@ -141,29 +148,43 @@ impl<'a> Search<'a> {
     pub fn run(mut self) -> Found {
         let start = LightPlace::of(self.given.design);
         let arrangements = Arrangement::all(self.given.design);
-        let own = Choice { arrangement: arrangements[0], diffuser: self.lobes[0].0 };
+        let own = Choice { arrangement: arrangements[0], diffuser: self.lobes[0].0, adds_hood: false };
         let diffuser = self.best_diffuser(own, start).unwrap_or(own.diffuser);
         let mut starts = vec![(Choice { diffuser, ..own }, start)];
-        for arrangement in arrangements.into_iter().skip(1) {
-            let choice = Choice { arrangement, diffuser };
-            let arcs: &[f64] = if arrangement.has_arc() { &FIRST_ARCS_DEG } else { &[0.0] };
-            let tried: Vec<(Choice, LightPlace)> =
-                arcs.iter().map(|arc| (choice, LightPlace { half_arc_deg: *arc, ..start })).collect();
-            let looked = self.look(&tried, true);
-            let first = looked.into_iter().min_by(Looked::order).filter(|one| one.violation.is_none());
-            match first {
-                Some(first) => starts.push((choice, first.place)),
-                None => self.found.arrangements.push((arrangement, None)),
+        let rim_mm = self.given.design.sections().dome.shape().rim_radius_mm();
+        for adds_hood in [false, true].into_iter().filter(|adds| !adds || self.given.takes_hood()) {
+            let skipped = usize::from(!adds_hood);
+            // behind a hood lights may stand deeper
+            let depths: &[f64] = if adds_hood { &FIRST_DEPTHS } else { &[0.0] };
+            for arrangement in arrangements.iter().copied().skip(skipped) {
+                let choice = Choice { arrangement, diffuser, adds_hood };
+                let arcs: &[f64] = if arrangement.has_arc() { &FIRST_ARCS_DEG } else { &[0.0] };
+                let at = |depth: &f64, arc: &f64| LightPlace {
+                    half_arc_deg: *arc,
+                    center_z_mm: start.center_z_mm - depth * rim_mm,
+                    ..start
+                };
+                let places = depths.iter().flat_map(|depth| arcs.iter().map(move |arc| at(depth, arc)));
+                let tried: Vec<(Choice, LightPlace)> =
+                    places.map(|place| (choice, place.rounded())).collect();
+                let looked = self.look(&tried, f64::INFINITY);
+                let first = looked.into_iter().min_by(Looked::order).filter(|one| one.violation.is_none());
+                match first {
+                    Some(first) => starts.push((choice, first.place)),
+                    None => self.found.arrangements.push((choice, None)),
+                }
             }
         }
         let broad = (BROAD_SHARE * self.options.evaluations as f64) as usize;
         let share = broad.saturating_sub(self.found.evaluations) / starts.len();
         for (index, (choice, place)) in starts.into_iter().enumerate() {
-            let before = self.found.feasible.len();
             self.descend(choice, place, 1.0, share, index as u64);
-            let own = self.found.feasible.iter().skip(before);
-            let best = own.filter(|one| one.violation.is_none()).min_by(|a, b| a.order(b)).cloned();
-            self.found.arrangements.push((choice.arrangement, best));
+            let is_own = |one: &&Looked| {
+                let of = one.choice;
+                (of.arrangement, of.adds_hood) == (choice.arrangement, choice.adds_hood)
+            };
+            let best = self.found.feasible.iter().filter(is_own).min_by(|a, b| a.order(b)).cloned();
+            self.found.arrangements.push((choice, best));
         }
         self.refine();
         self.found
@@ -171,9 +192,12 @@ impl<'a> Search<'a> {
 
     /// The diffuser that is best at a place.
     fn best_diffuser(&mut self, choice: Choice, place: LightPlace) -> Option<DiffuserKind> {
-        let tried: Vec<(Choice, LightPlace)> =
-            self.lobes.iter().map(|(diffuser, _)| (Choice { diffuser: *diffuser, ..choice }, place)).collect();
-        let looked = self.look(&tried, false);
+        let tried: Vec<(Choice, LightPlace)> = self
+            .lobes
+            .iter()
+            .map(|(diffuser, _)| (Choice { diffuser: *diffuser, ..choice }, place))
+            .collect();
+        let looked = self.look(&tried, WORTH_BROAD);
         let can_be = looked.into_iter().filter(|one| one.violation.is_none());
         can_be.min_by(Looked::order).map(|one| one.choice.diffuser)
     }
@@ -192,7 +216,8 @@ impl<'a> Search<'a> {
             }
             let tried: Vec<(Choice, LightPlace)> =
                 neighbours(&best, *steps).into_iter().map(|place| (best.choice, place)).collect();
-            self.look(&tried, false);
+            self.look(&tried, WORTH_NARROW);
+            self.verify_known();
             let is_better = self.found.best.as_ref().is_some_and(|now| now.objective() < best.objective());
             if !is_better {
                 level += 1;
@@ -219,7 +244,7 @@ impl<'a> Search<'a> {
             let points = cma.ask();
             let places: Vec<(LightPlace, f64)> = points.iter().map(|point| axes.place(point)).collect();
             let tried: Vec<(Choice, LightPlace)> = places.iter().map(|(place, _)| (choice, *place)).collect();
-            let mut looked = self.look(&tried, false);
+            let mut looked = self.look(&tried, WORTH_BROAD);
             for (one, (_, outside)) in looked.iter_mut().zip(places) {
                 one.outside = outside;
             }
@@ -227,48 +252,69 @@ impl<'a> Search<'a> {
             ordered.sort_by(|a, b| a.0.order(b.0));
             cma.tell(&ordered.into_iter().map(|(_, point)| point).collect::<Vec<_>>());
         }
+        self.verify_known();
     }
 
-    /// Looks at lights, in parallel; those that would be the best are verified, the best of them first. With `makes_all` the
-    /// platform of each is made, not only of those.
-    fn look(&mut self, tried: &[(Choice, LightPlace)], makes_all: bool) -> Vec<Looked> {
+    /// Looks at lights, in parallel; the best of those that are better than the best by a part of `worth` is verified: none where
+    /// that is infinite.
+    fn look(&mut self, tried: &[(Choice, LightPlace)], worth: f64) -> Vec<Looked> {
         let room = self.options.evaluations.saturating_sub(self.found.evaluations);
         let tried = tried.get(..tried.len().min(room)).unwrap_or_default();
-        let goal = self.goal();
         let (given, options, lobes) = (self.given, self.options, &self.lobes);
         let mut looked: Vec<Looked> = tried
             .par_iter()
             .map(|(choice, place)| {
                 let lobe = lobes.iter().find(|(kind, _)| *kind == choice.diffuser);
-                let lobe = lobe.map(|(_, lobe)| lobe);
-                look_at(given, options, (*choice, *place), lobe, if makes_all { f64::INFINITY } else { goal })
+                look_at(given, options, (*choice, *place), lobe.map(|(_, lobe)| lobe))
             })
             .collect();
         self.found.evaluations += looked.len();
         let mut order: Vec<usize> = (0..looked.len()).collect();
         order.sort_by(|a, b| looked[*a].order(&looked[*b]));
-        for index in order {
-            let one = &mut looked[index];
-            if one.violation.is_some() || one.objective() >= self.goal() {
-                break;
-            }
-            self.found.verified += 1;
-            let design = self.given.candidate(&one.choice, one.place).map(|made| made.design);
-            if design.is_ok_and(|design| verify(&design).is_ok()) {
-                self.found.best = Some(one.clone());
-            } else {
-                one.violation = Some(Violation { stage: Violation::BUILD, missing: 0.0 });
-            }
+        if let Some(one) = order.first().and_then(|index| looked.get_mut(*index))
+            && one.violation.is_none()
+            && one.objective() < self.goal(worth)
+        {
+            self.verify(one);
         }
         self.found.feasible.extend(looked.iter().filter(|one| one.violation.is_none()).cloned());
         self.tell();
         looked
     }
 
-    /// What is worth the build's checks.
-    fn goal(&self) -> f64 {
+    /// Puts lights through the build's checks: those that pass become the best, others cannot be.
+    fn verify(&mut self, one: &mut Looked) -> bool {
+        self.found.verified += 1;
+        let design = self.given.design_of(&one.choice, one.place);
+        let passes = design.is_ok_and(|design| verify(&design).is_ok());
+        if passes {
+            self.found.best = Some(one.clone());
+        } else {
+            one.violation = Some(Violation { stage: Violation::BUILD, missing: 0.0 });
+        }
+        passes
+    }
+
+    /// Verifies the best that is known, and where it does not pass the next ones.
+    fn verify_known(&mut self) {
+        for _ in 0..MAX_REFUSED {
+            let goal = self.goal(WORTH_NARROW);
+            let better =
+                (0..self.found.feasible.len()).filter(|i| self.found.feasible[*i].objective() < goal);
+            let best = better.min_by(|a, b| self.found.feasible[*a].order(&self.found.feasible[*b]));
+            let Some(index) = best else { return };
+            let mut one = self.found.feasible[index].clone();
+            if self.verify(&mut one) {
+                return;
+            }
+            self.found.feasible.remove(index);
+        }
+    }
+
+    /// What is better than the best by a part.
+    fn goal(&self, worth: f64) -> f64 {
         let best = self.found.best.as_ref().map_or(f64::INFINITY, Looked::objective);
-        (1.0 - WORTH) * best.min(self.start_objective)
+        (1.0 - worth) * best.min(self.start_objective)
     }
 
     fn tell(&mut self) {
@@ -283,24 +329,22 @@ impl<'a> Search<'a> {
     }
 }
 
-/// One look: the design that follows, its light, and the upper platform where the light is better than `goal`.
+/// One look: the design that follows, room for it, and its light.
 fn look_at(
     given: &Given<'_>,
     options: &SearchOptions,
     (choice, place): (Choice, LightPlace),
     lobe: Option<&Lobe>,
-    goal: f64,
 ) -> Looked {
-    let mut looked = Looked { choice, place, score: None, violation: None, lights: 0, height_mm: 0.0, outside: 0.0 };
+    let mut looked =
+        Looked { choice, place, score: None, violation: None, lights: 0, height_mm: 0.0, outside: 0.0 };
     let mut judge = || -> Result<(), Violation> {
         let candidate = given.candidate(&choice, place)?;
-        looked.lights = candidate.design.sections().leds.list.len();
-        looked.height_mm = height_mm(&candidate.design);
+        (looked.lights, looked.height_mm) = candidate.count_and_height_mm();
         let Some(lobe) = lobe else { return Ok(()) };
         let score = given.score(&candidate, lobe, options.polar_angle_deg)?;
-        let objective = score.objective();
         looked.score = Some(score);
-        if objective < goal { candidate.check_platform() } else { Ok(()) }
+        Ok(())
     };
     looked.violation = judge().err();
     looked

@@ -21,7 +21,10 @@ fn thumb24() -> Value {
 
 /// The check of thumb24 with some fields changed.
 fn checked(changes: &[(&str, Value)]) -> Result<LightCheck, String> {
-    let mut tree = thumb24();
+    checked_with(thumb24(), changes)
+}
+
+fn checked_with(mut tree: Value, changes: &[(&str, Value)]) -> Result<LightCheck, String> {
     for (field, value) in changes {
         match tree.pointer_mut(field) {
             Some(place) => *place = value.clone(),
@@ -124,7 +127,7 @@ fn wide_markers_and_dots_inside_of_the_shadows_are_tracked() {
     }
 }
 
-/// The tracker follows the dim scene, and says of every frame of one with less than half of its light that it does not.
+/// The tracker follows the dim scene, and says of every frame of one with a fifth of its light that it does not.
 #[test]
 fn the_dim_scene_is_tracked_and_the_one_that_is_too_dim_is_named() {
     let design = Design::load(&designs().join("thumb24.json")).unwrap();
@@ -188,8 +191,11 @@ fn what_is_cut_off_in_shadow_or_dim_is_a_warning_with_its_number() {
     let warned = |check: &LightCheck, field: &str, word: &str| {
         check.warnings.iter().any(|(at, message)| at == field && message.contains(word))
     };
+    let near_lights: Value = serde_json::from_str(include_str!("common/near-lights.json")).expect("its JSON");
+    let shadowed = checked_with(near_lights, &[]).unwrap();
+    assert!(warned(&shadowed, "leds.lip_top_z_mm", "shadow"), "{:?}", shadowed.warnings);
     let usual = checked(&[]).unwrap();
-    assert!(warned(&usual, "leds.lip_top_z_mm", "shadow"), "{:?}", usual.warnings);
+    assert!(!warned(&usual, "leds.lip_top_z_mm", "shadow"), "{:?}", usual.warnings);
     assert!(warned(&usual, "white_markers.reflectance", "threshold"), "{:?}", usual.warnings);
     assert_eq!(usual.report.dome.saturated_share, 0.0);
     let bright = checked(&[("/exposure/level_per_mw_mm2", json!(1200))]).unwrap();

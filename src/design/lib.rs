@@ -10,6 +10,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod electrical;
 pub mod layout;
 pub mod parts;
 mod spec;

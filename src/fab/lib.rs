@@ -8,6 +8,7 @@ pub mod constants;
 mod hash;
 pub mod html;
 pub mod illuminate;
+pub mod led_board;
 pub mod light;
 pub mod numbers;
 pub mod report;

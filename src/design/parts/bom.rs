@@ -6,8 +6,9 @@ use super::Part;
 use super::board::BoardSeat;
 use super::measures::Measures;
 use super::mount;
+use crate::electrical::{Electrical, LedBoard};
 use crate::spec::Design;
-use crate::spec::sections::LedColor;
+use crate::spec::sections::{LedColor, LedDrive};
 
 /// What to print, cut, cast and buy, with tolerances and where each comes from,
 /// as CSV: one line per item.
@@ -18,6 +19,7 @@ pub(super) fn bom(design: &Design, m: &Measures, parts: &[Part]) -> String {
     made(design, m, parts, &mut table);
     purchased(design, m, &mut table);
     leds(m, &mut table);
+    circuits(m, &mut table);
     let clamps = m.platforms.lower.clamp.azimuth_deg.len();
     if clamps > 0 {
         let size = format!("for a tapping hole of {}", m.platforms.lower.clamp.hole_diameter_mm);
@@ -226,17 +228,15 @@ fn leds(m: &Measures, table: &mut Table) {
         let n = m.leds.list.len().to_string();
         let size = format!("{} x {} x {}", m.leds.board_mm[0], m.leds.board_mm[1], m.leds.board_thickness_mm);
         let slack = format!("+-{}", m.leds.clearance_mm);
-        table.row([
-            "LED board",
-            &n,
-            "piece",
-            "circuit board for one LED",
-            &size,
-            &slack,
-            "FR4",
-            "ordered",
-            "leds.board_mm",
-        ]);
+        let board = LedBoard::of(&m.leds).ok().filter(|_| has_resistors(m));
+        let (what, source) = match &board {
+            Some(board) if board.is_for_panel => {
+                ("circuit board for one LED; ordered in a panel", "parts/led_board.kicad_pcb")
+            }
+            Some(_) => ("circuit board for one LED", "parts/led_board.kicad_pcb"),
+            None => ("circuit board for one LED", "ordered"),
+        };
+        table.row(["LED board", &n, "piece", what, &size, &slack, "FR4", source, "leds.board_mm"]);
         if m.leds.diffuser_thickness_mm > 0.0 {
             let t = m.leds.diffuser_thickness_mm.to_string();
             table.row([
@@ -251,6 +251,60 @@ fn leds(m: &Measures, table: &mut Table) {
                 "leds.diffuser_thickness_mm",
             ]);
         }
+    }
+}
+
+/// Whether the lights are plain ones, with resistors.
+fn has_resistors(m: &Measures) -> bool {
+    m.leds.electrical.drive == LedDrive::Resistor
+}
+
+/// Resistors by value, and wires by colour.
+fn circuits(m: &Measures, table: &mut Table) {
+    // a build has refused what cannot be before it comes to its list
+    let Ok(Some(electrical)) = Electrical::of_leds(&m.leds) else { return };
+    let mut resistors: Vec<(f64, f64, usize)> = Vec::new();
+    for light in &electrical.lights {
+        let (Some(ohm), Some(rating_w)) = (light.resistor_ohm, light.resistor_rating_w) else { continue };
+        match resistors.iter_mut().find(|(known, ..)| *known == ohm) {
+            Some((_, rated, count)) => (*rated, *count) = (rated.max(rating_w), *count + 1),
+            None => resistors.push((ohm, rating_w, 1)),
+        }
+    }
+    for (ohm, rating_w, count) in resistors {
+        table.row([
+            &format!("resistor {ohm} ohm"),
+            &count.to_string(),
+            "piece",
+            "in series with a light, at the cable's end",
+            &format!("{rating_w} W or more"),
+            "",
+            "5 %, E24",
+            "bought",
+            "leds.electrical.supply_voltage_v",
+        ]);
+    }
+    let length_m = 1e-3 * m.leds.electrical.wire_length_mm;
+    let mut wires: Vec<(&str, usize)> = Vec::new();
+    for light in &electrical.lights {
+        match wires.iter_mut().find(|(known, _)| *known == light.color.as_str()) {
+            Some((_, count)) => *count += 1,
+            None => wires.push((light.color.as_str(), 1)),
+        }
+    }
+    wires.push(("black", electrical.lights.len()));
+    for (color, count) in wires {
+        table.row([
+            &format!("wire {color}"),
+            &format!("{:.2}", length_m * count as f64),
+            "m",
+            if color == "black" { "stranded, from the cathodes" } else { "stranded, to the anodes" },
+            "AWG 30 to 32",
+            "",
+            "copper",
+            "bought",
+            "leds.electrical.wire_length_mm",
+        ]);
     }
 }
 

@@ -13,7 +13,7 @@ use super::bearing::behind_lip_mm;
 use super::error::infeasible;
 use super::measures::Measures;
 use super::view::sight_lines;
-use super::{Assembly, Part, PartError, Pose, hood, process, purchased, undercut};
+use super::{Assembly, Part, PartError, Pose, light_ways, process, purchased, undercut};
 use crate::spec::Cure;
 use domecast_mesh::{BoundingBox, Chord, MeshError, Piece, RayTarget, Solid, TriMesh};
 use domecast_optics::numeric::Rigid;
@@ -33,7 +33,7 @@ const CHORD_MM: f64 = 0.03;
 /// The failures, the first of each check: which parts, where, value, limit, which design field.
 pub fn check_assembly(m: &Measures, parts: &[Part], assembly: &Assembly) -> Result<(), PartError> {
     let checks =
-        [process::check(m, parts), undercut::check(m, parts), envelope(m, assembly), hood::keeps_light(m)];
+        [process::check(m, parts), undercut::check(m, parts), envelope(m, assembly), light_ways::check(m)];
     let mut faults: Vec<PartError> = checks.into_iter().filter_map(Result::err).collect();
     faults.extend(assembled(m, assembly).err());
     PartError::all(faults)

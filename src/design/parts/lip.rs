@@ -9,7 +9,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::assembly::affine;
 use super::bearing::behind_lip_mm;
-use super::{Measures, hood};
+use super::{Measures, hood, light_ways};
 
 /// By how much the lip is higher than it need be, mm: what chords of the mesh take away from its edge.
 const HIGHER_MM: f64 = 0.03;
@@ -43,7 +43,7 @@ impl HidingLip {
                 let from = led.transform_point3(DVec3::new(x * half, y * half, 0.0));
                 for &(to, camera_from_platform) in &lens {
                     let along = (to - from).dot(out);
-                    if along <= 0.0 || hood::hides(m, &camera_from_platform, from, to) {
+                    if along <= 0.0 || light_ways::hides(m, &camera_from_platform, from, to) {
                         continue;
                     }
                     let pit_end = front_mm / along;

@@ -33,6 +33,7 @@ mod feature;
 mod files;
 mod hood;
 mod image_rays;
+mod light_ways;
 mod lip;
 mod lower;
 mod measures;

@@ -4,8 +4,8 @@ use super::error::infeasible;
 use super::pits::missing_pit_wall_mm;
 use super::traced::{PoseSight, trace_sight};
 use super::{
-    Assembly, Measures, Part, PartError, bearing, board_seat, build, check_assembly, hood, mount, openings,
-    seats, trial,
+    Assembly, Measures, Part, PartError, bearing, board_seat, build, check_assembly, light_ways, mount,
+    openings, seats, trial,
 };
 use crate::layout::{Dot, PrintPass};
 use crate::spec::{Design, DesignWarning};
@@ -59,7 +59,7 @@ pub fn check_light_room(design: &Design, m: &Measures) -> Result<(), PartError> 
         ));
     }
     PartError::all(seats::faults(design, m))?;
-    hood::keeps_light(m)
+    light_ways::check(m)
 }
 
 /// The faults of [`build_seated`], each that names fields and no change with the first change that was tried and helps.

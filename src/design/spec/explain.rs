@@ -27,7 +27,9 @@ pub struct Explained {
 }
 
 /// The units that names end in.
-const UNITS: [(&str, &str); 14] = [
+const UNITS: [(&str, &str); 20] = [
+    ("_mw_per_ma", "mW/mA"),
+    ("_k_per_w", "K/W"),
     ("_n_per_mm", "N/mm"),
     ("_nmm", "N*mm"),
     ("_g_per_cm3", "g/cm^3"),
@@ -38,7 +40,11 @@ const UNITS: [(&str, &str); 14] = [
     ("_rad", "rad"),
     ("_mm", "mm"),
     ("_px", "px"),
+    ("_ma", "mA"),
+    ("_mw", "mW"),
+    ("_c", "degrees C"),
     ("_n", "N"),
+    ("_v", "V"),
     ("_g", "g"),
     ("_t", "T"),
     ("dpi", "dots per inch"),

@@ -195,9 +195,18 @@ fn from_catalogue(
     for (field, fact) in entry.section(target) {
         known = true;
         let lens = own_lens && ["model", "matrix", "distortion"].contains(&field);
+        // a field below a part of the section, `electrical.max_current_ma`, is put into that part
+        let (inner_place, section, field) = match field.split_once('.') {
+            Some((part, field)) => {
+                let inner = section.entry(part).or_insert_with(|| json!({}));
+                let Value::Object(inner) = inner else { continue };
+                (format!("{place}.{part}"), inner, field)
+            }
+            None => (place.to_owned(), &mut *section, field),
+        };
         if !section.contains_key(field) && !lens {
             let source = format!("catalogue {key}: {}", fact.source);
-            put(section, place, field, fact.value.clone(), &source, done);
+            put(section, &inner_place, field, fact.value.clone(), &source, done);
         }
     }
     if known {

@@ -70,12 +70,13 @@ pub(super) fn camera_below_sheet(camera: &CameraSection, optics: &OpticsSection)
 /// Side lengths, which the schema cannot bound inside a list.
 fn sizes(design: &Design, faults: &mut Vec<DesignError>) {
     let sections = design.sections();
-    let lists: [(&str, &[f64]); 7] = [
+    let lists: [(&str, &[f64]); 8] = [
         ("envelope.size_mm", &sections.envelope.size_mm),
         ("platforms.outer_mm", &sections.platforms.outer_mm),
         ("sheet.size_mm", &sections.sheet.size_mm),
         ("leds.package_mm", &sections.leds.package_mm),
         ("leds.board_mm", &sections.leds.board_mm),
+        ("leds.electrical.board.land_mm", &sections.leds.electrical.board.land_mm),
         ("jig.base_mm", &sections.jig.base_mm),
         ("process.build_volume_mm", &sections.process.build_volume_mm),
     ];

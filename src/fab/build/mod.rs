@@ -36,6 +36,7 @@ use std::fmt;
 use crate::artwork;
 use crate::artwork::RenderError;
 use crate::constants;
+use crate::led_board::Lights;
 use crate::light::LightCheck;
 use crate::report;
 use domecast_design::layout::LayoutError;
@@ -177,6 +178,7 @@ fn make(
     }
     add_design(&mut tree, design);
     let sha256 = sha256_hex(design.text().as_bytes());
+    let lights = Lights::of(design)?;
 
     step("trying the claimed loads");
     let sight = claims::try_claims(design)?;
@@ -204,7 +206,7 @@ fn make(
     }
     let (light, forces) = loaded?;
     let force_files = forces.files().into_iter().map(|(path, text)| (path, text.into_bytes()));
-    for (path, bytes) in light.files().into_iter().chain(force_files) {
+    for (path, bytes) in light.files().into_iter().chain(force_files).chain(lights.files(design)?) {
         tree.add(path, bytes);
     }
     step("writing what other programs read");
@@ -213,7 +215,7 @@ fn make(
     for (path, text) in forms.files {
         tree.add(path, text.into_bytes());
     }
-    let warnings = warnings(design, &checked.notes, &judged, &light);
+    let warnings = warnings(design, &[checked.notes, lights.warnings.clone()].concat(), &judged, &light);
 
     step("writing the page");
     let shown: Vec<(String, String)> =
@@ -225,6 +227,7 @@ fn make(
         constants: &constants,
         forces: &forces,
         light: &light.report,
+        lights: &lights,
         parts: &made,
         assembly: &assembly,
         sight: &checked.sight,

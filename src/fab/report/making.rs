@@ -4,7 +4,6 @@ use super::subject::ReportSubject;
 use crate::html::{Html, html};
 use crate::numbers::dimension;
 use domecast_design::parts::Part;
-use domecast_design::sections::LedColor;
 
 /// Silicone that stays in cup, syringe and sprue, as a share of what is needed: an estimate for hand casting.
 const WASTE: f64 = 1.0;
@@ -247,20 +246,28 @@ fn dots_text(subject: &ReportSubject<'_>) -> Html {
 
 fn lights_text(subject: &ReportSubject<'_>) -> Html {
     let leds = &subject.design.sections().leds;
-    let named = |color: LedColor| match color {
-        LedColor::Red => "red",
-        LedColor::Green => "green",
-        LedColor::Blue => "blue",
-        LedColor::White => "white",
-    };
     let list: Vec<String> = leds
         .list
         .iter()
-        .map(|led| format!("{} at {}°", named(led.color), dimension(led.azimuth_deg)))
+        .map(|led| format!("{} at {}°", led.color.as_str(), dimension(led.azimuth_deg)))
         .collect();
+    let solder = match &subject.lights.board {
+        Some(_) => html!(
+            "Boards: {}, or its Gerbers. Solder a light and two wires on each, cathode where the minus is. ",
+            file("parts/led_board.kicad_pcb")
+        ),
+        None => Html::default(),
+    };
+    let wiring = match &subject.lights.electrical {
+        Some(_) => {
+            html!(" Each light gets its resistor at the cable's end: {}.", file("parts/led_wiring.csv"))
+        }
+        None => Html::default(),
+    };
     html!(
-        "{} boards of {} × {} mm into their pits at {}° to the base: {}. Over each light a {} × {} mm piece of diffuser \
-         tape, {} mm thick, of its colour. Wires leave through the {} mm holes.",
+        "{}{} boards of {} × {} mm into their pits at {}° to the base: {}. Over each light a {} × {} mm piece of diffuser \
+         tape, {} mm thick, of its colour. Wires leave through the {} mm holes.{}",
+        solder,
         leds.list.len(),
         dimension(leds.board_mm[0]),
         dimension(leds.board_mm[1]),
@@ -270,5 +277,6 @@ fn lights_text(subject: &ReportSubject<'_>) -> Html {
         dimension(leds.package_mm[1]),
         dimension(leds.diffuser_thickness_mm),
         dimension(leds.wire_hole_diameter_mm),
+        wiring,
     )
 }

@@ -12,6 +12,7 @@
 //! ```
 
 mod constants;
+mod electrical;
 mod forces;
 mod light;
 mod making;

@@ -6,7 +6,9 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use super::subject::ReportSubject;
-use super::{constants, forces, light, making, measured, overlay, parts, pattern, section, verdict};
+use super::{
+    constants, electrical, forces, light, making, measured, overlay, parts, pattern, section, verdict,
+};
 use crate::html::{Html, STYLE, base64, figure, html, table};
 use crate::numbers::{dimension, typeset};
 use domecast_optics::DomeShape;
@@ -25,6 +27,7 @@ fn chapters(subject: &ReportSubject<'_>) -> Vec<Chapter> {
         chapter("dots", "Dots", pattern::dots(subject)),
         chapter("coverage", "What the camera covers", pattern::coverage(subject)),
         chapter("light", "The lit sensor", light::chapter(subject)),
+        chapter("electrical", "Currents and wires of the lights", electrical::chapter(subject)),
         chapter("parts", "Parts and assembly", parts::parts(subject)),
         chapter("fits", "Fits and interference", parts::fits(subject)),
         chapter("loads", "Springs and load envelope", forces::loads(subject)),

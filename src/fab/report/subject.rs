@@ -4,6 +4,7 @@ use tiny_skia::Pixmap;
 
 use crate::constants::ForceReport;
 use crate::html::{Html, html, picture};
+use crate::led_board::Lights;
 use crate::light::LightReport;
 use domecast_design::Design;
 use domecast_design::layout::Layout;
@@ -29,6 +30,8 @@ pub struct ReportSubject<'a> {
     pub forces: &'a ForceReport,
     /// The lit frame at rest in numbers.
     pub light: &'a LightReport,
+    /// The lights' circuits and their board.
+    pub lights: &'a Lights,
     /// The parts.
     pub parts: &'a [Part],
     /// The parts and stand-ins, put together.

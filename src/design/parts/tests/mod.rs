@@ -2,6 +2,7 @@ mod boards;
 mod checks;
 mod domes;
 mod exactness;
+mod hood;
 mod mechanism;
 mod random_designs;
 mod rigid;
@@ -22,6 +23,9 @@ use domecast_mesh::{Fit, Piece, RayTarget, Shape, Solid};
 pub(crate) fn thumb24() -> Design {
     Design::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json"))).unwrap()
 }
+
+/// A sensor whose lights stand close under the sheet.
+const NEAR_LIGHTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/common/near-lights.json");
 
 fn passes() -> Vec<PrintPass> {
     vec![PrintPass::new(0.0, 0.0)]
@@ -133,7 +137,8 @@ fn purchased_parts_fit_their_seats() {
     assert!(overlap(upper, sheet(0.0, 0.01)) > 0.1, "the sheet lies on its seat");
     // Magnets, flush, in both platforms.
     for axis in &m.spring_axes_mm {
-        for (part, low, high) in [(upper, -5.2, -4.2), (lower, -11.2, -10.2)] {
+        let (under, top) = (m.platforms.upper.underside_z_mm, m.lower_top_z_mm);
+        for (part, low, high) in [(upper, under, under + 1.0), (lower, top - 1.0, top)] {
             let tool = Piece::new("magnet", Shape::cylinder(1.5, low, high, Fit::Inside)).at(axis.x, axis.y);
             let tool = tool.solid(chord).unwrap();
             assert!(solid(part).intersection(&tool).unwrap().is_none(), "{} at {axis}", part.name);

@@ -5,13 +5,12 @@ use serde_json::{Value, json};
 use super::*;
 
 fn edited(edits: &[(&str, Value)]) -> Value {
-    let text =
-        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json")).unwrap();
+    let text = std::fs::read_to_string(NEAR_LIGHTS).unwrap();
     let mut tree: Value = serde_json::from_str(&text).unwrap();
     // Coarse meshes: what is looked for is tenths of a millimetre.
     set(&mut tree, "mesh.chord_tolerance_mm", json!(0.03));
     set(&mut tree, "mesh.optical_chord_tolerance_mm", json!(0.05));
-    // A channel for the cable, which thumb24 has no room for, and the two set screws that then have room beside it.
+    // A channel for the cable, which thumb24 and its kin have no room for, and the two set screws that then have room beside it.
     set(&mut tree, "platforms.lower.cable_exit.width_mm", json!(3.2));
     set(&mut tree, "platforms.lower.cable_exit.height_mm", json!(2.5));
     set(&mut tree, "platforms.lower.clamp.azimuth_deg", json!([60, 300]));
@@ -74,7 +73,7 @@ pub(super) fn refused_tree(field: &str, words: &[&str], mut tree: Value) {
 }
 
 #[test]
-fn thumb24_holds_everything_and_says_what_it_does_not() {
+fn a_sound_sensor_holds_everything_and_says_what_it_does_not() {
     let checked = verdict(&edited(&[])).unwrap();
     assert_eq!(checked.sight.len(), 7, "rest and six claimed loads");
     for pose in &checked.sight {

@@ -8,6 +8,7 @@
 
 mod board;
 mod camera;
+mod electrical;
 mod geometry;
 mod known;
 mod making;
@@ -45,6 +46,9 @@ fn rules() -> impl Iterator<Item = &'static Rule> {
         platforms::OUTLINE,
         mount::POST_PLACES,
         platforms::LOWER,
+        electrical::CIRCUIT,
+        electrical::HEAT,
+        electrical::BOARD,
         pattern::RULES,
         making::TOOLS,
         making::EXACTNESS,

@@ -16,6 +16,7 @@
 mod accuracy;
 mod body;
 mod camera;
+mod electrical;
 mod light;
 mod loads;
 mod making;
@@ -36,6 +37,7 @@ use serde::{Deserialize, Serialize};
 pub use accuracy::AccuracySection;
 pub use body::{CameraBoardSection, CameraBodyKind, CameraBodySection, MIN_BEND_DIAMETERS};
 pub use camera::{CameraSection, ModelName, RuntimeSection};
+pub use electrical::{ElectricalSection, LedBoardSection, LedDrive, ValueRgbw};
 pub use light::{DiffuserSection, ExposureSection, PowerRgb, ReflectanceRgb};
 pub use loads::{CentroidNoiseSection, LoadClaim, LoadsSection, WhiteMarkersSection};
 pub use making::{

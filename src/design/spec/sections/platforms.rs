@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{DiffuserSection, PowerRgb, Why};
+use super::{DiffuserSection, ElectricalSection, PowerRgb, Why};
 
 /// The two printed platforms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -264,6 +264,8 @@ pub struct LedsSection {
     /// Diameter of the wire hole through the pit's floor, mm; 0 for none.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub wire_hole_diameter_mm: f64,
+    /// What drives the lights, how warm they get, and the board of one light.
+    pub electrical: ElectricalSection,
     /// Key of a part whose numbers stand for the fields that are left out here: `domecast list leds`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<String>,

@@ -142,8 +142,8 @@ fn the_sensor_is_lit_from_three_sides() {
     let field = dome.field();
     assert!(field.error() < 0.02, "{}", field.error());
     assert!(work.of(EffectName::PlatformShadow) > work.of(EffectName::DirectLight));
-    // Half way down, in the direction of each light, its colour is the strongest.
-    for (light, azimuth_deg) in [0.0_f64, 120.0, 240.0].into_iter().enumerate() {
+    // Half way down, across from the lights of a colour, that colour is the strongest.
+    for (light, azimuth_deg) in [210.0_f64, 330.0, 90.0].into_iter().enumerate() {
         let aside = DVec2::from_angle(azimuth_deg.to_radians()) * 0.76;
         let seen = field.still(aside.extend(0.65).normalize().as_vec3a()).to_array();
         let strongest = (0..3).max_by(|a, b| seen[*a].total_cmp(&seen[*b])).unwrap();

@@ -22,7 +22,7 @@ pub(super) fn room_mm(m: &Measures) -> f64 {
 
 /// How far a hood's rim can stand above the pupil before it stands in the camera's view, mm, for measures of a hood that is
 /// higher than that; `None` where the view leaves room for any.
-pub(super) fn highest_rim_mm(m: &Measures) -> Option<f64> {
+pub fn highest_hood_rim_mm(m: &Measures) -> Option<f64> {
     let view = m.lower_view.as_ref()?;
     Some(view.highest_within(m.bore_radius_mm()) - m.pupil_mm().z)
 }

@@ -214,12 +214,6 @@ impl Measures {
         self.sensor_from_camera.translation
     }
 
-    /// How far above the pupil the rim of a hood may stand before it stands in the camera's view, mm; `None` where these are
-    /// not the measures of a hood that is too high.
-    pub fn highest_hood_rim_mm(&self) -> Option<f64> {
-        super::hood::highest_rim_mm(self)
-    }
-
     /// Height of the middle of the hood's rim, mm; `None` where there is no hood.
     pub fn hood_rim_z_mm(&self) -> Option<f64> {
         let hood = self.platforms.lower.hood?;

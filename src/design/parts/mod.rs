@@ -71,6 +71,7 @@ pub use checks::check_assembly;
 pub use error::{Cure, PartError};
 use feature::{Blueprint, Feature};
 pub use files::{PartFile, files};
+pub use hood::highest_hood_rim_mm;
 pub use image_rays::RayKind;
 pub use lip::HidingLip;
 pub use measures::Measures;

@@ -48,13 +48,13 @@ pub fn check_light_room(design: &Design, m: &Measures) -> Result<(), PartError> 
     let missing_mm = missing_pit_wall_mm(m);
     // the mesh has the last word where it is a matter of rounding
     if missing_mm > WALL_ROUNDING_MM {
-        let least_mm = m.process.min_wall_mm;
+        let min_mm = m.process.min_wall_mm;
         let place = "wall of an LED's pit".to_owned();
         return Err(infeasible(
             "upper_platform",
             place,
-            least_mm - missing_mm,
-            least_mm,
+            min_mm - missing_mm,
+            min_mm,
             "leds.center_radius_mm",
         ));
     }

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::numbers::Percentiles;
-use super::optimize::{FrontPoint, Lights, Optimization};
+use super::optimize::{FrontPoint, LightsSummary, Optimization};
 use super::tilt::{COLORS, TiltStudy};
 use crate::chart::{Axis, Chart, INK, TextAlign};
 use crate::html::{Html, figure, html, table};
@@ -54,7 +54,7 @@ pub(super) fn search(searched: &Optimization) -> Html {
         columns.push("found");
         ends.push(best);
     }
-    let row = |name: &str, cell: &dyn Fn(&Lights) -> String| -> Vec<Html> {
+    let row = |name: &str, cell: &dyn Fn(&LightsSummary) -> String| -> Vec<Html> {
         std::iter::once(Html::from(name)).chain(ends.iter().map(|lights| Html::from(cell(lights)))).collect()
     };
     let rows = vec![

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::choices::{Arrangement, DiffuserKind, diffuser_fields};
 use super::score::{ComparedLight, LightScore};
 use crate::light::scene;
-use domecast_design::parts::{HidingLip, Measures, PartError, check_light_room};
+use domecast_design::parts::{HidingLip, Measures, PartError, check_light_room, highest_hood_rim_mm};
 use domecast_design::{Cure, Design, DesignError};
 use domecast_sim::Scene;
 use domecast_sim::light::LightUse;
@@ -52,7 +52,7 @@ impl LightPlace {
 
 /// What is the same for a whole search.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Choice {
+pub struct LightChoice {
     /// Lights of each colour.
     pub arrangement: Arrangement,
     /// The diffuser.
@@ -123,7 +123,7 @@ impl<'a> Given<'a> {
     ///
     /// # Errors
     /// How far the lights are from what can be.
-    pub fn candidate(&self, choice: &Choice, place: LightPlace) -> Result<Candidate, Violation> {
+    pub fn candidate(&self, choice: &LightChoice, place: LightPlace) -> Result<Candidate, Violation> {
         let mut changes = self.changes(choice, place);
         let resolve = |changes: &[Cure]| {
             let design = self.design.with_changes(changes);
@@ -158,14 +158,14 @@ impl<'a> Given<'a> {
     ///
     /// # Errors
     /// As [`Given::candidate`].
-    pub fn design_of(&self, choice: &Choice, place: LightPlace) -> Result<Design, Violation> {
+    pub fn design_of(&self, choice: &LightChoice, place: LightPlace) -> Result<Design, Violation> {
         let made = self.candidate(choice, place)?;
         let design = self.design.with_changes(&made.changes);
         design.map_err(|_| Violation { stage: Violation::UNRESOLVED, missing: f64::MAX })
     }
 
     /// The fields that a choice and a place set, and those that then follow from rules.
-    fn changes(&self, choice: &Choice, place: LightPlace) -> Vec<Cure> {
+    fn changes(&self, choice: &LightChoice, place: LightPlace) -> Vec<Cure> {
         let leds = &self.design.sections().leds;
         let mut changes = vec![
             change("leds.center_radius_mm", json!(place.center_radius_mm)),
@@ -290,7 +290,7 @@ fn hood_for(design: &Design) -> Option<Value> {
     let tall_mm = -design.sensor_from_camera().translation_mm.z;
     let hood = |rim_mm: f64| json!({ "rim_from_pupil_mm": rim_mm, "wall_mm": wall_mm, "gap_mm": 0.5 });
     let with = design.with_changes(&[change("platforms.lower.hood", hood(tall_mm))]).ok()?;
-    let highest = Measures::of(&with).ok()?.highest_hood_rim_mm()?;
+    let highest = highest_hood_rim_mm(&Measures::of(&with).ok()?)?;
     let rim_mm = (100.0 * highest - 1.0).floor() / 100.0;
     (rim_mm > sections.camera_body.front_from_pupil_mm + wall_mm).then(|| hood(rim_mm))
 }

@@ -65,7 +65,7 @@ pub fn diffusers(design: &Design) -> Vec<DiffuserKind> {
 /// How the lights of a colour stand round the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Spread {
+pub enum ArcSpread {
     /// As the design has them.
     AsGiven,
     /// Evenly on an arc about the colour's azimuth.
@@ -80,7 +80,7 @@ pub struct Arrangement {
     /// Lights of each colour.
     pub per_color: usize,
     /// How they stand.
-    pub spread: Spread,
+    pub spread: ArcSpread,
 }
 
 /// A colour's lights at most.
@@ -91,18 +91,18 @@ impl Arrangement {
     pub fn all(design: &Design) -> Vec<Self> {
         let list = &design.sections().leds.list;
         let given = list.len() / 3;
-        let mut found = vec![Self { per_color: given, spread: Spread::AsGiven }];
+        let mut found = vec![Self { per_color: given, spread: ArcSpread::AsGiven }];
         if list.iter().any(|led| led.color == LedColor::White) || azimuths_deg(list).contains(&None) {
             return found;
         }
         for per_color in 1..=MAX_PER_COLOR {
             match per_color {
                 1 if given == 1 => {}
-                1 => found.push(Self { per_color, spread: Spread::AboutMiddle }),
+                1 => found.push(Self { per_color, spread: ArcSpread::AboutMiddle }),
                 2 => found.extend(
-                    [Spread::AboutMiddle, Spread::FromFirst].map(|spread| Self { per_color, spread }),
+                    [ArcSpread::AboutMiddle, ArcSpread::FromFirst].map(|spread| Self { per_color, spread }),
                 ),
-                _ => found.push(Self { per_color, spread: Spread::AboutMiddle }),
+                _ => found.push(Self { per_color, spread: ArcSpread::AboutMiddle }),
             }
         }
         found
@@ -110,20 +110,20 @@ impl Arrangement {
 
     /// Whether the arc is searched.
     pub fn has_arc(&self) -> bool {
-        self.spread != Spread::AsGiven && self.per_color > 1
+        self.spread != ArcSpread::AsGiven && self.per_color > 1
     }
 
     /// The lights, of which the outermost of a colour stand `half_arc_deg` off their middle.
     pub fn list(&self, design: &Design, half_arc_deg: f64) -> Vec<LedSection> {
         let given = &design.sections().leds.list;
-        if self.spread == Spread::AsGiven {
+        if self.spread == ArcSpread::AsGiven {
             return given.clone();
         }
         let colors = [LedColor::Red, LedColor::Green, LedColor::Blue];
         let middles = azimuths_deg(given);
         let of_color = |(color, middle): (LedColor, Option<f64>)| {
             let middle =
-                middle.unwrap_or(0.0) + if self.spread == Spread::FromFirst { half_arc_deg } else { 0.0 };
+                middle.unwrap_or(0.0) + if self.spread == ArcSpread::FromFirst { half_arc_deg } else { 0.0 };
             let count = self.per_color;
             (0..count).map(move |k| {
                 let share = if count > 1 { 2.0 * k as f64 / (count - 1) as f64 - 1.0 } else { 0.0 };

@@ -1,9 +1,11 @@
 //! A search for better lights of a design: where they stand, how they lean, how many they are, what diffuses them. What
 //! follows from them (lip, underside of the platform) follows by the design's own rules, and the build's own checks judge.
 
+mod axes;
 mod candidate;
 mod choices;
 mod cma;
+mod options;
 mod outcome;
 mod proposal;
 mod score;
@@ -14,9 +16,10 @@ use std::fmt;
 use serde_json::json;
 
 pub use candidate::LightPlace;
-pub use choices::{Arrangement, Spread};
+pub use choices::{ArcSpread, Arrangement};
 pub(super) use choices::{DiffuserKind, diffusers};
-pub use outcome::{FieldChange, FrontPoint, Lights, OptimizationReport, Sensitivity};
+pub use options::SearchOptions;
+pub use outcome::{FieldChange, FrontPoint, LightsSummary, OptimizationReport, Sensitivity};
 pub(super) use score::ComparedLight;
 pub use score::LightScore;
 pub use search::SearchStatus;
@@ -28,48 +31,6 @@ use candidate::{Given, score_of};
 use domecast_design::{Design, DesignError};
 use search::{Looked, Search};
 
-/// What is searched for, and how long.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SearchOptions {
-    /// Polar angle to which the error of normals counts, degrees.
-    pub polar_angle_deg: f64,
-    /// How many lights are looked at, at most.
-    pub evaluations: usize,
-    /// Seed of the search.
-    pub seed: u64,
-}
-
-impl Default for SearchOptions {
-    fn default() -> Self {
-        Self { polar_angle_deg: 60.0, evaluations: 500, seed: 1 }
-    }
-}
-
-impl SearchOptions {
-    /// Whether these make a search.
-    ///
-    /// # Errors
-    /// A search without a look, or of no part of a dome.
-    pub fn check(&self) -> Result<(), DesignError> {
-        let polar_deg = self.polar_angle_deg;
-        if !(polar_deg > 0.0 && polar_deg <= 90.0) {
-            let problem = "no part of the dome would count";
-            return Err(DesignError::at("--polar-angle-deg", polar_deg, problem, "above 0, up to 90"));
-        }
-        if self.evaluations < MIN_EVALUATIONS {
-            return Err(DesignError::at(
-                "--evaluations",
-                self.evaluations,
-                "so few lights are no search",
-                format!("at least {MIN_EVALUATIONS}; 500 take some half a minute"),
-            ));
-        }
-        Ok(())
-    }
-}
-
-/// Fewer looks than a generation and the diffusers take find nothing.
-const MIN_EVALUATIONS: usize = 20;
 /// A proposal must be better by this part in `illuminate`'s own numbers.
 const MIN_GAIN: f64 = 0.005;
 

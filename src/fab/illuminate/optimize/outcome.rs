@@ -5,18 +5,18 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::SearchOptions;
-use super::candidate::{Choice, Given, LightPlace, height_mm, score_of};
+use super::candidate::{Given, LightChoice, LightPlace, height_mm, score_of};
 use super::choices::{Arrangement, diffuser_fields, diffusers};
+use super::options::SearchOptions;
 use super::score::LightScore;
-use super::search::{Found, Looked, SearchStatus};
+use super::search::{FoundLights, Looked, SearchStatus};
 use crate::build::verify;
 use domecast_design::sections::{DiffuserSection, LedSection};
 use domecast_design::{Cure, Design, DesignError};
 
 /// The lights of a design.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Lights {
+pub struct LightsSummary {
     /// Where they stand.
     pub place: LightPlace,
     /// Height of the lip's top, mm.
@@ -110,9 +110,9 @@ pub struct OptimizationReport {
     /// Lights that went through the build's checks.
     pub verified: usize,
     /// The given design.
-    pub start: Lights,
+    pub start: LightsSummary,
     /// The proposal; null where nothing better can be made.
-    pub best: Option<Lights>,
+    pub best: Option<LightsSummary>,
     /// The changes that make the proposal of the given design.
     pub changes: Vec<FieldChange>,
     /// Error of normals of the best over that of the start, both as `illuminate` has them.
@@ -138,7 +138,7 @@ pub(super) struct Ends<'a> {
 pub(super) fn report(
     given: &Given<'_>,
     options: &SearchOptions,
-    found: &Found,
+    found: &FoundLights,
     ends: Ends<'_>,
 ) -> Result<OptimizationReport, DesignError> {
     let best = match (ends.proposal, &ends.best) {
@@ -158,7 +158,7 @@ pub(super) fn report(
         },
     );
     let ratio = ends.best_p95.zip(ends.start_p95).map(|(best, start)| best / start);
-    let arrangement = |(choice, best): &(Choice, Option<Looked>)| ArrangementResult {
+    let arrangement = |(choice, best): &(LightChoice, Option<Looked>)| ArrangementResult {
         arrangement: choice.arrangement,
         adds_hood: choice.adds_hood,
         normal_error_p95_deg_per_level: best
@@ -190,9 +190,9 @@ pub(super) fn report(
     })
 }
 
-fn lights(design: &Design, place: LightPlace, score: LightScore, p95: Option<f64>) -> Lights {
+fn lights(design: &Design, place: LightPlace, score: LightScore, p95: Option<f64>) -> LightsSummary {
     let sections = design.sections();
-    Lights {
+    LightsSummary {
         place,
         lip_top_z_mm: sections.leds.lip_top_z_mm,
         underside_z_mm: sections.platforms.upper.underside_z_mm,
@@ -205,13 +205,13 @@ fn lights(design: &Design, place: LightPlace, score: LightScore, p95: Option<f64
 }
 
 /// Points of the front at most: each costs a run of the build's checks.
-const MAX_FRONT: usize = 10;
+const MAX_FRONT: usize = 5;
 /// Points of the front differ by this part in noise or evenness at least.
 const APART: f64 = 0.02;
 
 /// The lights that no others beat in everything, thinned, as far as the build's checks let them pass; the least noise first.
-fn front(given: &Given<'_>, found: &Found) -> Vec<FrontPoint> {
-    let point = |one: &Looked| -> Option<(FrontPoint, Choice)> {
+fn front(given: &Given<'_>, found: &FoundLights) -> Vec<FrontPoint> {
+    let point = |one: &Looked| -> Option<(FrontPoint, LightChoice)> {
         let score = one.score.as_ref()?;
         Some((
             FrontPoint {
@@ -227,9 +227,10 @@ fn front(given: &Given<'_>, found: &Found) -> Vec<FrontPoint> {
             one.choice,
         ))
     };
-    let all: Vec<(FrontPoint, Choice)> = found.feasible.iter().chain(&found.best).filter_map(point).collect();
-    let mut kept: Vec<(FrontPoint, Choice)> = Vec::new();
-    let mut free: Vec<&(FrontPoint, Choice)> =
+    let all: Vec<(FrontPoint, LightChoice)> =
+        found.feasible.iter().chain(&found.best).filter_map(point).collect();
+    let mut kept: Vec<(FrontPoint, LightChoice)> = Vec::new();
+    let mut free: Vec<&(FrontPoint, LightChoice)> =
         all.iter().filter(|one| !all.iter().any(|other| other.0.dominates(&one.0))).collect();
     free.sort_by(|a, b| a.0.normal_error_p95_deg_per_level.total_cmp(&b.0.normal_error_p95_deg_per_level));
     for one in free {
@@ -240,11 +241,11 @@ fn front(given: &Given<'_>, found: &Found) -> Vec<FrontPoint> {
     // evenly thinned, the first and the last kept
     let last = kept.len().saturating_sub(1);
     let step = (last as f64 / (MAX_FRONT - 1) as f64).max(1.0);
-    let thinned: Vec<(FrontPoint, Choice)> = (0..MAX_FRONT)
+    let thinned: Vec<(FrontPoint, LightChoice)> = (0..MAX_FRONT)
         .map(|k| (step * k as f64).round() as usize)
         .filter_map(|index| kept.get(index).cloned())
         .collect();
-    let passes = |(point, choice): &(FrontPoint, Choice)| {
+    let passes = |(point, choice): &(FrontPoint, LightChoice)| {
         given.design_of(choice, point.place).is_ok_and(|design| verify(&design).is_ok())
     };
     let checked: Vec<bool> = thinned.par_iter().map(passes).collect();

@@ -2,8 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
-use super::SearchOptions;
 use super::candidate::Candidate;
+use super::options::SearchOptions;
 use crate::numbers::significant;
 use domecast_design::sections::Why;
 use domecast_design::{Cure, Design, DesignError};

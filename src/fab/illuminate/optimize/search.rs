@@ -6,13 +6,13 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::SearchOptions;
-use super::candidate::{Choice, Given, LightPlace, Violation};
+use super::axes::{Axes, neighbours};
+use super::candidate::{Given, LightChoice, LightPlace, Violation};
 use super::choices::{Arrangement, DiffuserKind, diffusers};
 use super::cma::{Cma, SearchPoint};
+use super::options::SearchOptions;
 use super::score::LightScore;
 use crate::build::verify;
-use domecast_design::Design;
 use domecast_optics::numeric::SeededRandom;
 use domecast_sim::light::lobe::Lobe;
 use domecast_sim::light::setup;
@@ -24,7 +24,7 @@ const NARROW: f64 = 0.02;
 
 /// A candidate must be better than the best by this part to be worth the build's checks: while the search is broad, and when
 /// it refines.
-const WORTH_BROAD: f64 = 0.02;
+const WORTH_BROAD: f64 = 0.05;
 const WORTH_NARROW: f64 = 1e-3;
 /// Half arcs at which an arrangement is first tried, degrees.
 const FIRST_ARCS_DEG: [f64; 3] = [15.0, 30.0, 40.0];
@@ -53,7 +53,7 @@ pub enum SearchStatus {
 #[derive(Debug, Clone)]
 pub struct Looked {
     /// What they were made of.
-    pub choice: Choice,
+    pub choice: LightChoice,
     /// Where they stand.
     pub place: LightPlace,
     /// How good they are; `None` where that was not found out.
@@ -91,13 +91,13 @@ impl Looked {
 
 /// What a search found.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct FoundLights {
     /// The best that the build's checks let pass.
     pub best: Option<Looked>,
     /// All that nothing is known against, in the order in which they were looked at.
     pub feasible: Vec<Looked>,
     /// The best of each arrangement, with and without a hood, where it fits.
-    pub arrangements: Vec<(Choice, Option<Looked>)>,
+    pub arrangements: Vec<(LightChoice, Option<Looked>)>,
     /// How many lights were looked at.
     pub evaluations: usize,
     /// How many of them went through the build's checks.
@@ -114,7 +114,7 @@ pub struct Search<'a> {
     is_stopped: &'a dyn Fn() -> bool,
     start_objective: f64,
     lobes: Vec<(DiffuserKind, Lobe)>,
-    found: Found,
+    found: FoundLights,
 }
 
 impl<'a> Search<'a> {
@@ -132,7 +132,7 @@ impl<'a> Search<'a> {
             leds.diffuser = kind.diffuser;
             (kind, setup::lobe(&leds))
         };
-        let found = Found {
+        let found = FoundLights {
             best: None,
             feasible: Vec::new(),
             arrangements: Vec::new(),
@@ -145,19 +145,19 @@ impl<'a> Search<'a> {
     }
 
     /// Searches until it converges, the evaluations are used up, or it is stopped.
-    pub fn run(mut self) -> Found {
+    pub fn run(mut self) -> FoundLights {
         let start = LightPlace::of(self.given.design);
         let arrangements = Arrangement::all(self.given.design);
-        let own = Choice { arrangement: arrangements[0], diffuser: self.lobes[0].0, adds_hood: false };
+        let own = LightChoice { arrangement: arrangements[0], diffuser: self.lobes[0].0, adds_hood: false };
         let diffuser = self.best_diffuser(own, start).unwrap_or(own.diffuser);
-        let mut starts = vec![(Choice { diffuser, ..own }, start)];
+        let mut starts = vec![(LightChoice { diffuser, ..own }, start)];
         let rim_mm = self.given.design.sections().dome.shape().rim_radius_mm();
         for adds_hood in [false, true].into_iter().filter(|adds| !adds || self.given.takes_hood()) {
             let skipped = usize::from(!adds_hood);
             // behind a hood lights may stand deeper
             let depths: &[f64] = if adds_hood { &FIRST_DEPTHS } else { &[0.0] };
             for arrangement in arrangements.iter().copied().skip(skipped) {
-                let choice = Choice { arrangement, diffuser, adds_hood };
+                let choice = LightChoice { arrangement, diffuser, adds_hood };
                 let arcs: &[f64] = if arrangement.has_arc() { &FIRST_ARCS_DEG } else { &[0.0] };
                 let at = |depth: &f64, arc: &f64| LightPlace {
                     half_arc_deg: *arc,
@@ -165,7 +165,7 @@ impl<'a> Search<'a> {
                     ..start
                 };
                 let places = depths.iter().flat_map(|depth| arcs.iter().map(move |arc| at(depth, arc)));
-                let tried: Vec<(Choice, LightPlace)> =
+                let tried: Vec<(LightChoice, LightPlace)> =
                     places.map(|place| (choice, place.rounded())).collect();
                 let looked = self.look(&tried, f64::INFINITY);
                 let first = looked.into_iter().min_by(Looked::order).filter(|one| one.violation.is_none());
@@ -191,11 +191,11 @@ impl<'a> Search<'a> {
     }
 
     /// The diffuser that is best at a place.
-    fn best_diffuser(&mut self, choice: Choice, place: LightPlace) -> Option<DiffuserKind> {
-        let tried: Vec<(Choice, LightPlace)> = self
+    fn best_diffuser(&mut self, choice: LightChoice, place: LightPlace) -> Option<DiffuserKind> {
+        let tried: Vec<(LightChoice, LightPlace)> = self
             .lobes
             .iter()
-            .map(|(diffuser, _)| (Choice { diffuser: *diffuser, ..choice }, place))
+            .map(|(diffuser, _)| (LightChoice { diffuser: *diffuser, ..choice }, place))
             .collect();
         let looked = self.look(&tried, WORTH_BROAD);
         let can_be = looked.into_iter().filter(|one| one.violation.is_none());
@@ -206,7 +206,7 @@ impl<'a> Search<'a> {
     fn refine(&mut self) {
         let Some(best) = self.found.best.clone() else { return };
         let diffuser = self.best_diffuser(best.choice, best.place).unwrap_or(best.choice.diffuser);
-        let choice = Choice { diffuser, ..best.choice };
+        let choice = LightChoice { diffuser, ..best.choice };
         let left = self.options.evaluations.saturating_sub(self.found.evaluations);
         self.descend(choice, best.place, 0.3, left / 2, 100);
         let mut level = 0;
@@ -214,10 +214,12 @@ impl<'a> Search<'a> {
             if self.is_over() {
                 return;
             }
-            let tried: Vec<(Choice, LightPlace)> =
-                neighbours(&best, *steps).into_iter().map(|place| (best.choice, place)).collect();
+            let tried: Vec<(LightChoice, LightPlace)> =
+                neighbours(best.place, best.choice.arrangement.has_arc(), *steps)
+                    .into_iter()
+                    .map(|place| (best.choice, place))
+                    .collect();
             self.look(&tried, WORTH_NARROW);
-            self.verify_known();
             let is_better = self.found.best.as_ref().is_some_and(|now| now.objective() < best.objective());
             if !is_better {
                 level += 1;
@@ -235,7 +237,14 @@ impl<'a> Search<'a> {
     }
 
     /// CMA-ES from a place, with so many evaluations at most.
-    fn descend(&mut self, choice: Choice, from: LightPlace, sigma: f64, evaluations: usize, stream: u64) {
+    fn descend(
+        &mut self,
+        choice: LightChoice,
+        from: LightPlace,
+        sigma: f64,
+        evaluations: usize,
+        stream: u64,
+    ) {
         let axes = Axes::of(self.given.design, choice.arrangement.has_arc(), from);
         let random = SeededRandom::stream(self.options.seed, stream);
         let mut cma = Cma::new(DVector::zeros(axes.count()), sigma, POPULATION, random);
@@ -243,7 +252,8 @@ impl<'a> Search<'a> {
         while self.found.evaluations + POPULATION <= until && cma.width() > NARROW && !self.is_over() {
             let points = cma.ask();
             let places: Vec<(LightPlace, f64)> = points.iter().map(|point| axes.place(point)).collect();
-            let tried: Vec<(Choice, LightPlace)> = places.iter().map(|(place, _)| (choice, *place)).collect();
+            let tried: Vec<(LightChoice, LightPlace)> =
+                places.iter().map(|(place, _)| (choice, *place)).collect();
             let mut looked = self.look(&tried, WORTH_BROAD);
             for (one, (_, outside)) in looked.iter_mut().zip(places) {
                 one.outside = outside;
@@ -257,7 +267,7 @@ impl<'a> Search<'a> {
 
     /// Looks at lights, in parallel; the best of those that are better than the best by a part of `worth` is verified: none where
     /// that is infinite.
-    fn look(&mut self, tried: &[(Choice, LightPlace)], worth: f64) -> Vec<Looked> {
+    fn look(&mut self, tried: &[(LightChoice, LightPlace)], worth: f64) -> Vec<Looked> {
         let room = self.options.evaluations.saturating_sub(self.found.evaluations);
         let tried = tried.get(..tried.len().min(room)).unwrap_or_default();
         let (given, options, lobes) = (self.given, self.options, &self.lobes);
@@ -333,7 +343,7 @@ impl<'a> Search<'a> {
 fn look_at(
     given: &Given<'_>,
     options: &SearchOptions,
-    (choice, place): (Choice, LightPlace),
+    (choice, place): (LightChoice, LightPlace),
     lobe: Option<&Lobe>,
 ) -> Looked {
     let mut looked =
@@ -348,78 +358,4 @@ fn look_at(
     };
     looked.violation = judge().err();
     looked
-}
-
-/// Places one step away along each axis.
-fn neighbours(best: &Looked, [step_mm, step_deg]: [f64; 2]) -> Vec<LightPlace> {
-    let at = best.place;
-    let mut found = Vec::new();
-    for sign in [1.0, -1.0] {
-        let (mm, deg) = (sign * step_mm, sign * step_deg);
-        found.push(LightPlace { center_radius_mm: at.center_radius_mm + mm, ..at });
-        found.push(LightPlace { center_z_mm: at.center_z_mm + mm, ..at });
-        found.push(LightPlace { tilt_deg: (at.tilt_deg + deg).clamp(MIN_TILT_DEG, MAX_TILT_DEG), ..at });
-        // along the wall of the view and along the sheet's underside, where the best mostly lies
-        found.push(LightPlace {
-            center_radius_mm: at.center_radius_mm + mm,
-            center_z_mm: at.center_z_mm + mm,
-            ..at
-        });
-        found.push(LightPlace {
-            center_radius_mm: at.center_radius_mm + mm,
-            center_z_mm: at.center_z_mm - mm,
-            ..at
-        });
-        if best.choice.arrangement.has_arc() {
-            found.push(LightPlace { half_arc_deg: (at.half_arc_deg + deg).max(0.0), ..at });
-        }
-    }
-    found.into_iter().map(LightPlace::rounded).filter(|place| *place != at.rounded()).collect()
-}
-
-/// What the schema allows of `leds.tilt_deg`.
-const MIN_TILT_DEG: f64 = 30.0;
-const MAX_TILT_DEG: f64 = 90.0;
-const MAX_ARC_DEG: f64 = 55.0;
-
-/// The coordinates of a search: place over a length of the sensor, angles over some degrees, about where it begins.
-struct Axes {
-    from: [f64; 4],
-    scale: [f64; 4],
-    low: [f64; 4],
-    high: [f64; 4],
-    has_arc: bool,
-}
-
-impl Axes {
-    fn of(design: &Design, has_arc: bool, from: LightPlace) -> Self {
-        let sections = design.sections();
-        let rim_mm = sections.dome.shape().rim_radius_mm();
-        let [x, y] = sections.platforms.outer_mm;
-        let sheet_mm = design.sheet_underside_z_mm();
-        Self {
-            from: [from.center_radius_mm, from.center_z_mm, from.tilt_deg, from.half_arc_deg],
-            scale: [0.05 * rim_mm, 0.05 * rim_mm, 8.0, 6.0],
-            low: [0.3 * rim_mm, sheet_mm - 2.0 * rim_mm, MIN_TILT_DEG, 0.0],
-            high: [0.5 * x.max(y), sheet_mm, MAX_TILT_DEG, MAX_ARC_DEG],
-            has_arc,
-        }
-    }
-
-    fn count(&self) -> usize {
-        if self.has_arc { 4 } else { 3 }
-    }
-
-    /// The place of a point within the bounds, and how far outside it lay.
-    fn place(&self, point: &SearchPoint) -> (LightPlace, f64) {
-        let mut outside = 0.0_f64;
-        let value: [f64; 4] = std::array::from_fn(|i| {
-            let wanted = self.from[i] + self.scale[i] * point.get(i).copied().unwrap_or(0.0);
-            let kept = wanted.clamp(self.low[i].min(self.from[i]), self.high[i].max(self.from[i]));
-            outside = outside.hypot((wanted - kept) / self.scale[i]);
-            kept
-        });
-        let [center_radius_mm, center_z_mm, tilt_deg, half_arc_deg] = value;
-        (LightPlace { center_radius_mm, center_z_mm, tilt_deg, half_arc_deg }.rounded(), outside)
-    }
 }

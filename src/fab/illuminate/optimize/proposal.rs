@@ -32,7 +32,8 @@ pub fn explained(
         significant(after),
         significant(before),
     );
-    let lip = "choice: as low as hides the lights from the lens at every position of the springs";
+    let lip = "choice: as low as hides the lights from the lens at every position of the springs, by `domecast illuminate \
+               --optimize`";
     let underside = "choice: the underside lies as deep as its rule asks for below the lights that `domecast illuminate \
                      --optimize` found";
     let mut changes = made.changes.clone();

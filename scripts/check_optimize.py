@@ -115,8 +115,8 @@ def refusals(domecast, design, work):
     """Each way to ask for nothing is named."""
     tree = json.loads(design.read_text())
     blind = work / "no-blue.json"
-    blind.write_text(json.dumps({**tree, "leds": {**tree["leds"], "list": [
-        led for led in tree["leds"]["list"] if led["color"] != "blue"]}}))
+    two = [{"color": "red", "azimuth_deg": 0}, {"color": "green", "azimuth_deg": 120}]
+    blind.write_text(json.dumps({**tree, "leds": {**tree.get("leds", {}), "list": two}}))
     wanted = [
         (design, ["--evaluations", 0], "--evaluations"),
         (design, ["--polar-angle-deg", 0], "--polar-angle-deg"),

@@ -48,7 +48,7 @@ pub use error::{ForeignEntries, WriteError};
 pub use marker::{MARKER_NAME, list_files, marked_files};
 pub use place::OutputRules;
 use place::{Kind, Place};
-pub use recovery::{recover, tidy_on_signals};
+pub use recovery::{StopWish, recover, tidy_on_signals};
 use staging::Staging;
 
 fn stage(out: &Path, kind: Kind, command: &str, rules: &OutputRules<'_>) -> Result<Staging, WriteError> {

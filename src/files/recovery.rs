@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 
 use super::staging::{PREFIX, recover_one};
 
@@ -44,6 +46,35 @@ fn levels_of(path: &Path, levels: usize) -> Vec<PathBuf> {
     full.ancestors().take(levels).map(Path::to_path_buf).collect()
 }
 
+/// Whether an interrupt is taken as a wish to stop soon, and whether one came.
+static IS_HEEDED: AtomicBool = AtomicBool::new(false);
+static IS_WISHED: AtomicBool = AtomicBool::new(false);
+
+/// While it lives, the first interrupt (Ctrl-C) after [`tidy_on_signals`] ends nothing: the work is to look whether it came,
+/// and to end with what it has. The second ends the program as ever.
+#[derive(Debug)]
+pub struct StopWish(());
+
+impl StopWish {
+    /// From now on.
+    pub fn heed() -> Self {
+        IS_WISHED.store(false, Relaxed);
+        IS_HEEDED.store(true, Relaxed);
+        Self(())
+    }
+
+    /// Whether an interrupt came.
+    pub fn came(&self) -> bool {
+        IS_WISHED.load(Relaxed)
+    }
+}
+
+impl Drop for StopWish {
+    fn drop(&mut self) {
+        IS_HEEDED.store(false, Relaxed);
+    }
+}
+
 /// From now on an interrupt (Ctrl-C) or a request to terminate first removes the results that are being made. For the
 /// program: a library that took its user's signals would surprise them.
 ///
@@ -55,7 +86,10 @@ pub fn tidy_on_signals() {
         use signal_hook::iterator::Signals;
         let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
         std::thread::spawn(move || {
-            if let Some(signal) = signals.forever().next() {
+            let is_wish = |signal: &i32| *signal == SIGINT && IS_HEEDED.load(Relaxed);
+            if let Some(signal) =
+                signals.forever().find(|signal| !(is_wish(signal) && !IS_WISHED.swap(true, Relaxed)))
+            {
                 super::staging::abandon_all();
                 // ends the process as the signal would have, so that a shell sees it
                 let _ = signal_hook::low_level::emulate_default_handler(signal);

@@ -76,13 +76,15 @@ enum Command {
         quick: bool,
     },
     /// Show the light on the dome of a design as it stands: each colour's irradiance, how even it is, and what error of a
-    /// normal one grey level makes, as maps on the dome and in the image.
+    /// normal one grey level makes, as maps on the dome and in the image; and search for better lights.
     Illuminate {
         /// The design file.
         design: PathBuf,
         /// Where to write [default: output/<design name>-light].
         #[arg(long)]
         out: Option<PathBuf>,
+        #[command(flatten)]
+        search: illuminate::LightSearch,
     },
     /// Write a starting design, and the schema for editors beside it: with a radius, one of your own that leaves the rest
     /// to rules; without, one in which every field has its reason.
@@ -285,7 +287,9 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::Accuracy { design, scene, out, quick } => {
             accuracy::run(output, design, scene.as_deref(), out.as_deref(), *quick)
         }
-        Command::Illuminate { design, out } => illuminate::run(output, design, out.as_deref()),
+        Command::Illuminate { design, out, search } => {
+            illuminate::run(output, design, out.as_deref(), search)
+        }
         Command::New { name, scene: Some(design), out, .. } => {
             new_scene::run(output, name, design, out.as_deref())
         }

@@ -209,7 +209,7 @@ fn boards(m: &Measures, upper: &RayTarget, found: &mut Vec<PartError>) {
         let front = leds.diffuser_thickness_mm + leds.clearance_mm;
         let far = front + m.process.min_wall_mm + skin;
         if !upper.is_hit(place(foot), place(foot + DVec3::Z * far)) {
-            let needed = behind_lip_mm(m).max(leds.center_radius_mm + 0.05);
+            let needed = behind_lip_mm(m, leds.lip_top_z_mm).max(leds.center_radius_mm + 0.05);
             let cure = Cure::length("leds.center_radius_mm", leds.center_radius_mm, needed);
             let names = [format!("LED {i}"), "upper_platform".to_owned()];
             let problem = "no lip stands before the package's foot: distance of its face from the axis";
@@ -219,10 +219,10 @@ fn boards(m: &Measures, upper: &RayTarget, found: &mut Vec<PartError>) {
     }
 }
 
-/// Distance from the axis at which an LED's face has a lip before it, mm.
-pub(super) fn behind_lip_mm(m: &Measures) -> f64 {
+/// Distance from the axis at which an LED's face has a lip of a height before it, mm.
+pub(super) fn behind_lip_mm(m: &Measures, lip_top_z_mm: f64) -> f64 {
     let front = m.leds.diffuser_thickness_mm + m.leds.clearance_mm;
-    m.view.radius_mm(m.leds.lip_top_z_mm) + m.process.min_wall_mm + front
+    m.view.radius_mm(lip_top_z_mm).max(super::hood::room_mm(m)) + m.process.min_wall_mm + front
 }
 
 /// A straight way for the driver from outside to each set screw.

@@ -346,7 +346,7 @@ impl Scene {
                     let lip = m.leds.lip_top_z_mm;
                     let fault = infeasible("upper_platform", place, lip, lip + h, "leds.lip_top_z_mm");
                     // Without a lip before it no height of the lip hides it.
-                    let (radius_mm, needed_mm) = (m.leds.center_radius_mm, behind_lip_mm(m));
+                    let (radius_mm, needed_mm) = (m.leds.center_radius_mm, behind_lip_mm(m, lip));
                     if radius_mm < needed_mm {
                         let cure = Cure::length("leds.center_radius_mm", radius_mm, needed_mm);
                         return Err(PartError::Cured { fault: Box::new(fault), cure });

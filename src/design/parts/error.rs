@@ -94,6 +94,18 @@ pub enum PartError {
 }
 
 impl PartError {
+    /// By how much the worst of the faults that are lengths misses its limit, mm; 0 where none is one.
+    pub fn missing_mm(&self) -> f64 {
+        match self {
+            Self::Infeasible { value_mm, limit_mm, .. } | Self::Unheld { value_mm, limit_mm, .. } => {
+                (value_mm - limit_mm).abs()
+            }
+            Self::Cured { fault, .. } => fault.missing_mm(),
+            Self::Several(faults) => faults.iter().map(Self::missing_mm).fold(0.0, f64::max),
+            _ => 0.0,
+        }
+    }
+
     /// One error of all: nothing if there is none.
     ///
     /// # Errors

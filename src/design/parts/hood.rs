@@ -14,6 +14,19 @@ pub(super) fn outer_mm(m: &Measures) -> Option<f64> {
     m.platforms.lower.hood.map(|hood| m.bore_radius_mm() + hood.wall_mm)
 }
 
+/// Radius of what the upper platform leaves open round it at rest, mm; 0 where there is no hood.
+pub(super) fn room_mm(m: &Measures) -> f64 {
+    let (Some(hood), Some(outer)) = (&m.platforms.lower.hood, outer_mm(m)) else { return 0.0 };
+    outer + hood.gap_mm + m.pupil_mm().truncate().length()
+}
+
+/// How far a hood's rim can stand above the pupil before it stands in the camera's view, mm, for measures of a hood that is
+/// higher than that; `None` where the view leaves room for any.
+pub fn highest_hood_rim_mm(m: &Measures) -> Option<f64> {
+    let view = m.lower_view.as_ref()?;
+    Some(view.highest_within(m.bore_radius_mm()) - m.pupil_mm().z)
+}
+
 /// Adds the tube to the lower platform.
 ///
 /// # Errors

@@ -48,6 +48,13 @@ pub(super) fn check(m: &Measures) -> Result<(), PartError> {
     Err(PartError::Cured { fault: Box::new(fault), cure: Cure::length(RIM, from, to) })
 }
 
+/// Whether a straight way into the lens goes through the hood's wall: whether it comes into the bore below the rim.
+pub(super) fn hides(m: &Measures, camera_from_platform: &DAffine3, from: DVec3, lens: DVec3) -> bool {
+    m.platforms.lower.hood.is_some_and(|hood| {
+        over_rim_mm(camera_from_platform, [from, lens], m.bore_radius_mm()) < hood.rim_from_pupil_mm
+    })
+}
+
 /// Places of the sheet's underside below the dome's foot.
 fn under_dome(m: &Measures) -> impl Iterator<Item = DVec3> + use<> {
     let (rim, z) = (m.dome.rim_radius_mm(), m.seat_z_mm());

@@ -1,12 +1,17 @@
 //! Everything that is checked of the assembled sensor, with all faults in one answer.
 
+use super::error::infeasible;
+use super::pits::missing_pit_wall_mm;
 use super::traced::{PoseSight, trace_sight};
 use super::{
-    Assembly, Measures, Part, PartError, bearing, board_seat, build, check_assembly, mount, openings, seats,
-    trial,
+    Assembly, Measures, Part, PartError, bearing, board_seat, build, check_assembly, light_ways, mount,
+    openings, seats, trial,
 };
 use crate::layout::{Dot, PrintPass};
 use crate::spec::{Design, DesignWarning};
+
+/// What a wall may miss by rounding, mm.
+const WALL_ROUNDING_MM: f64 = 1e-3;
 
 /// What the checks of a sound sensor found.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +38,28 @@ pub fn build_seated(design: &Design, m: &Measures, passes: &[PrintPass]) -> Resu
     }
     PartError::all(faults)?;
     made
+}
+
+/// Looks at the seats, the hood and the pits' walls, before any part is made: what most changes of the lights fail at.
+///
+/// # Errors
+/// The first of their faults.
+pub fn check_light_room(design: &Design, m: &Measures) -> Result<(), PartError> {
+    let missing_mm = missing_pit_wall_mm(m);
+    // the mesh has the last word where it is a matter of rounding
+    if missing_mm > WALL_ROUNDING_MM {
+        let min_mm = m.process.min_wall_mm;
+        let place = "wall of an LED's pit".to_owned();
+        return Err(infeasible(
+            "upper_platform",
+            place,
+            min_mm - missing_mm,
+            min_mm,
+            "leds.center_radius_mm",
+        ));
+    }
+    PartError::all(seats::faults(design, m))?;
+    light_ways::check(m)
 }
 
 /// The faults of [`build_seated`], each that names fields and no change with the first change that was tried and helps.

@@ -79,13 +79,24 @@ impl Design {
     /// # Errors
     /// The faults of the changed design; a field that cannot be set.
     pub fn changed(&self, change: &Cure) -> Result<Self, DesignError> {
-        let fault = |problem: &str| DesignError::at(change.field.clone(), &change.value, problem, "a field");
+        self.with_changes(std::slice::from_ref(change))
+    }
+
+    /// The design with fields changed one after another; a value of null leaves its field to the rules. The text of what
+    /// comes out is a file that says the same.
+    ///
+    /// # Errors
+    /// The faults of the changed design; a field that cannot be set.
+    pub fn with_changes(&self, changes: &[Cure]) -> Result<Self, DesignError> {
+        let fault = |field: &str, problem: &str| DesignError::at(field, "", problem, "a field");
         let mut tree: Value =
-            serde_json::from_str(self.text()).map_err(|_| fault("the design is no JSON"))?;
-        let whole = serde_json::to_value(self.sections()).map_err(|_| fault("the design is no JSON"))?;
-        set(&mut tree, &whole, &change.field, change.value.clone())
-            .ok_or_else(|| fault("there is no such place"))?;
-        Self::from_text(&tree.to_string(), Path::new(""))
+            serde_json::from_str(self.text()).map_err(|_| fault("", "the design is no JSON"))?;
+        let whole = serde_json::to_value(self.sections()).map_err(|_| fault("", "the design is no JSON"))?;
+        for Cure { field, value } in changes {
+            set(&mut tree, &whole, field, value.clone())
+                .ok_or_else(|| fault(field, "there is no such place"))?;
+        }
+        Self::from_text(&format!("{tree:#}\n"), Path::new(""))
     }
 
     /// The fault with changes that a file takes as they are: a field of an object that a rule gives whole is no field of the file

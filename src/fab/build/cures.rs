@@ -90,7 +90,7 @@ fn lit(design: &Design) -> Result<(), DesignError> {
 }
 
 /// The same with the parts, made and assembled.
-fn with_parts(design: &Design) -> Result<(), DesignError> {
+pub(super) fn with_parts(design: &Design) -> Result<(), DesignError> {
     let sight = claims::check_claims(design)?;
     let (_, layout) = lay_out(design)?;
     let springs = constants::springs_of(design, sight)?;

@@ -140,6 +140,15 @@ pub fn build(design: &Design, step: &mut dyn FnMut(&str)) -> Result<Build, Build
     build_with(design, None, step)
 }
 
+/// Whether a design builds: its loads, dots, parts and light, without files and without a search for what would mend it.
+///
+/// # Errors
+/// The first fault of the design.
+pub fn verify(design: &Design) -> Result<(), DesignError> {
+    let (parts, light) = rayon::join(|| cures::with_parts(design), || LightCheck::of(design));
+    parts.and(light.map(|_| ()))
+}
+
 /// [`build`] with what was measured of the design, which goes into the report.
 ///
 /// # Errors

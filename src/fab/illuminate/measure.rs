@@ -76,7 +76,7 @@ fn fault(error: SimError) -> DesignError {
 }
 
 /// Refuses lights without one of the colours: normals want three.
-fn require_colors(design: &Design) -> Result<(), DesignError> {
+pub(super) fn require_colors(design: &Design) -> Result<(), DesignError> {
     use domecast_design::sections::LedColor;
     let leds = &design.sections().leds;
     if leds.list.is_empty() {
@@ -138,6 +138,14 @@ fn places(light: &Illumination, checked: &LightReport, stray_levels: f64, lacks:
         normal_error_deg_per_level: each.map(error).collect(),
         is_lacking: lacks.to_vec(),
     }
+}
+
+/// 95th percentile by area of the normal's error of the places seen from the pole to a polar angle, degrees a grey level.
+pub(super) fn p95_to(report: &IlluminationReport, polar_angle_deg: f64) -> Option<f64> {
+    let places = &report.places;
+    let each = places.polar_deg.iter().zip(&places.image_px).zip(&places.normal_error_deg_per_level);
+    let seen = each.filter(|((polar_deg, image_px), _)| **polar_deg <= polar_angle_deg && image_px.is_some());
+    percentile_of(seen.map(|(_, error)| *error).collect(), 0.95)
 }
 
 fn within(light: &Illumination, places: &Places, polar_angle_deg: f64) -> Within {

@@ -3,6 +3,9 @@
 use super::crescents::{COLORS, Crescent};
 use super::maps::{Map, SCALE};
 use super::numbers::{IlluminationReport, LightEvenness, Percentiles, Within};
+use super::optimize::Optimization;
+use super::search_page;
+use super::tilt::TiltStudy;
 use crate::html::{Html, STYLE, figure, html, picture, table};
 use crate::numbers::{percent, typeset};
 use crate::report::markers;
@@ -11,7 +14,12 @@ use crate::report::markers;
 const MAX_CRESCENTS: usize = 12;
 
 /// The numbers in short, the maps, then the tables.
-pub(super) fn page(report: &IlluminationReport, maps: &[Map]) -> Html {
+pub(super) fn page(
+    report: &IlluminationReport,
+    maps: &[Map],
+    study: &TiltStudy,
+    searched: Option<&Optimization>,
+) -> Html {
     let figures = |kind: &str| -> Html {
         let of_kind = maps.iter().filter(|map| map.name.starts_with(kind));
         of_kind
@@ -28,12 +36,13 @@ pub(super) fn page(report: &IlluminationReport, maps: &[Map]) -> Html {
          class=\"soft\">domecast {2}. At rest, exposure and gain: level {3} for each mW/mm² on a white \
          surface{4}.</p>\n<nav aria-label=\"Chapters\"><ul>\n<li><a href=\"#numbers\">Numbers</a></li>\n<li><a \
          href=\"#dome\">On the dome</a></li>\n<li><a href=\"#image\">In the image</a></li>\n<li><a \
-         href=\"#seen\">Markers, dots, reflections</a></li>\n</ul></nav>\n</header>\n<main>\n<section id=\"numbers\">\n\
+         href=\"#seen\">Markers, dots, reflections</a></li>\n<li><a href=\"#tilt\">Tilt and \
+         diffuser</a></li>\n{10}</ul></nav>\n</header>\n<main>\n<section id=\"numbers\">\n\
          <h2>Numbers</h2>\n{5}</section>\n<section id=\"dome\">\n<h2>On the dome</h2>\n<p>Seen from outside: the pole in the \
          middle, x to the right, y up; circles at polar angles of 45°, 60° and 75°.</p>\n{6}<div \
          class=\"row\">\n{7}</div>\n</section>\n<section id=\"image\">\n<h2>In the image</h2>\n<div \
          class=\"row\">\n{8}</div>\n</section>\n<section id=\"seen\">\n<h2>Markers, dots, \
-         reflections</h2>\n{9}</section>\n</main>\n</body>\n</html>\n",
+         reflections</h2>\n{9}</section>\n{11}{12}</main>\n</body>\n</html>\n",
         report.design,
         Html::trusted(STYLE),
         report.domecast,
@@ -44,6 +53,13 @@ pub(super) fn page(report: &IlluminationReport, maps: &[Map]) -> Html {
         figures("dome"),
         figures("image"),
         seen(report),
+        Html::trusted(if searched.is_some() {
+            "<li><a href=\"#search\">Search for lights</a></li>\n"
+        } else {
+            ""
+        }),
+        search_page::tilt(study),
+        searched.map(search_page::search).unwrap_or_default(),
     )
 }
 

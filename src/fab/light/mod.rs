@@ -27,8 +27,8 @@ use domecast_sim::light::RestLight;
 pub use edges::ShadowEdges;
 pub use levels::{DomeLevels, LightReport, MarkerLevels};
 use levels::{dome_levels, marker_levels};
-pub(crate) use rest::scene;
-use rest::{fault, pixels};
+use rest::pixels;
+pub(crate) use rest::{fault, scene};
 pub use separation::Separation;
 pub(crate) use separation::{lacking, normal_error_deg, percentile_of};
 

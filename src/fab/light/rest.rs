@@ -64,7 +64,7 @@ pub(super) fn pixels(design: &Design) -> impl Iterator<Item = DVec2> {
 }
 
 /// What the simulator refuses is a fault of the design: of its lights, as a rule.
-pub(super) fn fault(error: SimError) -> DesignError {
+pub(crate) fn fault(error: SimError) -> DesignError {
     match error {
         SimError::Input(error) => *error,
         other => DesignError::at("leds", "", other.to_string(), "lights that can be computed"),

@@ -138,10 +138,23 @@ impl Illumination {
     /// # Errors
     /// As [`Illumination::of`].
     pub fn direct(scene: &Scene, grid: PlaceGrid, max_polar_deg: f64) -> Result<Option<Self>, SimError> {
-        let Some(light) = &scene.file().light.leds else { return Ok(None) };
+        if scene.file().light.leds.is_none() {
+            return Ok(None);
+        }
         let ways = setup::ways(scene, &LightUse::ALL)?;
+        Ok(Self::along(scene, &ways, grid, max_polar_deg, &EmitterRule::default()))
+    }
+
+    /// [`Illumination::direct`] for lights and ways of the caller's: other places, tilts and diffusers than the design's.
+    pub fn along(
+        scene: &Scene,
+        ways: &Ways,
+        grid: PlaceGrid,
+        max_polar_deg: f64,
+        rule: &EmitterRule,
+    ) -> Option<Self> {
+        let light = scene.file().light.leds.as_ref()?;
         let face = ways.face();
-        let rule = EmitterRule::default();
         let one = |index: usize| {
             let place = grid.middle(face, index);
             let polar_deg = place.truncate().length().atan2(place.z).to_degrees();
@@ -149,12 +162,12 @@ impl Illumination {
                 polar_deg,
                 azimuth_deg: 360.0 * ((index % grid.places) as f64 + 0.5) / grid.places as f64,
                 normal: face.normal(place),
-                ..IlluminatedPlace::of(scene, &ways, ways.point(place, 1.0), &rule)
+                ..IlluminatedPlace::of(scene, ways, ways.point(place, 1.0), rule)
             })
         };
         let places = (0..grid.count()).into_par_iter().filter_map(one).collect();
         let reflectance = scene.design().sections().elastomer.membrane_reflectance.to_array();
-        Ok(Some(Self {
+        Some(Self {
             grid,
             face,
             places,
@@ -162,7 +175,7 @@ impl Illumination {
             level_per_irradiance: std::array::from_fn(|c| {
                 reflectance[c] / setup::index_at(&ways.optics[c], false).powi(2)
             }),
-        }))
+        })
     }
 
     /// `C L` of a place, mW/mm^2.

@@ -11,7 +11,7 @@ use crate::SimError;
 use crate::scene::Scene;
 use domecast_design::parts;
 use domecast_design::parts::Measures;
-use domecast_design::sections::LedColor;
+use domecast_design::sections::{LedColor, LedsSection};
 use domecast_design::{Design, DesignError};
 use domecast_optics::{ColorChannel, SensorOptics};
 
@@ -44,8 +44,7 @@ pub fn crosstalk_matrix(crosstalk: f64) -> DMat3 {
 }
 
 /// The brightness that the scene gives each light of the design.
-fn drives(scene: &Scene) -> Result<Vec<f64>, SimError> {
-    let count = scene.design().sections().leds.list.len();
+fn drives(scene: &Scene, count: usize) -> Result<Vec<f64>, SimError> {
     let Some(light) = &scene.file().light.leds else { return Ok(Vec::new()) };
     if !light.each.is_empty() && light.each.len() != count {
         return Err(DesignError::at(
@@ -61,8 +60,7 @@ fn drives(scene: &Scene) -> Result<Vec<f64>, SimError> {
 }
 
 /// Height of the highest point of each emitter, with or without the diffuser in front, mm.
-pub fn emitter_tops_mm(design: &Design) -> Vec<f64> {
-    let leds = &design.sections().leds;
+pub fn emitter_tops_mm(leds: &LedsSection) -> Vec<f64> {
     (0..leds.list.len())
         .map(|i| {
             let pose = parts::platform_from_led(leds, i);
@@ -77,10 +75,35 @@ pub fn emitter_tops_mm(design: &Design) -> Vec<f64> {
 /// # Errors
 /// Lights that do not fit the design, or stand in the sheet.
 pub fn sources(scene: &Scene, used: &LightUse) -> Result<Vec<Source>, SimError> {
+    let leds = &scene.design().sections().leds;
+    if used.diffuser {
+        return sources_of(scene, leds, &lobe(leds));
+    }
+    let bare = LedsSection { diffuser: None, ..leds.clone() };
+    sources_of(scene, &bare, &lobe(&bare))
+}
+
+/// What one of the lights sends into each direction, behind its diffuser where it has one.
+pub fn lobe(leds: &LedsSection) -> Lobe {
+    let bare = Lobe::cosine_power(leds.lobe_exponent);
+    match leds.diffuser {
+        None => bare,
+        Some(tape) => bare.behind(&Diffuser {
+            lambert_fraction: tape.lambert_fraction,
+            lobe_width_rad: tape.lobe_width_deg.to_radians(),
+            transmittance: tape.transmittance,
+        }),
+    }
+}
+
+/// The sources of other lights than the design's, in the light of a scene: its power and crosstalk.
+///
+/// # Errors
+/// Lights that stand in the sheet, or of another number than the scene drives one by one.
+pub fn sources_of(scene: &Scene, leds: &LedsSection, lobe: &Lobe) -> Result<Vec<Source>, SimError> {
     let Some(light) = &scene.file().light.leds else { return Ok(Vec::new()) };
     let design = scene.design();
-    let leds = &design.sections().leds;
-    for (i, top) in emitter_tops_mm(design).into_iter().enumerate() {
+    for (i, top) in emitter_tops_mm(leds).into_iter().enumerate() {
         let bottom = design.sheet_underside_z_mm();
         if top >= bottom {
             return Err(DesignError::at(
@@ -92,20 +115,10 @@ pub fn sources(scene: &Scene, used: &LightUse) -> Result<Vec<Source>, SimError> 
             .into());
         }
     }
-    let bare = Lobe::cosine_power(leds.lobe_exponent);
-    let diffuser = leds.diffuser.filter(|_| used.diffuser);
-    let lobe = match diffuser {
-        None => bare,
-        Some(tape) => bare.behind(&Diffuser {
-            lambert_fraction: tape.lambert_fraction,
-            lobe_width_rad: tape.lobe_width_deg.to_radians(),
-            transmittance: tape.transmittance,
-        }),
-    };
-    let front_mm = if diffuser.is_some() { leds.diffuser_thickness_mm } else { 0.0 };
+    let front_mm = if leds.diffuser.is_some() { leds.diffuser_thickness_mm } else { 0.0 };
     let flux = leds.radiant_flux_mw.to_array();
     let mut out = Vec::new();
-    for ((i, led), drive) in leds.list.iter().enumerate().zip(drives(scene)?) {
+    for ((i, led), drive) in leds.list.iter().enumerate().zip(drives(scene, leds.list.len())?) {
         let mut pose = parts::platform_from_led(leds, i);
         // The tape's outer face is what shines.
         pose.translation += pose.matrix3.z_axis * front_mm;
@@ -131,14 +144,22 @@ pub fn sources(scene: &Scene, used: &LightUse) -> Result<Vec<Source>, SimError> 
 /// Lights that do not fit the design, or a platform that cannot be made.
 pub fn ways(scene: &Scene, used: &LightUse) -> Result<Ways, SimError> {
     let design = scene.design();
-    Ok(Ways {
-        sources: sources(scene, used)?,
+    let cavities = if used.platform_shadow { Some(cavities(design)?) } else { None };
+    Ok(Ways { fresnel: used.fresnel, ..ways_among(scene, sources(scene, used)?, cavities) })
+}
+
+/// The ways of such sources as the caller has, through what the caller's platform leaves open; `None` where none stands in
+/// the way. The sheet is that of the scene's design.
+pub fn ways_among(scene: &Scene, sources: Vec<Source>, cavities: Option<Cavities>) -> Ways {
+    let design = scene.design();
+    Ways {
+        sources,
         optics: channel_optics(design),
-        cavities: if used.platform_shadow { Some(cavities(design)?) } else { None },
+        cavities,
         through_platform: design.sections().leds.through_platform,
         sheet_half_mm: sheet_half_mm(design),
-        fresnel: used.fresnel,
-    })
+        fresnel: true,
+    }
 }
 
 /// What the upper platform leaves open to the light.
@@ -146,13 +167,19 @@ pub fn ways(scene: &Scene, used: &LightUse) -> Result<Ways, SimError> {
 /// # Errors
 /// A platform that the design cannot have.
 pub fn cavities(design: &Design) -> Result<Cavities, SimError> {
-    let shapes = Measures::of(design)
-        .and_then(|measures| parts::upper_platform(&measures))
-        .map_err(DesignError::from)?;
+    cavities_of(&Measures::of(design).map_err(DesignError::from)?)
+}
+
+/// The same of the measures.
+///
+/// # Errors
+/// A platform that they do not allow.
+pub fn cavities_of(measures: &Measures) -> Result<Cavities, SimError> {
+    let shapes = parts::upper_platform(measures).map_err(DesignError::from)?;
     // No light goes down before it goes up into the sheet.
-    let leds = &design.sections().leds;
+    let leds = &measures.leds;
     let lowest = leds.center_z_mm - leds.emitter_mm - leds.diffuser_thickness_mm;
-    Ok(Cavities::of(&shapes).between(lowest, design.sheet_underside_z_mm()))
+    Ok(Cavities::of(&shapes).between(lowest, measures.seat_z_mm()))
 }
 
 /// Half sides of the sheet, mm.

@@ -3,16 +3,10 @@
 use glam::{DAffine3, DVec3};
 
 use super::measures::Measures;
+use super::pits::{CHANNEL_STEP, channel_end_mm};
 use super::{Blueprint, Feature, PartError};
 use super::{hood, mount};
 use domecast_mesh::{Fit, Profile, Shape};
-
-/// The light channel is wider than the pit by this share on each side: their
-/// side faces are then clearly apart, not almost in one plane.
-const CHANNEL_STEP: f64 = 0.04;
-
-/// Material thinner than this is none, mm.
-const SKIN_MM: f64 = 1e-3;
 
 /// Cuts that may run into each other.
 const OPEN_TO_EACH_OTHER: [(&str, &str); 31] = [
@@ -152,13 +146,7 @@ fn led_seat(m: &Measures, i: usize, b: &mut Blueprint) {
     let lip = leds.lip_top_z_mm;
     let inside_window = 0.25 * m.view.radius_mm(lip);
     let half_channel = half_width * (1.0 + CHANNEL_STEP);
-    // A board that leans far has its pit's front, at the seat, outside its own middle: no skin may stay between.
-    let lean = platform_from_led.matrix3.z_axis.z / up;
-    let front_at_seat = leds.center_radius_mm - front / up + (m.seat_z_mm() - leds.center_z_mm) * lean;
-    let beyond = front_at_seat - leds.center_radius_mm;
-    // Into the pit, also where the pit's front is behind the emitting face.
-    let into = 0.5 * front.abs().max(2.0 * SKIN_MM);
-    let end = leds.center_radius_mm + if beyond > SKIN_MM { beyond + into } else { 0.0 };
+    let end = channel_end_mm(m);
     let channel = Shape::cuboid(
         DVec3::new(inside_window, -half_channel, lip),
         DVec3::new(end, half_channel, top + over),

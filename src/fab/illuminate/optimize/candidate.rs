@@ -1,13 +1,17 @@
 //! From the numbers of a search to a design whose other fields follow, and to its light.
 
+use std::sync::{Mutex, PoisonError};
+
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::choices::{Arrangement, DiffuserKind, diffuser_fields};
 use super::score::{ComparedLight, LightScore};
 use crate::light::scene;
-use domecast_design::parts::{HidingLip, Measures, PartError, check_light_room, highest_hood_rim_mm};
-use domecast_design::{Cure, Design, DesignError};
+use domecast_design::parts::{
+    HidingLip, Measures, PartError, check_light_room, highest_hood_rim_mm, min_well_floor_mm,
+};
+use domecast_design::{Cure, Design, DesignError, DesignFile};
 use domecast_sim::Scene;
 use domecast_sim::light::LightUse;
 use domecast_sim::light::lobe::Lobe;
@@ -103,6 +107,8 @@ pub struct Given<'a> {
     scene: Scene,
     text: Value,
     hood: Option<Value>,
+    /// Measures that were taken, with what they depend on: all but the lights.
+    known: Mutex<Vec<(DesignFile, Measures)>>,
 }
 
 impl<'a> Given<'a> {
@@ -110,7 +116,27 @@ impl<'a> Given<'a> {
     /// A design without light, or one that cannot be lit.
     pub fn new(design: &'a Design) -> Result<Self, DesignError> {
         let text = serde_json::from_str(design.text()).unwrap_or_default();
-        Ok(Self { design, scene: scene(design, 1.0, 0.0)?, text, hood: hood_for(design) })
+        let known = Mutex::default();
+        Ok(Self { design, scene: scene(design, 1.0, 0.0)?, text, hood: hood_for(design), known })
+    }
+
+    /// The measures of a design. Those of designs that differ in their lights alone are the same but for the lights: where
+    /// springs and camera's view take the platform is found out once.
+    fn measures(&self, design: &Design) -> Result<Measures, PartError> {
+        let mut rest = design.sections().clone();
+        rest.leds = self.design.sections().leds.clone();
+        let known = |list: &[(DesignFile, Measures)]| {
+            let alike = list.iter().find(|(other, _)| *other == rest);
+            alike.map(|(_, measures)| Measures { leds: design.sections().leds.clone(), ..measures.clone() })
+        };
+        // A lock that a panic left is as good as another: what is kept in it is only ever added to.
+        let found = known(&self.known.lock().unwrap_or_else(PoisonError::into_inner));
+        if let Some(found) = found {
+            return Ok(found);
+        }
+        let taken = Measures::of(design)?;
+        self.known.lock().unwrap_or_else(PoisonError::into_inner).push((rest, taken.clone()));
+        Ok(taken)
     }
 
     /// Whether a hood can be added.
@@ -140,13 +166,14 @@ impl<'a> Given<'a> {
             return Err(Violation { stage: Violation::UNRESOLVED, missing: excess_mm });
         }
         let mut measures =
-            Measures::of(&design).map_err(|error| Violation::of_part(Violation::UNRESOLVED, &error))?;
+            self.measures(&design).map_err(|error| Violation::of_part(Violation::UNRESOLVED, &error))?;
         let lip = HidingLip::of(&measures).ok_or(Violation { stage: Violation::LIP, missing: f64::MAX })?;
         if measures.leds.center_radius_mm < lip.min_light_radius_mm {
             let missing = lip.min_light_radius_mm - measures.leds.center_radius_mm;
             return Err(Violation { stage: Violation::LIP, missing });
         }
-        let lip_mm = (100.0 * lip.top_z_mm).ceil() / 100.0;
+        let floor_mm = min_well_floor_mm(&measures).unwrap_or(f64::NEG_INFINITY);
+        let lip_mm = (100.0 * lip.top_z_mm.max(floor_mm) - 1e-6).ceil() / 100.0;
         changes.push(change(LIP, json!(lip_mm)));
         measures.leds.lip_top_z_mm = lip_mm;
         check_light_room(&design, &measures)

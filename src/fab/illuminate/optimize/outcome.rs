@@ -52,7 +52,8 @@ pub struct ArrangementResult {
     pub arrangement: Arrangement,
     /// Whether a hood was added.
     pub adds_hood: bool,
-    /// The least error of normals found with it, degrees a grey level; null where boards, springs and walls leave no room.
+    /// The least error of normals found with it, degrees a grey level, by the search's own tests of room: the build, which judges
+    /// what is proposed, may still refuse it. Null where boards, springs and walls leave no room.
     pub normal_error_p95_deg_per_level: Option<f64>,
 }
 

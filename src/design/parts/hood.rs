@@ -37,12 +37,7 @@ pub(super) fn add(m: &Measures, b: &mut Blueprint) -> Result<(), PartError> {
     let rim = hood.rim_from_pupil_mm;
     if pupil_z + rim <= top {
         let needed = top - pupil_z + m.process.min_wall_mm;
-        return Err(b.infeasible(
-            "rim of the hood above the block",
-            rim,
-            (100.0 * needed).ceil() / 100.0,
-            RIM,
-        ));
+        return Err(refused(b, "rim of the hood above the block", rim, (100.0 * needed).ceil() / 100.0));
     }
     if let Some(view) = &m.lower_view {
         let highest = view.highest_within(m.bore_radius_mm()) - pupil_z;

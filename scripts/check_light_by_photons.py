@@ -8,7 +8,7 @@ triangles of `parts/upper_platform.stl` and `parts/lower_platform.stl` (Embree, 
 at the sheet's faces by Fresnel's equations, thrown up and down in the sheet, and counted where it first meets the dome.
 The counts, as irradiance of bins of equal area, are put beside `vector_irradiance_mw_mm2` times the normal of `illuminate.json`,
 averaged over the same bins. In the mean over all bins of more than a tenth of the brightest one, weighted as they are known, both
-must agree to 1 %, and in each of them to 1 % and four of the count's own standard deviations. What goes to and fro between
+must agree to 1 %, and in each of them to 1 % and four of the count's own standard deviations. What goes back and forth between
 sheet and air, or between the sheet's faces, `illuminate` leaves out: photons that were thrown back inside the sheet are counted apart.
 """
 

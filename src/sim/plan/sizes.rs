@@ -45,6 +45,15 @@ fn touches(scene: &Scene, plan: &Plan) -> Vec<Touch> {
 /// Largest shift of a dot or marker and change of a pixel between two renderings; of what is random, the 99.9th percentile.
 fn difference(scene: &Scene, random: bool, a: &[Drawn], b: &[Drawn]) -> (f64, f64) {
     let (mut px, mut grey) = (0.0_f64, 0.0_f64);
+    let spec = scene.optics().lens().spec();
+    let size = [f64::from(spec.width), f64::from(spec.height)];
+    // What is in one picture alone has moved past the frame's edge: at least as far as it is from there.
+    let apart = |a: Option<[f64; 2]>, b: Option<[f64; 2]>| match (a, b) {
+        (Some(at), None) | (None, Some(at)) => {
+            (0..2).map(|axis| (at[axis] + 0.5).min(size[axis] - 0.5 - at[axis])).fold(f64::INFINITY, f64::min)
+        }
+        both => apart(both.0, both.1),
+    };
     for (a, b) in a.iter().zip(b) {
         for (a, b) in a.truth.black_dots.iter().zip(&b.truth.black_dots) {
             px = px.max(apart(a.centroid_px, b.centroid_px));

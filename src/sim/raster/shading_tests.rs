@@ -61,7 +61,8 @@ fn levels(scene: &Scene, frame: u32, tolerances: &[f32]) -> (Vec<Levels>, Vec<(u
     let mut spans = vec![0..0; height];
     coverage.spans(width, height, &(0..height), &mut spans);
     for (y, span) in spans.iter_mut().enumerate() {
-        *span = span.start.max(field.row(y).start)..span.end.min(field.row(y).end);
+        let start = span.start.max(field.row(y).start);
+        *span = start..span.end.min(field.row(y).end).max(start);
     }
     let shading = pipeline.shading.as_deref().unwrap();
     let slices = [ShadedSlice { end: height, optics, map: instant.shape.map.as_ref() }];
@@ -77,6 +78,9 @@ fn levels(scene: &Scene, frame: u32, tolerances: &[f32]) -> (Vec<Levels>, Vec<(u
         places.clear();
         for (y, x, part) in coverage.rows(width, height) {
             let columns = spans[y].clone();
+            if columns.is_empty() {
+                continue;
+            }
             let shares = &part[columns.start - x..columns.end - x];
             let found = lattice.row(&surface, y, columns.clone(), &mut spent);
             for k in (0..columns.len()).filter(|k| shares[*k] > MIN_SHARE) {

@@ -27,7 +27,8 @@ pub fn scale_grip(design: &mut Value, scale: f64) {
 
 fn random_design(rng: &mut TestRng, index: usize) -> Value {
     let text =
-        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/thumb24.json")).unwrap();
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/common/near-lights.json"))
+            .unwrap();
     let mut d: Value = serde_json::from_str(&text).unwrap();
     // thumb24 has no room for a cable's channel and set screws all round: most designs have the one and two of the others
     d["platforms"]["lower"]["cable_exit"] = json!({ "azimuth_deg": 180, "width_mm": 3.2, "height_mm": 2.5 });

@@ -139,8 +139,9 @@ mod tests {
 
     #[test]
     fn it_finds_the_bottom_of_a_bent_valley_and_of_a_long_bowl() {
+        // In three unknowns Rosenbrock's valley has one bottom; in four it has another at 3.70.
         let valley = |x: &SearchPoint| {
-            (0..3).map(|i| 100.0 * (x[i + 1] - x[i] * x[i]).powi(2) + (1.0 - x[i]).powi(2)).sum::<f64>()
+            (0..2).map(|i| 100.0 * (x[i + 1] - x[i] * x[i]).powi(2) + (1.0 - x[i]).powi(2)).sum::<f64>()
         };
         // a bowl a thousand times longer than wide, turned
         let bowl = |x: &SearchPoint| {
@@ -148,7 +149,7 @@ mod tests {
             1e6 * a * a + b * b + x[2] * x[2]
         };
         for seed in 1..6 {
-            let (value, looks) = search(seed, &[-0.5, 0.5, 1.5, 0.1], valley);
+            let (value, looks) = search(seed, &[-0.5, 0.5, 1.5], valley);
             assert!(value < 1e-12 && looks < 8000, "{seed}: {value} after {looks}");
             let (value, looks) = search(seed, &[0.0, 0.0, 2.0], bowl);
             assert!(value < 1e-10 && looks < 4000, "{seed}: {value} after {looks}");

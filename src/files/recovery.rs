@@ -88,7 +88,7 @@ pub fn tidy_on_signals() {
         std::thread::spawn(move || {
             let is_wish = |signal: &i32| *signal == SIGINT && IS_HEEDED.load(Relaxed);
             if let Some(signal) =
-                signals.forever().find(|signal| !(is_wish(signal) && !IS_WISHED.swap(true, Relaxed)))
+                signals.forever().find(|signal| !is_wish(signal) || IS_WISHED.swap(true, Relaxed))
             {
                 super::staging::abandon_all();
                 // ends the process as the signal would have, so that a shell sees it

@@ -57,6 +57,9 @@ pub struct TiltStudy {
     pub curves: Vec<TiltCurve>,
 }
 
+/// A number of a point of the study.
+type Reading<'a> = &'a dyn Fn(&TiltPoint) -> Option<f64>;
+
 impl TiltStudy {
     /// Of the lights of a design, without its platform.
     ///
@@ -110,7 +113,7 @@ impl TiltStudy {
         self.chart("Unevenness of the colours' sum: standard deviation over mean", &[(&spread, 2.0)])
     }
 
-    fn chart(&self, title: &str, lines: &[(&dyn Fn(&TiltPoint) -> Option<f64>, f64)]) -> Chart {
+    fn chart(&self, title: &str, lines: &[(Reading<'_>, f64)]) -> Chart {
         let size = DVec2::new(560.0, 340.0);
         let mut chart = Chart::new(title, size);
         let values = self.curves.iter().flat_map(|curve| &curve.points);

@@ -54,6 +54,14 @@ def bring(domecast, folder):
     frames.mkdir()
     for frame in sorted((folder / "simulated").glob("frame_*.png")):
         shutil.copy(frame, frames)
+    run("simulate", "designs/scenes/lit.json", "--out", "lit")
+    shutil.copy(folder / "lit/frame_0000.png", folder / "rest.png")
+    shutil.rmtree(folder / "lit")
+    run("simulate", "designs/scenes/ball.json", "--frames", "3", "--out", "simulated-ball")
+    (folder / "pressed").mkdir()
+    for frame in sorted((folder / "simulated-ball").glob("frame_*.png")):
+        shutil.copy(frame, folder / "pressed")
+    shutil.rmtree(folder / "simulated-ball")
     constants = json.loads((folder / "constants.json").read_text())
     scatter = np.random.default_rng(25)
     dots = [(dot["id"], *dot["surface_mm"][:2]) for dot in constants["black_dots"]]

@@ -25,6 +25,7 @@
 //! | write and read what the runtime needs | [`Constants`]; [`constants`] |
 //! | replace nominal numbers by measured ones | [`calibrate`] |
 //! | turn frames into markers, pose, wrench and displacement | [`Tracker`]; [`track`] |
+//! | read the skin's shape from their colours | [`ShapeFromColor`]; [`shape`] |
 //! | simulate what the sensor sees | [`Scene`]; [`sim`] |
 //! | look at the lit sensor before it is made | [`light`] |
 //! | do all of it | [`build`], and [`report`] for its page; [`compare`] two of them |
@@ -54,7 +55,7 @@ pub use domecast_fab::{artwork, build, compare, light, report};
 pub use domecast_mesh as mesh;
 pub use domecast_optics as optics;
 pub use domecast_optics::{camera, numeric, pose};
-pub use domecast_runtime::{calibrate, frames, track};
+pub use domecast_runtime::{calibrate, frames, shape, track};
 pub use domecast_sim as sim;
 pub use domecast_springs as springs;
 
@@ -64,6 +65,7 @@ pub use design::Design;
 pub use error::Error;
 pub use layout::Layout;
 pub use numeric::Rigid as Pose;
+pub use shape::ShapeFromColor;
 pub use sim::Scene;
 pub use springs::Wrench;
 pub use track::Tracker;

@@ -7,10 +7,10 @@ use glam::DVec3;
 use crate::contact::{Contact, Prepared};
 use crate::elastomer::Indenter;
 use crate::error::ContactError;
-use crate::fem::{Compliance, Parts, SurfaceField};
 use crate::field::Field;
 use crate::object::{Placed, deepest};
 use crate::state::ContactState;
+use domecast_elastic::{Compliance, NodeParts, SurfaceField};
 use domecast_optics::numeric::Rigid;
 
 /// Nodes this far from an object, as a part of the dome's radius, cannot be touched by it.
@@ -103,7 +103,7 @@ impl Contact {
         let before = before.map(|before| own_alone(before, compliance, beside, sharing));
         let grid = &moved.grid;
         let offset = |number: usize| -> DVec3 {
-            let parts: Parts = moved.places.parts(grid, number);
+            let parts: NodeParts = moved.places.parts(grid, number);
             parts.as_slice().iter().map(|(node, share)| grid.offset(*node) * *share).sum()
         };
         let contact = self.with_prepared(Prepared::Compliance(Arc::new(moved.clone())));

@@ -6,12 +6,12 @@ use crate::deviation::deviation;
 use crate::elastomer::{Elastomer, Indenter};
 use crate::error::ContactError;
 use crate::estimate::{Estimate, estimate};
-use crate::fem::Compliance;
 use crate::level::{DEEPEST, Level, elements_of};
 use crate::levels;
 use crate::linear;
 use crate::outcome::Status;
 use crate::state::ContactState;
+use domecast_elastic::Compliance;
 use domecast_optics::numeric::Rigid;
 
 /// A dome that can be touched.
@@ -46,7 +46,7 @@ impl Contact {
             }
             Level::Linear { element_mm } => {
                 let elements = elements_of(&elastomer, element_mm)?;
-                Prepared::Compliance(Arc::new(Compliance::new(&elastomer, elements)?))
+                Prepared::Compliance(Arc::new(Compliance::new(&elastomer.elastic(), elements)?))
             }
         };
         Ok(Self { elastomer, level, prepared })

@@ -2,6 +2,7 @@
 
 use crate::error::{ContactError, positive};
 use crate::object::ContactSolid;
+use domecast_elastic::ElasticDome;
 use domecast_optics::DomeShape;
 
 /// Heights of domes over the radius of their sphere: flatter ones have no elements, and higher ones are no domes.
@@ -52,6 +53,11 @@ impl Elastomer {
     /// The dome's face.
     pub fn dome(&self) -> DomeShape {
         DomeShape::new(self.dome_radius_mm, self.center_z_mm)
+    }
+
+    /// The dome as a linear elastic body.
+    pub fn elastic(&self) -> ElasticDome {
+        ElasticDome { dome: self.dome(), young_mpa: self.young_mpa, poisson: self.poisson }
     }
 
     /// What depths are measured by: the radius, or the height of a cap, mm.

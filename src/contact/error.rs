@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use domecast_elastic::FactorError;
 use domecast_springs::MechanicsError;
 
 /// Why there is no contact state.
@@ -104,7 +105,7 @@ pub enum ContactError {
     /// The springs have no force at the pose that was asked for.
     Springs(MechanicsError),
     /// The stiffness matrix has no factors: the elastomer's constants make it singular.
-    Factorisation(String),
+    Factorisation(FactorError),
     /// More nodes than the level's memory allows.
     TooFine {
         /// The element size that was asked for, mm.
@@ -169,7 +170,7 @@ impl fmt::Display for ContactError {
                 100.0 * reached
             ),
             Self::Springs(error) => write!(f, "{error}"),
-            Self::Factorisation(why) => write!(f, "the dome's stiffness has no factors: {why}"),
+            Self::Factorisation(why) => write!(f, "{why}"),
             Self::TooFine { element_mm, min_mm } => {
                 write!(f, "elements of {element_mm} mm are too many, at least {min_mm:.3} mm is allowed")
             }
@@ -198,5 +199,11 @@ pub(crate) fn positive(field: &'static str, value: f64) -> Result<f64, ContactEr
         Ok(value)
     } else {
         Err(ContactError::Dimension { field, value, allowed: "more than 0, at most 1e6" })
+    }
+}
+
+impl From<FactorError> for ContactError {
+    fn from(error: FactorError) -> Self {
+        Self::Factorisation(error)
     }
 }

@@ -36,7 +36,6 @@ mod elastomer;
 mod equilibrium;
 mod error;
 mod estimate;
-mod fem;
 mod field;
 mod finite_strain;
 mod gel;
@@ -48,6 +47,7 @@ mod object;
 mod on_pole;
 mod outcome;
 mod state;
+mod traction;
 
 pub use beside::Beside;
 pub use contact::Contact;

@@ -7,12 +7,12 @@ use glam::{DMat3, DVec3};
 
 use crate::elastomer::{Elastomer, Indenter};
 use crate::error::{ContactError, positive};
-use crate::fem::{Parts, Revolved};
 use crate::level::DEEPEST;
 use crate::linear::{Candidate, Spot, Touch, Way};
 use crate::object::{ContactSolid, Placed};
 use crate::outcome::Status;
 use crate::state::ContactState;
+use domecast_elastic::{NodeParts, Revolved};
 use domecast_optics::numeric::Rigid;
 
 /// Elements along the meridian: 4 times a power of two, from 8 to this.
@@ -65,12 +65,12 @@ impl OnPole {
         // A rigid ball touches nothing that it did not overlap: the two spheres' circle.
         let up =
             (apart_mm * apart_mm + dome_mm * dome_mm - radius_mm * radius_mm) / (2.0 * apart_mm * dome_mm);
-        let revolved = Revolved::new(elastomer, elements, up.clamp(-1.0, 1.0).acos())?;
+        let revolved = Revolved::new(&elastomer.elastic(), elements, up.clamp(-1.0, 1.0).acos())?;
         let rigid = Indenter { solid, young_mpa: None, poisson: 0.3 };
         let mut touch = Touch::new(elastomer, placed, 1.0 + rigid.yield_ratio(elastomer));
         let way = Way::new(&touch.placed, elastomer.dome(), None, (elastomer.dome().pole_mm(), -depth_mm));
         for (number, ring) in revolved.rings().into_iter().enumerate() {
-            let parts = Parts::whole(number);
+            let parts = NodeParts::whole(number);
             let (at_mm, area_mm2, spread_mm) = (ring.at_mm, ring.area_mm2, ring.spread_mm);
             let spot = Spot { node: number, parts, at_mm, area_mm2, spread_mm };
             touch.candidates.push(Candidate::new(spot, elastomer, &touch.placed, &way, touch.sharing)?);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::finite_strain::Deformed;
+pub use domecast_elastic::Extent;
 use domecast_optics::numeric::Rigid;
 use domecast_springs::Wrench;
 
@@ -43,19 +44,12 @@ pub struct TouchedNode {
     pub force_n: DVec3,
     /// Its part along the contact normal, over the area, MPa.
     pub pressure_mpa: f64,
+    /// Where the dome bears it, mm: the levels of finite elements know where the node is now, the others bear it at rest.
+    pub place_mm: DVec3,
+    /// Unit direction in which the pressure pushes the dome: the contact normal, inwards.
+    pub inward: DVec3,
     /// Whether it sticks to the object.
     pub sticks: bool,
-}
-
-/// Where the dome moves.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extent {
-    /// Direction from the centre of the dome's sphere to the middle of the touched region.
-    pub direction: DVec3,
-    /// Half angle of a cap about it, rad.
-    pub angle_rad: f64,
-    /// No point outside the cap moves by more than this, mm.
-    pub beyond_mm: f64,
 }
 
 /// What the next state must know of this one for friction.

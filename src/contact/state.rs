@@ -33,6 +33,9 @@ pub struct ContactState {
     pub deviation: Deviation,
     /// Counted work, multiplications.
     pub work: f64,
+    /// The nodes' forces as the dome bears them now, spread as the level's elements spread them; still where the level has
+    /// no elements of its own.
+    pub(crate) bearing: Field,
     /// The dome's own field under this contact's forces.
     pub(crate) field: Field,
     /// What moved the dome besides.
@@ -54,6 +57,7 @@ impl ContactState {
             iterations: 0,
             deviation: Deviation::default(),
             work: 0.0,
+            bearing: Field::Still,
             field: Field::Still,
             beside: Field::Still,
             history: History { sensor_from_object: Some(*sensor_from_object), ..Default::default() },
@@ -86,6 +90,7 @@ impl ContactState {
             all.wrench = all.wrench + state.wrench;
         }
         all.contact_radius_mm = area.sqrt();
+        all.bearing = Field::sum(&states.clone().map(|state| (1.0, &state.bearing)).collect::<Vec<_>>());
         let fields = std::iter::once(beside).chain(states.map(|state| &state.field));
         all.field = Field::sum(&fields.map(|field| (1.0, field)).collect::<Vec<_>>());
         all

@@ -3,4 +3,5 @@
 pub mod calibrate;
 pub mod constants;
 pub mod frames;
+pub mod shape;
 pub mod track;

@@ -23,7 +23,6 @@ mod plan;
 mod probe;
 pub mod raster;
 pub mod scene;
-mod splines;
 mod work;
 
 pub use bound::Bound;

@@ -8,15 +8,17 @@ use crate::tokens::tokens;
 use crate::{assert_none, crates, members, short, text, workspace};
 
 /// The crates from the ground up; each may depend on those named beside it and on no others of ours.
-const CRATES: [(&str, &[&str]); 10] = [
+const CRATES: [(&str, &[&str]); 12] = [
     ("files", &[]),
     ("optics", &[]),
     ("mesh", &[]),
+    ("light", &["optics"]),
     ("springs", &["optics"]),
-    ("runtime", &["optics", "springs"]),
+    ("elastic", &["optics"]),
+    ("runtime", &["elastic", "light", "optics", "springs"]),
     ("design", &["mesh", "optics", "springs"]),
-    ("contact", &["mesh", "optics", "springs"]),
-    ("sim", &["contact", "design", "files", "mesh", "optics", "springs"]),
+    ("contact", &["elastic", "mesh", "optics", "springs"]),
+    ("sim", &["contact", "design", "files", "light", "mesh", "optics", "springs"]),
     ("fab", &["design", "files", "mesh", "optics", "runtime", "sim", "springs"]),
     ("cli", &["contact", "design", "fab", "files", "mesh", "optics", "runtime", "sim", "springs"]),
 ];

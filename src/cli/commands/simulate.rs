@@ -28,6 +28,10 @@ pub struct SimulateOptions {
     /// Number of frames, instead of the scene's: spread over the same time.
     #[arg(long)]
     frames: Option<u32>,
+    /// Write what each pixel sees as well: `frame_NNNN.surface.npy`, `.normal.npy`, `.displacement.npy`, `.pressure.npy`,
+    /// `.traction.npy` and `depth/frame_NNNN.png`.
+    #[arg(long)]
+    depth: bool,
     /// Threads that draw [default: one for each core].
     #[arg(long)]
     threads: Option<usize>,
@@ -49,6 +53,9 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
     };
     let mut scene = Scene::load(path).map_err(in_file)?;
     scene.override_run(options.frames, options.seed).map_err(in_file)?;
+    if options.depth {
+        scene.write_depth();
+    }
     let out = options.out.clone().unwrap_or_else(|| PathBuf::from("output").join(scene.name()));
     // the plan may take a while: a place that is refused is refused before it
     let staged = match options.explain {

@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::fem::SurfaceField;
 use crate::finite_strain::Deformed;
 use crate::outcome::Extent;
+use domecast_elastic::SurfaceField;
 pub(crate) use pushed_out::PushedOut;
 pub(crate) use sunk::Sunk;
 

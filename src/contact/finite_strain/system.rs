@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::element::{Element, Material, NODES};
 use super::mesh::Mesh;
 use crate::error::ContactError;
+use domecast_elastic::FactorError;
 
 /// A meshed body with the pattern of its matrix.
 #[derive(Debug)]
@@ -43,7 +44,7 @@ impl Body {
     /// # Errors
     /// [`ContactError::Factorisation`] for a mesh with elements inside out, or a pattern too large for memory.
     pub fn new(mesh: Mesh, material: Material) -> Result<Self, ContactError> {
-        let fault = |why: String| ContactError::Factorisation(why);
+        let fault = |why: String| ContactError::from(FactorError(why));
         let elements: Option<Vec<Element>> = mesh
             .elements
             .iter()

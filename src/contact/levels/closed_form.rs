@@ -140,6 +140,8 @@ fn pressure_nodes(
                 area_mm2,
                 force_n: normal * -(pressure_mpa * area_mm2),
                 pressure_mpa,
+                place_mm: at_mm,
+                inward: -normal,
                 sticks: false,
             });
         }

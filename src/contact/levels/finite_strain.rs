@@ -87,6 +87,8 @@ fn state_of(way: Way, law: &Law, placed: &Placed, queries: f64) -> ContactState 
             area_mm2: spot.area_mm2,
             force_n: bearing.force_n,
             pressure_mpa,
+            place_mm: bearing.place_mm,
+            inward: bearing.normal,
             sticks: bearing.sticks,
         });
     }

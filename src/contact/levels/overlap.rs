@@ -157,7 +157,15 @@ pub(crate) fn nodes_of(overlap: &Overlap, k_mpa_per_mm: f64) -> Vec<TouchedNode>
             let pressure_mpa = k_mpa_per_mm * way;
             // Across a side wall the way out is not along the object's normal; the push still is.
             let force_n = outward * (pressure_mpa * area_mm2);
-            TouchedNode { at_mm, area_mm2, force_n, pressure_mpa, sticks: false }
+            TouchedNode {
+                at_mm,
+                area_mm2,
+                force_n,
+                pressure_mpa,
+                place_mm: at_mm,
+                inward: outward,
+                sticks: false,
+            }
         })
         .collect()
 }

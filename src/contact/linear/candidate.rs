@@ -4,11 +4,11 @@ use glam::{DMat3, DVec3};
 
 use crate::elastomer::Elastomer;
 use crate::error::ContactError;
-use crate::fem::Parts;
 use crate::level::DEEPEST;
 use crate::object::Placed;
 use crate::outcome::{History, NodeMemory};
 use crate::state::ContactState;
+use domecast_elastic::NodeParts;
 use domecast_optics::DomeShape;
 use domecast_optics::numeric::Rigid;
 
@@ -17,7 +17,7 @@ use domecast_optics::numeric::Rigid;
 pub(crate) struct Candidate {
     pub node: usize,
     /// The level's nodes that it moves with and hands its force to.
-    pub parts: Parts,
+    pub parts: NodeParts,
     pub at_mm: DVec3,
     /// Into the dome there.
     pub inward: DVec3,
@@ -45,7 +45,7 @@ pub(crate) struct Candidate {
 /// Where a candidate lies.
 pub(crate) struct Spot {
     pub node: usize,
-    pub parts: Parts,
+    pub parts: NodeParts,
     pub at_mm: DVec3,
     pub area_mm2: f64,
     /// Standard deviations of its hat along the meridian and along the ring, mm.
@@ -216,5 +216,23 @@ impl Candidate {
         let outward =
             if outward.length() > 0.4 { outward } else { placed.distance(self.at_mm + self.u_mm).1 };
         (distance, outward.normalize_or(DVec3::Z))
+    }
+}
+
+/// Part of the nodes' distance by which an object that touches nothing may reach into the dome.
+const MIN_SEEN: f64 = 0.5;
+
+/// Where no node bears a force, the object must not reach far into the dome between the nodes.
+pub(super) fn check_seen(
+    placed: &Placed,
+    dome: DomeShape,
+    deepest_mm: DVec3,
+    spacing_mm: f64,
+) -> Result<(), ContactError> {
+    match placed.walk_out(deepest_mm, -dome.normal(deepest_mm), dome.radius_mm()) {
+        Some((depth_mm, _)) if depth_mm > MIN_SEEN * spacing_mm => {
+            Err(ContactError::Unseen { depth_mm, spacing_mm })
+        }
+        _ => Ok(()),
     }
 }

@@ -4,7 +4,7 @@
 //! node is now. Neither does for a wall thinner than the nodes' distance, or beside an edge: the wall is met by some
 //! nodes and missed by others, and its nearest face is a flank. Where that is so, the object is taken as the faces that
 //! a look along its way into the dome shows, each place keeps the face that has come over it, and places between the
-//! nodes take part ([`crate::fem::Compliance::places`]). The task is then convex: it has one answer, which follows the pose smoothly.
+//! nodes take part ([`domecast_elastic::Compliance::places`]). The task is then convex: it has one answer, which follows the pose smoothly.
 //! Flanks steeper than [`FACING`] do not push. Forces are those of the surface that the nodes carry: a pressure is a force
 //! over a node's area, and less than that of an edge.
 
@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::candidate::{Face, hat_places};
-use crate::fem::Compliance;
 use crate::object::Placed;
+use domecast_elastic::Compliance;
 
 /// A place between the nodes takes part where the object reaches deeper than the nodes tell by more than this part of
 /// their distance. A ball does so where its radius is below 1.25 of them.

@@ -164,6 +164,8 @@ impl<'a> Touch<'a> {
                 area_mm2: candidate.area_mm2,
                 force_n: candidate.force_n,
                 pressure_mpa: pressure_n / candidate.area_mm2,
+                place_mm,
+                inward: candidate.normal,
                 sticks: friction_n < max_n * (1.0 - 1e-9),
             });
             state.history.nodes.push(NodeMemory {

@@ -5,40 +5,21 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::candidate::{Candidate, Spot, Way};
+use super::candidate::{Candidate, Spot, Way, check_seen};
 use super::faces::{Faces, fine};
 use super::rounds::{PENETRATION, Rounds, Touch};
 use crate::elastomer::{Elastomer, Indenter};
 use crate::error::ContactError;
-use crate::fem::{Compliance, GridNode, Parts, SurfaceField};
 use crate::field::Field;
 use crate::level::DEEPEST;
 use crate::object::{Placed, deepest, deepest_from};
 use crate::outcome::Status;
 use crate::state::ContactState;
-use domecast_optics::DomeShape;
+use domecast_elastic::{Compliance, GridNode, NodeParts, SurfaceField};
 use domecast_optics::numeric::Rigid;
 
 /// Looks for nodes that no plane held back.
 const MAX_LOOKS: u32 = 8;
-
-/// Part of the nodes' distance by which an object that touches nothing may reach into the dome.
-const MIN_SEEN: f64 = 0.5;
-
-/// Where no node bears a force, the object must not reach far into the dome between the nodes.
-fn check_seen(
-    placed: &Placed,
-    dome: DomeShape,
-    deepest_mm: DVec3,
-    spacing_mm: f64,
-) -> Result<(), ContactError> {
-    match placed.walk_out(deepest_mm, -dome.normal(deepest_mm), dome.radius_mm()) {
-        Some((depth_mm, _)) if depth_mm > MIN_SEEN * spacing_mm => {
-            Err(ContactError::Unseen { depth_mm, spacing_mm })
-        }
-        _ => Ok(()),
-    }
-}
 
 /// One frame of the linear level, for one pose or for the many poses of a balance: nodes, their compliance and their
 /// forces stay from pose to pose.
@@ -148,7 +129,10 @@ impl<'a> Solver<'a> {
     fn state(&self, mut state: ContactState, ended: Rounds, field: SurfaceField) -> ContactState {
         self.touch.finish(&mut state, ended);
         state.work += field.work();
-        state.field = if state.status == Status::Free { Field::Still } else { Field::Elastic(field) };
+        if state.status != Status::Free {
+            state.field = Field::Elastic(field);
+            state.bearing = Field::Elastic(self.field_of(|candidate| candidate.force_n));
+        }
         state
     }
 
@@ -316,7 +300,7 @@ impl<'a> Solver<'a> {
                 }
             }
         };
-        if touch.candidates.iter().all(|c| c.parts == Parts::whole(c.node)) {
+        if touch.candidates.iter().all(|c| c.parts == NodeParts::whole(c.node)) {
             // Nodes alone: each is its own list's.
             for i in 0..n {
                 for j in 0..i {
@@ -336,7 +320,7 @@ impl<'a> Solver<'a> {
             }
             // Each candidate's shares by the nodes' places in that list.
             let place = |(number, share): (usize, f64)| (numbers.binary_search(&number).unwrap_or(0), share);
-            let shares: Vec<Parts> = touch.candidates.iter().map(|c| c.parts.map(place)).collect();
+            let shares: Vec<NodeParts> = touch.candidates.iter().map(|c| c.parts.map(place)).collect();
             for i in 0..n {
                 for j in 0..=i {
                     let mut block = DMat3::ZERO;
@@ -352,12 +336,17 @@ impl<'a> Solver<'a> {
         touch.work += 60.0 * (n * n) as f64;
     }
 
+    /// What the forces move, turned back to how the dome lay at rest.
     fn field(&self) -> SurfaceField {
+        self.field_of(Candidate::rest_force_n)
+    }
+
+    fn field_of(&self, force_n: impl Fn(&Candidate) -> DVec3) -> SurfaceField {
         let grid = &self.compliance.grid;
         let mut forces: BTreeMap<usize, DVec3> = BTreeMap::new();
         for candidate in self.touch.candidates.iter().filter(|c| c.force_n != DVec3::ZERO) {
             for &(node, share) in candidate.parts.as_slice() {
-                let local = grid.frame(grid.node(node)).transpose() * (candidate.rest_force_n() * share);
+                let local = grid.frame(grid.node(node)).transpose() * (force_n(candidate) * share);
                 *forces.entry(node).or_insert(DVec3::ZERO) += local;
             }
         }

@@ -61,13 +61,7 @@ impl Assembly {
                 a.push(name, color, body, part.mesh.clone(), up * lift);
             }
         }
-        let piece = |piece: &Piece| {
-            piece
-                .shape
-                .triangulate(&piece.name, m.chord)
-                .map(|mesh| mesh.transformed(&piece.part_from_shape))
-                .map_err(|error| PartError::Mesh { part: piece.name.clone(), error })
-        };
+        let piece = |piece: &Piece| placed_mesh(m, piece);
         let camera = purchased::camera_mesh(m)
             .map_err(|error| PartError::Mesh { part: "camera".to_owned(), error })?;
         a.push("camera", [0.12, 0.12, 0.13, 1.0], Body::Fixed, camera, -0.35 * lift);
@@ -104,6 +98,13 @@ impl Assembly {
             explode_mm: DVec3::Z * up_mm,
         });
     }
+}
+
+/// A purchased piece where it sits.
+pub(super) fn placed_mesh(m: &Measures, piece: &Piece) -> Result<TriMesh, PartError> {
+    let mesh = piece.shape.triangulate(&piece.name, m.chord);
+    mesh.map(|mesh| mesh.transformed(&piece.part_from_shape))
+        .map_err(|error| PartError::Mesh { part: piece.name.clone(), error })
 }
 
 impl AssemblyItem {

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use glam::{DAffine3, DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::assembly::{Body, affine};
+use super::assembly::{Body, affine, placed_mesh};
 use super::bearing::behind_lip_mm;
 use super::error::infeasible;
 use super::measures::Measures;
@@ -80,7 +80,21 @@ fn envelope(m: &Measures, assembly: &Assembly) -> Result<(), PartError> {
     let membrane = purchased::membrane(m);
     let membrane = membrane.shape.triangulate("membrane", m.chord).map_err(|e| mesh_error("membrane", e))?;
     let all = assembly.items.iter().filter_map(|item| item.mesh.bounds()).chain(membrane.bounds());
-    let Some(bounds) = all.reduce(|a, b| a.union(&b)) else { return Ok(()) };
+    all.reduce(|a, b| a.union(&b)).map_or(Ok(()), |bounds| fits_envelope(m, &bounds))
+}
+
+/// The lights with their boards fit the envelope beside the block, as [`envelope`] finds it, before any part is made.
+pub(super) fn lights_fit_envelope(m: &Measures) -> Result<(), PartError> {
+    let block = (0.5 * m.outer_mm).extend(0.0);
+    let mut bounds =
+        BoundingBox { min_mm: m.seat_z_mm() * DVec3::Z - block, max_mm: m.seat_z_mm() * DVec3::Z + block };
+    for piece in (0..m.leds.list.len()).flat_map(|i| purchased::led(m, i)) {
+        bounds = placed_mesh(m, &piece)?.bounds().map_or(bounds, |of| bounds.union(&of));
+    }
+    fits_envelope(m, &bounds)
+}
+
+fn fits_envelope(m: &Measures, bounds: &BoundingBox) -> Result<(), PartError> {
     let size = bounds.size_mm();
     // Rounding to f32 may add a little to a length that fits exactly.
     let slack = 1e-6 * size.max_element();

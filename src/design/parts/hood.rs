@@ -39,12 +39,9 @@ pub(super) fn add(m: &Measures, b: &mut Blueprint) -> Result<(), PartError> {
         let needed = top - pupil_z + m.process.min_wall_mm;
         return Err(refused(b, "rim of the hood above the block", rim, (100.0 * needed).ceil() / 100.0));
     }
-    if let Some(view) = &m.lower_view {
-        let highest = view.highest_within(m.bore_radius_mm()) - pupil_z;
-        if rim > highest {
-            let place = "rim of the hood, which stands in the camera's view: height above the pupil, at most";
-            return Err(refused(b, place, rim, (100.0 * highest).floor() / 100.0));
-        }
+    if let Some(highest) = highest_hood_rim_mm(m).filter(|highest| rim > *highest) {
+        let place = "rim of the hood, which stands in the camera's view: height above the pupil, at most";
+        return Err(refused(b, place, rim, (100.0 * highest).floor() / 100.0));
     }
     // From the middle of the block, so that no faces coincide.
     let low = 0.5 * (top + m.platforms.lower.underside_z_mm) - pupil_z;
@@ -65,7 +62,7 @@ pub(super) fn make_room(m: &Measures, b: &mut Blueprint) {
     let (radius, bottom) = (outer + hood.gap_mm, m.platforms.upper.underside_z_mm);
     let at = m.pupil_mm().truncate();
     // As high as the window itself is wide enough.
-    let needed = radius + at.length();
+    let needed = room_mm(m);
     let (mut low, mut high) = (bottom, m.seat_z_mm());
     if m.view.radius_mm(low) >= needed {
         return;

@@ -75,7 +75,7 @@ pub use hood::highest_hood_rim_mm;
 pub use image_rays::RayKind;
 pub use lip::HidingLip;
 pub use measures::Measures;
-pub use pits::{min_well_floor_mm, missing_pit_wall_mm};
+pub use pits::{min_well_floor_mm, missing_light_wall_mm};
 pub use poses::Pose;
 pub use sight::{EdgeRay, MarkerView, markers_of};
 pub use traced::{PoseSight, RayCount, trace_sight};

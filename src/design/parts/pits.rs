@@ -1,12 +1,10 @@
-//! Room for the lights' pits, from the measures alone: walls to the outside, to the magnets' pockets, and between pits. What
-//! the check of walls finds in the finished mesh, this finds of the pits in no time; the mesh has the last word.
+//! Room for the lights' pits, from the measures alone: walls to the outside, to the magnets' pockets, between pits, and at the
+//! set screws that low lights leave little room. What the check of walls finds in the finished mesh, this finds of the pits in no time; the mesh has the last word.
 
 use glam::{DVec2, DVec3};
 
 use super::Measures;
-
-/// Two faces bound a wall where the angle between them has this cosine at least, as in the check of walls.
-const MIN_WALL_COSINE: f64 = 0.95;
+use super::walls::OPPOSITE;
 
 /// A pit as it is cut, seen along the axis: a rectangle in the frame of its light's azimuth.
 struct Pit {
@@ -37,7 +35,7 @@ impl Pit {
         Self {
             outward,
             along_mm: [along[0].min(along[1]), along[2].max(along[3])],
-            wall_end_mm: if up >= MIN_WALL_COSINE { along[2].max(along[3]) } else { along[2] },
+            wall_end_mm: if up >= -OPPOSITE { along[2].max(along[3]) } else { along[2] },
             half_width_mm: 0.5 * leds.board_mm[0].max(leds.package_mm[0]) + leds.clearance_mm,
         }
     }
@@ -78,8 +76,8 @@ pub(super) fn channel_end_mm(m: &Measures) -> f64 {
     leds.center_radius_mm + if beyond > SKIN_MM { beyond + into } else { 0.0 }
 }
 
-/// By how much the thinnest wall of a pit misses what the process makes, mm; 0 where none does.
-pub fn missing_pit_wall_mm(m: &Measures) -> f64 {
+/// By how much the thinnest wall at a light's pit or a set screw's hole misses what the process makes, mm; 0 where none does.
+pub fn missing_light_wall_mm(m: &Measures) -> f64 {
     let wall = m.process.min_wall_mm;
     let pits: Vec<Pit> = (0..m.leds.list.len()).map(|i| Pit::of(m, i)).collect();
     let (pocket, depth) = m.pocket_mm();

@@ -1,7 +1,8 @@
 //! Everything that is checked of the assembled sensor, with all faults in one answer.
 
+use super::checks::lights_fit_envelope;
 use super::error::infeasible;
-use super::pits::missing_pit_wall_mm;
+use super::pits::missing_light_wall_mm;
 use super::traced::{PoseSight, trace_sight};
 use super::{
     Assembly, Measures, Part, PartError, bearing, board_seat, build, check_assembly, light_ways, mount,
@@ -40,16 +41,16 @@ pub fn build_seated(design: &Design, m: &Measures, passes: &[PrintPass]) -> Resu
     made
 }
 
-/// Looks at the seats, the hood and the pits' walls, before any part is made: what most changes of the lights fail at.
+/// Looks at the seats, the envelope, the hood and the pits' walls, before any part is made: what most changes of the lights fail at.
 ///
 /// # Errors
 /// The first of their faults.
 pub fn check_light_room(design: &Design, m: &Measures) -> Result<(), PartError> {
-    let missing_mm = missing_pit_wall_mm(m);
+    let missing_mm = missing_light_wall_mm(m);
     // the mesh has the last word where it is a matter of rounding
     if missing_mm > WALL_ROUNDING_MM {
         let min_mm = m.process.min_wall_mm;
-        let place = "wall of an LED's pit".to_owned();
+        let place = "wall at an LED's pit or a set screw".to_owned();
         return Err(infeasible(
             "upper_platform",
             place,
@@ -59,6 +60,7 @@ pub fn check_light_room(design: &Design, m: &Measures) -> Result<(), PartError> 
         ));
     }
     PartError::all(seats::faults(design, m))?;
+    lights_fit_envelope(m)?;
     light_ways::check(m)
 }
 

@@ -23,7 +23,7 @@ const CHORD_SHARE: f64 = 0.02;
 const FINE_SHARE: f64 = 0.002;
 /// Two faces bound a wall if their normals are opposite to within about 18
 /// degrees; where faces meet at a blunter angle the material ends in an edge.
-const OPPOSITE: f64 = -0.95;
+pub(super) const OPPOSITE: f64 = -0.95;
 /// How much longer the way along a normal can be than the wall is thick: two
 /// faces within [`OPPOSITE`], each with its chords.
 const SEARCH: f64 = 1.0 / 0.95 + 2.0 * CHORD_SHARE;

@@ -17,6 +17,7 @@
 mod envelope_picture;
 mod force_report;
 pub mod formats;
+mod light;
 mod resolution;
 mod sight;
 mod springs;
@@ -28,12 +29,15 @@ pub use resolution::{DesignChoice, Resolution, design_choices, frames_to_average
 pub use sight::{MarkerSight, markers_of};
 pub use springs::{DesignSprings, claimed_loads, springs_of};
 
+use light::light_of;
+
 use domecast_design::layout::{KeyImage, Layout, PatternKey};
 use domecast_design::{Design, DesignError};
 use domecast_optics::ColorChannel;
 use domecast_runtime::constants::{
-    BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, KeyConstants, KeyImageConstants,
-    LayerConstants, MaskConstants, OpticsConstants, SpringTolerances, VERSION, WhiteMarker,
+    BlackDot, CalibrationPriors, CameraConstants, Constants, ElastomerConstants, FORMAT, KeyConstants,
+    KeyImageConstants, LayerConstants, MaskConstants, OpticsConstants, SpringTolerances, VERSION,
+    WhiteMarker,
 };
 
 /// The constants of a design with its dots.
@@ -95,6 +99,7 @@ pub fn with_springs(
                 })
                 .collect(),
         },
+        elastomer: Some(elastomer_of(design)),
         mask: MaskConstants { center_px: [cx, cy], radius_px: sections.runtime.mask_radius_px },
         white_markers,
         black_dots: layout
@@ -112,6 +117,7 @@ pub fn with_springs(
             .collect(),
         key: layout.key.as_ref().map(key_of),
         springs: springs.constants.clone(),
+        light: light_of(design)?,
         tolerances: Some(priors_of(design)),
         optics_uncertainty: None,
         calibrations: Vec::new(),
@@ -131,6 +137,24 @@ fn key_of(key: &PatternKey) -> KeyConstants {
         diameter_mm: key.dot.diameter_mm,
         neighbors: key.dot.neighbors.iter().map(|id| *id as usize).collect(),
         images: key.images.iter().map(image).collect(),
+    }
+}
+
+/// Standard deviation of a silicone's modulus over it: data sheets give Shore A to 3 points, which by Gent's formula (A. N. Gent,
+/// Rubber Chem. Technol. 31, 1958) are 17 % at Shore A 15.
+const YOUNG_SD_PART: f64 = 0.17;
+/// Standard deviation of Poisson's ratio: what bulk moduli of silicones leave open.
+const POISSON_SD: f64 = 0.005;
+
+/// The elastomer of a design.
+fn elastomer_of(design: &Design) -> ElastomerConstants {
+    let elastomer = &design.sections().elastomer;
+    ElastomerConstants {
+        young_modulus_mpa: elastomer.young_modulus_mpa,
+        young_modulus_sd_mpa: YOUNG_SD_PART * elastomer.young_modulus_mpa,
+        poisson_ratio: elastomer.poisson_ratio,
+        poisson_ratio_sd: POISSON_SD,
+        friction: elastomer.friction,
     }
 }
 

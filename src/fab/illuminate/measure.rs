@@ -174,7 +174,7 @@ fn within(light: &Illumination, places: &Places, polar_angle_deg: f64) -> Within
     }
 }
 
-fn percentiles(values: Vec<Option<f64>>) -> Percentiles {
+pub(super) fn percentiles(values: Vec<Option<f64>>) -> Percentiles {
     let [p5, p50, p95] = [0.05, 0.5, 0.95].map(|part| percentile_of(values.clone(), part));
     Percentiles { p5, p50, p95 }
 }
@@ -186,14 +186,19 @@ fn evenness(inside: &[usize], value: &dyn Fn(usize) -> [f64; 3]) -> LightEvennes
     let ratio =
         |of: Percentiles| of.p95.zip(of.p5).filter(|(_, low)| *low > 0.0).map(|(high, low)| high / low);
     let sums: Vec<f64> = values.iter().map(|v| v.iter().sum()).collect();
-    let count = sums.len().max(1) as f64;
-    let mean = sums.iter().sum::<f64>() / count;
-    let variance = sums.iter().map(|sum| (sum - mean).powi(2)).sum::<f64>() / count;
     LightEvenness {
         p95_over_p5: irradiance_mw_mm2.map(ratio),
         irradiance_mw_mm2,
-        sum_coefficient_of_variation: (mean > 0.0).then(|| variance.sqrt() / mean),
+        sum_coefficient_of_variation: coefficient_of_variation(&sums),
     }
+}
+
+/// Standard deviation over mean; `None` where all is dark.
+pub(super) fn coefficient_of_variation(values: &[f64]) -> Option<f64> {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
+    (mean > 0.0).then(|| variance.sqrt() / mean)
 }
 
 fn lights_seen(scene: &Scene) -> Result<LightsSeen, DesignError> {

@@ -13,6 +13,7 @@ use std::str::FromStr;
 
 mod error;
 mod law;
+mod light;
 mod loads;
 mod model;
 mod plain;
@@ -25,11 +26,12 @@ mod uncertainty;
 
 pub use error::ConstantsError;
 pub use law::{MagnetLaw, SpringLaw, SpringLawEnds};
+pub use light::{DiffuserConstants, HollowConstants, LedConstants, LightConstants, LobeConstants};
 pub use loads::{PosedLoad, loads_over};
 pub use model::{
-    BlackDot, CalibrationPriors, CameraConstants, Constants, FORMAT, KeyConstants, KeyImageConstants,
-    LayerConstants, MaskConstants, Matrix4, OpticsConstants, PlainRuntime, SpringConstants, StiffnessAt,
-    VERSION, WhiteMarker,
+    BlackDot, CalibrationPriors, CameraConstants, Constants, ElastomerConstants, FORMAT, KeyConstants,
+    KeyImageConstants, LayerConstants, MaskConstants, Matrix4, OpticsConstants, PlainRuntime,
+    SpringConstants, StiffnessAt, VERSION, WhiteMarker,
 };
 pub use plain::{Bias, PlainFit};
 pub use plain_input::{PlainError, PlainInput};

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::law::SpringLaw;
+use super::light::LightConstants;
 use super::uncertainty::{OpticsUncertainty, SpringTemperature, SpringTolerances, SpringUncertainty};
 use domecast_optics::DomeShape;
 
@@ -30,6 +31,9 @@ pub struct Constants {
     pub camera: CameraConstants,
     /// Layers and dome.
     pub optics: OpticsConstants,
+    /// What the dome is made of; not there in constants of earlier builds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elastomer: Option<ElastomerConstants>,
     /// The circle that the paper's runtime looks into, in the undistorted frame.
     pub mask: MaskConstants,
     /// The markers on the sheet's top face.
@@ -42,6 +46,9 @@ pub struct Constants {
     /// The springs between the platforms.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub springs: Option<SpringConstants>,
+    /// The lights: what `track --shape` reads the skin's shape with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<LightConstants>,
     /// How far the built sensor may be off these numbers: the priors of `calibrate-optics`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerances: Option<CalibrationPriors>,
@@ -51,6 +58,45 @@ pub struct Constants {
     /// What calibrations say of the numbers that they measured, one entry each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub calibrations: Vec<serde_json::Value>,
+}
+
+/// The dome as an elastic body, bonded to the sheet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ElastomerConstants {
+    /// Young's modulus at small strain, N/mm2.
+    pub young_modulus_mpa: f64,
+    /// Its standard deviation, N/mm2.
+    pub young_modulus_sd_mpa: f64,
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
+    /// Its standard deviation.
+    pub poisson_ratio_sd: f64,
+    /// Coulomb's coefficient of friction between membrane and objects.
+    pub friction: f64,
+}
+
+impl ElastomerConstants {
+    /// Whether the numbers are those of a solid.
+    ///
+    /// # Errors
+    /// The field at fault and what is wrong with it.
+    pub fn check(&self) -> Result<(), (&'static str, &'static str)> {
+        let sd = |value: f64| value.is_finite() && value >= 0.0;
+        if !(self.young_modulus_mpa.is_finite() && self.young_modulus_mpa > 0.0) {
+            return Err(("elastomer.young_modulus_mpa", "is no modulus: a number above 0 is needed"));
+        }
+        if !(0.0..=0.4999).contains(&self.poisson_ratio) {
+            return Err(("elastomer.poisson_ratio", "is none: 0 to 0.4999 are possible"));
+        }
+        if !(sd(self.young_modulus_sd_mpa) && sd(self.poisson_ratio_sd)) {
+            return Err(("elastomer", "has a standard deviation that is none: 0 or more are possible"));
+        }
+        if !(0.0..=10.0).contains(&self.friction) {
+            return Err(("elastomer.friction", "is no coefficient: 0 to 10 are possible"));
+        }
+        Ok(())
+    }
 }
 
 /// Standard deviations of the nominal numbers, and of the centroids.

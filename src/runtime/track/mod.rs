@@ -68,6 +68,8 @@ mod options;
 mod pose;
 mod report;
 mod tracker;
+#[cfg(feature = "traction")]
+mod traction;
 mod wrench;
 
 pub use error::TrackError;
@@ -84,4 +86,9 @@ pub use report::{
 #[cfg(feature = "overlay")]
 pub use report::{OverlayError, overlay_png};
 pub use tracker::Tracker;
+#[cfg(feature = "traction")]
+pub use traction::{
+    ContactEstimate, DotTraction, ForceDistribution, HeightSample, LocalForces, TractionStatus,
+    write_json_forces,
+};
 pub use wrench::Springs;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::Serialize;
 
-use domecast_contact::{ContactState, Pressed, PressedObject, PressedTogether, Status};
+use domecast_contact::{ContactState, Pressed, PressedObject, PressedTogether, Status, TouchedNode};
 
 /// How far a frame's contact may be from that of a dome at large strain, as measured against the finite-strain level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -38,6 +38,15 @@ pub struct ContactTruth {
     pub balance_residual_n: Option<f64>,
     /// Contact solves that this took; null where nothing was solved.
     pub solves: Option<u32>,
+    /// Area of the contact, mm2: that of an ellipse whose half ellipsoid of pressure has the second moments of this one (exact for
+    /// Hertz' contact); several objects' are added. Null where nothing touches, like the next three.
+    pub area_mm2: Option<f64>,
+    /// Centre of pressure: the mean of the places that bear a load, as the dome is now, by their pressure, sensor frame, mm.
+    pub point_mm: Option<[f64; 3]>,
+    /// Mean outward normal of the contact by pressure, sensor frame.
+    pub normal: Option<[f64; 3]>,
+    /// Force that the objects put on the dome, sensor frame, N.
+    pub force_n: Option<[f64; 3]>,
     /// Each object's own part, where a scene has several; their wrenches add to the frame's.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<ObjectTruth>,
@@ -74,6 +83,10 @@ impl ContactTruth {
             estimated_error: None,
             balance_residual_n: None,
             solves: None,
+            area_mm2: None,
+            point_mm: None,
+            normal: None,
+            force_n: None,
             objects: Vec::new(),
         }
     }
@@ -110,6 +123,13 @@ impl ContactTruth {
             status => (status_name(status), None),
         };
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+        let loads = || state.nodes.iter().map(|node| (node, node.pressure_mpa * node.area_mm2));
+        let load_n: f64 = loads().map(|(_, load_n)| load_n).sum();
+        let touches = |value: DVec3| (load_n > 0.0).then(|| value.to_array());
+        let mean = |of: &dyn Fn(&TouchedNode) -> DVec3| {
+            loads().map(|(node, load_n)| of(node) * load_n).sum::<DVec3>() / load_n
+        };
+        let area_mm2 = std::f64::consts::PI * state.contact_radius_mm.powi(2);
         Self {
             status,
             note,
@@ -119,6 +139,10 @@ impl ContactTruth {
             estimated_error: None,
             balance_residual_n: finite(residual_n),
             solves: Some(solves),
+            area_mm2: (load_n > 0.0).then_some(area_mm2),
+            point_mm: touches(mean(&|node| node.place_mm)),
+            normal: touches(-mean(&|node| node.inward).normalize_or_zero()),
+            force_n: touches(state.wrench.force_n),
             objects: Vec::new(),
         }
     }

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::cavity::Cavities;
 use super::direct::Emitter;
+use super::hollows::hollows_of;
 use super::lobe::{Diffuser, Lobe};
 use super::parts::LightUse;
 use super::tables::{Source, Ways};
@@ -179,7 +180,7 @@ pub fn cavities_of(measures: &Measures) -> Result<Cavities, SimError> {
     // No light goes down before it goes up into the sheet.
     let leds = &measures.leds;
     let lowest = leds.center_z_mm - leds.emitter_mm - leds.diffuser_thickness_mm;
-    Ok(Cavities::of(&shapes).between(lowest, measures.seat_z_mm()))
+    Ok(hollows_of(&shapes).between(lowest, measures.seat_z_mm()))
 }
 
 /// Half sides of the sheet, mm.

@@ -10,7 +10,6 @@ use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3A};
 use super::LightUse;
 use super::bounds;
 use super::bounds::CoarseLight;
-use super::cavity::Cavities;
 use super::direct::{DirectLight, Emitter, EmitterRule};
 use super::dome_map::{DomeFace, DomeGrid, bicubic};
 use super::field::{FieldParts, LightField};
@@ -350,7 +349,7 @@ fn the_way_is_free_where_the_hollows_join() {
         )
         .at(-2.0, 0.0),
     ];
-    let cavities = Cavities::of(&Construction { added: Vec::new(), cut });
+    let cavities = super::hollows::hollows_of(&Construction { added: Vec::new(), cut });
     assert_eq!(cavities.count(), 3);
     let free = |a: [f64; 3], b: [f64; 3]| cavities.is_free(DVec3::from_array(a), DVec3::from_array(b));
     assert!(free([3.9, 0.0, 1.0], [0.1, 0.5, 1.5]), "inside the box");

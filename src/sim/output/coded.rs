@@ -47,7 +47,7 @@ impl CodedFrame {
             }),
             None => None,
         };
-        let extras = extras(scene, &drawn).map_err(|error| error.to_string())?;
+        let extras = extras(scene, &drawn)?;
         let line = drawn.truth.to_line();
         let Drawn { image: picture, truth, coding, work, .. } = drawn;
         Ok((Self { image, extras, line, truth, coding, work }, picture))
@@ -89,8 +89,8 @@ fn jpeg_bytes(image: &Image8) -> io::Result<Vec<u8>> {
 /// Samples along each side of a height map.
 const HEIGHT_SIDE: u32 = 200;
 
-/// The membrane's heights and the contact's pressure, where the scene wants them.
-fn extras(scene: &Scene, drawn: &Drawn) -> tiff::TiffResult<Vec<(String, Vec<u8>)>> {
+/// The membrane's heights, the contact's pressure and what each pixel sees, where the scene wants them.
+fn extras(scene: &Scene, drawn: &Drawn) -> Result<Vec<(String, Vec<u8>)>, String> {
     let wanted = scene.file().output;
     let number = drawn.truth.frame;
     let dome = scene.optics().dome();
@@ -100,10 +100,16 @@ fn extras(scene: &Scene, drawn: &Drawn) -> tiff::TiffResult<Vec<(String, Vec<u8>
             Some(contact) => contact.height_map_mm(dome, HEIGHT_SIDE as usize),
             None => still_heights_mm(dome, HEIGHT_SIDE as usize),
         };
-        files.push((format!("heights_{number:04}.tif"), float_tiff(&heights, HEIGHT_SIDE)?));
+        files.push((
+            format!("heights_{number:04}.tif"),
+            float_tiff(&heights, HEIGHT_SIDE).map_err(|error| error.to_string())?,
+        ));
     }
     if wanted.pressure {
         files.push((format!("pressure_{number:04}.json"), pressure_json(drawn).into_bytes()));
+    }
+    if let Some(maps) = &drawn.depth {
+        files.extend(maps.files(number).map_err(|error| error.to_string())?);
     }
     Ok(files)
 }

@@ -4,20 +4,32 @@ use std::sync::PoisonError;
 
 use crate::SimError;
 use crate::contact::between::Around;
+use crate::contact::level::map_step_mm;
 use crate::electronics::pass::{Gains, PassContext, Stage, run_coded};
+use crate::output::depth::DepthMaps;
 use crate::output::drawn::{Drawn, Exposed, Scratch};
 use crate::output::render::Renderer;
 use crate::output::truth::ExposureTruth;
+use crate::raster::sensor_state::SensorState;
 use crate::work::Work;
 
 /// What looks at a frame, with the touched dome about it.
 type See<'a> = dyn FnMut(u32, Option<&Around>) -> Result<(), SimError> + 'a;
 
 impl Renderer<'_> {
+    /// What each pixel sees, where the scene wants it.
+    pub(super) fn depth(&self, now: &SensorState, around: Option<&Around>) -> Option<DepthMaps> {
+        let optics = now.eye.optics(self.eye.reference()).filter(|_| self.scene.file().output.depth)?;
+        let step_mm = map_step_mm(self.pipeline.contact);
+        let contact = around.map(|around| around.now.contact.as_deref());
+        Some(DepthMaps::new(now, optics, self.scene.image_size(), step_mm, contact))
+    }
+
     /// From light on the sensor to the camera's bytes, with the gains of the frame.
     pub(super) fn develop(&self, exposed: Exposed, gains: &Gains, scratch: &mut Scratch) -> Drawn {
-        let Exposed { frame, mut truth, contact, mut work, .. } = exposed;
+        let Exposed { frame, mut truth, contact, depth, mut work, .. } = exposed;
         let context = PassContext { frame: truth.frame, seed: self.scene.file().seed, gains: *gains };
+        truth.depth = depth.as_ref().map(|maps| maps.truth);
         let mut coding = None;
         let image = frame.map(|mut frame| {
             self.run_passes(&mut frame, &context, &mut work, |stage| stage > Stage::Focus);
@@ -30,7 +42,7 @@ impl Renderer<'_> {
         if self.pipeline.metering.is_used() {
             truth.exposure = Some(ExposureTruth { gain: gains.exposure, white_balance: gains.balance });
         }
-        Drawn { image, truth, contact, coding, work }
+        Drawn { image, truth, contact, depth, coding, work }
     }
 
     /// The gains of a frame: where they follow the frames before, those are drawn for it that are not known yet.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::electronics::deviation::CodingDeviation;
 use crate::electronics::exposure::Meter;
+use crate::output::depth::DepthMaps;
 use crate::output::truth::FrameTruth;
 use crate::raster::frame::{Frame, Image8};
 use crate::raster::picture::Painter;
@@ -35,6 +36,8 @@ pub struct Drawn {
     pub truth: FrameTruth,
     /// What touches the dome.
     pub contact: Option<Arc<ContactState>>,
+    /// What each pixel sees, where the scene wants it.
+    pub depth: Option<DepthMaps>,
     /// What the camera's lossy code made of the picture; `None` without one.
     pub coding: Option<CodingDeviation>,
     /// What it took.
@@ -52,6 +55,8 @@ pub(super) struct Exposed {
     pub truth: FrameTruth,
     /// What touches the dome.
     pub contact: Option<Arc<ContactState>>,
+    /// What each pixel sees, where the scene wants it.
+    pub depth: Option<DepthMaps>,
     /// What it took so far.
     pub work: Work,
 }

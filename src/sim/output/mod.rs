@@ -4,10 +4,12 @@
 //! are solved, and one thread writes them in their order.
 
 mod coded;
+mod depth;
 mod develop;
 pub(crate) mod drawn;
 mod error;
 mod in_order;
+mod npy;
 mod parts;
 pub(crate) mod render;
 mod timing;
@@ -33,6 +35,7 @@ use crate::scene::Scene;
 use crate::work::Work;
 
 use coded::CodedFrame;
+pub use depth::{BearingMaps, DepthMaps, DepthTruth};
 pub use error::RunError;
 pub use parts::{ContactFault, PLAN_NAME, Summary, TRUTH_NAME, VIDEO_NAME, WorstContact};
 use parts::{Pending, Sent};

@@ -34,7 +34,7 @@ use domecast_optics::numeric::Rigid;
 pub struct Renderer<'a> {
     pub(super) scene: &'a Scene,
     pub(super) pipeline: Pipeline,
-    eye: Projector,
+    pub(super) eye: Projector,
     points: Points,
     field: Option<LensField>,
     effects: Vec<EffectTruth>,
@@ -143,10 +143,6 @@ impl<'a> Renderer<'a> {
         SensorState::new(&self.eye, self.pipeline.geometry, time_s, state, shape, work)
     }
 
-    fn rate_hz(&self) -> f64 {
-        self.scene.file().frames.rate_hz
-    }
-
     /// Only the centres of dots, then markers, in the reference channel: the fastest answer there is.
     ///
     /// # Errors
@@ -222,7 +218,8 @@ impl<'a> Renderer<'a> {
         });
         let truth = self.truth(number, &now, &spots, &parts, around);
         let contact = around.and_then(|around| around.now.contact.clone());
-        Ok(Exposed { frame, meter, truth, contact, work })
+        let depth = self.depth(&now, around);
+        Ok(Exposed { frame, meter, truth, contact, depth, work })
     }
 
     fn count(&self, work: &mut Work) {
@@ -328,7 +325,7 @@ impl<'a> Renderer<'a> {
         let mut states = Vec::with_capacity(rows_s.len());
         for (slice, (_, row_s)) in rows_s.iter().enumerate() {
             let mut one = Work::default();
-            let frames = (after_s + row_s) * self.rate_hz();
+            let frames = (after_s + row_s) * self.scene.file().frames.rate_hz;
             let free = || SkinShape { touch: around.map(|around| around.at(frames)), ..SkinShape::default() };
             let shape = shapes.map_or_else(free, |shapes| shapes.at(frames));
             states.push(self.instant_of(number, now_s + after_s + row_s, shape, &mut one)?);
@@ -385,6 +382,7 @@ impl<'a> Renderer<'a> {
                 .collect(),
             effects: self.effects.clone(),
             exposure: None,
+            depth: None,
         }
     }
 }

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::contact::record::ContactTruth;
 use crate::effect_name::EffectName;
+use crate::output::depth::DepthTruth;
 use crate::plan::Plan;
 use crate::raster::spots::{Spot, Spots};
 use crate::scene::Scene;
@@ -89,6 +90,9 @@ pub struct FrameTruth {
     /// The gains that the camera has set; only where it sets them by itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure: Option<ExposureTruth>,
+    /// How the maps of what each pixel sees are to be read; only where they are written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth: Option<DepthTruth>,
     /// The effects.
     pub effects: Vec<EffectTruth>,
 }

@@ -8,6 +8,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 
 use super::coded::CodedFrame;
+use super::depth::DEPTH_FOLDER;
 use super::error::{RunError, fault};
 use super::parts::{Pending, Sent, Summary, TRUTH_NAME, VIDEO_NAME};
 use super::video::VideoFiles;
@@ -28,6 +29,10 @@ pub(super) struct Writer {
 impl Writer {
     pub fn new(scene: &Scene, folder: &Path) -> Result<Self, RunError> {
         let truth_path = folder.join(TRUTH_NAME);
+        if scene.file().output.depth {
+            let depth = folder.join(DEPTH_FOLDER);
+            fs::create_dir(&depth).map_err(fault("make the folder", &depth))?;
+        }
         let truth = File::create(&truth_path).map_err(fault("write the truth", &truth_path))?;
         Ok(Self {
             folder: folder.to_path_buf(),

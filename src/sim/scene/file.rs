@@ -270,4 +270,6 @@ pub struct OutputSection {
     pub heights: bool,
     /// The contact pressure for each frame: `pressure_NNNN.json`, by node of the dome's surface.
     pub pressure: bool,
+    /// What each pixel sees, for each frame: surface, normal, displacement, pressure and traction (`simulate --depth`).
+    pub depth: bool,
 }

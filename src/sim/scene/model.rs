@@ -71,6 +71,11 @@ impl Scene {
         Ok(())
     }
 
+    /// Writes what each pixel sees ([`crate::output::DepthMaps`]), whatever the file says.
+    pub fn write_depth(&mut self) {
+        self.file.output.depth = true;
+    }
+
     /// The scene as written; every rule between its fields holds.
     pub fn file(&self) -> &SceneFile {
         &self.file

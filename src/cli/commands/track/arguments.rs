@@ -45,6 +45,9 @@ pub struct TrackArguments {
     /// that needs the wrench alone reads a tenth of the bytes.
     #[arg(long, value_name = "NAME,..", value_delimiter = ',', value_parser = field)]
     pub fields: Vec<Field>,
+    /// State the forces on the skin as well: traction (pressure and shear) at each dot, and what touches as a whole.
+    #[arg(long)]
+    pub traction: bool,
     /// Draw dots, axes and force over each frame, into this folder.
     #[arg(long)]
     pub overlay: Option<PathBuf>,
@@ -54,6 +57,13 @@ pub struct TrackArguments {
     /// Write each frame undistorted and masked, as the paper's runtime sees it, into this folder.
     #[arg(long)]
     pub undistorted: Option<PathBuf>,
+    /// Read the skin's shape from each frame's colours, into this folder: `frame_NNNN.height.npy` (mm from its shape at
+    /// rest, negative where it is pressed in), `.height_sd.npy`, `.normal.npy` and `.contact.npy`, all on the raw image's grid.
+    #[arg(long, requires = "rest")]
+    pub shape: Option<PathBuf>,
+    /// A frame of the untouched sensor, which the shape is read against.
+    #[arg(long, requires = "shape", value_name = "FRAME")]
+    pub rest: Option<PathBuf>,
     /// Raw frames of this size: WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb.
     #[arg(long)]
     pub raw: Option<RawSize>,

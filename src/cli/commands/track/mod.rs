@@ -2,6 +2,7 @@
 
 mod arguments;
 mod decode;
+mod shape;
 mod source;
 mod times;
 
@@ -19,9 +20,10 @@ use domecast_files::{OutputRules, StagedFile, StagedFolder};
 use domecast_optics::SensorOptics;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
-    CSV_HEADER, CameraFrame, CameraTurn, DOTS_CSV_HEADER, Tracked, Tracker, Undistorted, overlay_png,
-    write_csv, write_dots_csv, write_json_fields,
+    CSV_HEADER, CameraFrame, CameraTurn, DOTS_CSV_HEADER, ForceDistribution, Tracked, Tracker, Undistorted,
+    overlay_png, write_csv, write_dots_csv, write_json_fields, write_json_forces,
 };
+use shape::ShapeFiles;
 use source::FrameSource;
 use times::FrameTimes;
 
@@ -91,10 +93,11 @@ impl Pictures {
         number: u64,
         frame: &CameraFrame<'_>,
         tracked: &Tracked,
+        tractions: &[(DVec3, DVec3)],
     ) -> Result<(), Failure> {
         if let Some(folder) = &self.overlay {
             let name = format!("overlay_{number:04}.png");
-            match overlay_png(frame, tracked, &self.rest, self.magnify) {
+            match overlay_png(frame, tracked, &self.rest, self.magnify, tractions) {
                 Ok(png) => folder.write(&name, &png)?,
                 Err(error) => output.warn(&format!("{name}: {error}")),
             }
@@ -178,30 +181,79 @@ fn tell_turn(output: &Output, turn: Option<CameraTurn>, tally: &Tally) {
     }
 }
 
+/// What stands before the lines.
+fn header(format: Format) -> String {
+    match format {
+        Format::Jsonl => String::new(),
+        Format::Csv => format!("{CSV_HEADER}\n"),
+        Format::DotsCsv => format!("{DOTS_CSV_HEADER}\n"),
+    }
+}
+
+/// Writes a frame's line or lines.
+fn write_line(
+    line: &mut Vec<u8>,
+    arguments: &TrackArguments,
+    tracked: &Tracked,
+    at_mm: DVec3,
+    forces: Option<&ForceDistribution>,
+) -> io::Result<()> {
+    match arguments.format {
+        Format::Jsonl => match forces {
+            Some(forces) => write_json_forces(line, tracked, &arguments.fields, forces.result()),
+            None => write_json_fields(line, tracked, &arguments.fields),
+        },
+        Format::Csv => write_csv(line, tracked, at_mm),
+        Format::DotsCsv => write_dots_csv(line, tracked),
+    }
+}
+
+fn warn_without_key(output: &Output, arguments: &TrackArguments, constants: &Constants) {
+    if constants.key.is_none() {
+        let whether = "a picture that is turned or mirrored may pass for a good one (constants of a new build have a key)";
+        output.warn(&format!("{}: name no `key`: {whether}", arguments.constants.display()));
+    }
+}
+
+/// The files that are read: none may be written.
+fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
+    let named =
+        arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times).chain(&arguments.rest);
+    named.map(PathBuf::as_path).collect()
+}
+
+fn forces_of(
+    arguments: &TrackArguments,
+    constants: &Constants,
+) -> Result<Option<ForceDistribution>, Failure> {
+    let forces = arguments.traction.then(|| ForceDistribution::new(constants, None));
+    forces.transpose().map_err(|e| unfit(arguments, &e))
+}
+
+fn frame_of(picture: &Result<decode::Picture, String>) -> Result<CameraFrame<'_>, String> {
+    let picture = picture.as_ref().map_err(String::clone)?;
+    let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
+    frame.map_err(|error| error.to_string())
+}
+
 /// Tracks every frame that there is; a frame that cannot be read is reported and skipped.
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     arguments.note_what_is_gone(output);
     let constants = read_constants(&arguments.constants)?;
     let mut tracker = Tracker::new(&constants, arguments.options()).map_err(|e| unfit(arguments, &e))?;
-    let named = arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times);
-    let inputs: Vec<&Path> = named.map(PathBuf::as_path).collect();
+    let mut forces = forces_of(arguments, &constants)?;
+    let inputs = inputs_of(arguments);
     let rules = output.rules(&inputs);
     let mut pictures = Pictures::new(arguments, &rules, &constants, &tracker)?;
+    let mut shape = ShapeFiles::open(arguments, &rules, &constants, &tracker)?;
     let mut sink = Sink::new(arguments.out.as_deref(), &rules)?;
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
     let mut times = FrameTimes::open(arguments.times.as_deref())?;
     let mut line = Vec::new();
-    match arguments.format {
-        Format::Jsonl => {}
-        Format::Csv => sink.put(format!("{CSV_HEADER}\n").as_bytes())?,
-        Format::DotsCsv => sink.put(format!("{DOTS_CSV_HEADER}\n").as_bytes())?,
-    }
+    sink.put(header(arguments.format).as_bytes())?;
     let at_mm = tracker.springs().map_or(DVec3::ZERO, domecast_runtime::track::Springs::at_mm);
     let mut tally = Tally::default();
-    if constants.key.is_none() {
-        let whether = "a picture that is turned or mirrored may pass for a good one (constants of a new build have a key)";
-        output.warn(&format!("{}: name no `key`: {whether}", arguments.constants.display()));
-    }
+    warn_without_key(output, arguments, &constants);
     let mut turn = None;
     while let Some(mut next) = source.next_frame() {
         if arguments.camera_mirrored
@@ -210,11 +262,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             picture.mirror();
         }
         output.step(&format!("frame {}", next.number));
-        let picture = match &next.picture {
-            Ok(picture) => CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes)
-                .map_err(|error| error.to_string()),
-            Err(problem) => Err(problem.clone()),
-        };
+        let picture = frame_of(&next.picture);
         if let Some(time_s) = times.next_s()? {
             tracker.stamp(time_s);
         }
@@ -226,20 +274,28 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
                 tracker.skip(next.number)
             }
         };
+        if let (Ok(frame), Some(shape)) = (&picture, &mut shape) {
+            shape.measure(frame, tracked)?;
+        }
+        if let Some(forces) = &mut forces {
+            forces.update(tracked, &[]);
+        }
         if picture.is_ok() {
             tally.times.push(began.elapsed());
         }
         turn = tracked.camera_turn.or(turn);
         *tally.counts.entry(tracked.status()).or_default() += 1;
         line.clear();
-        match arguments.format {
-            Format::Jsonl => write_json_fields(&mut line, tracked, &arguments.fields)?,
-            Format::Csv => write_csv(&mut line, tracked, at_mm)?,
-            Format::DotsCsv => write_dots_csv(&mut line, tracked)?,
+        write_line(&mut line, arguments, tracked, at_mm, forces.as_ref())?;
+        if let (Ok(_), Some(shape)) = (&picture, &mut shape) {
+            let line = (arguments.format == Format::Jsonl).then_some(&mut line);
+            shape.write(next.number, line, forces.is_some())?;
         }
         sink.put(&line)?;
         if let Ok(frame) = &picture {
-            pictures.write(output, next.number, frame, tracked)?;
+            let dots = forces.as_ref().map_or(&[][..], |forces| &forces.result().dots);
+            let tractions: Vec<_> = dots.iter().map(|dot| (dot.surface_mm, dot.traction_n_mm2)).collect();
+            pictures.write(output, next.number, frame, tracked, &tractions)?;
         }
         source.reuse(next.picture);
     }
@@ -247,6 +303,9 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     if !tally.counts.is_empty() {
         sink.end(output)?;
         pictures.end(output)?;
+        if let Some(shape) = shape {
+            shape.end(output)?;
+        }
     }
     source.end()?;
     if tally.counts.is_empty() {

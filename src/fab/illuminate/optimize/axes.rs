@@ -31,7 +31,7 @@ pub fn neighbours(at: LightPlace, has_arc: bool, [step_mm, step_deg]: [f64; 2]) 
 }
 
 /// What the schema allows of `leds.tilt_deg`.
-const MIN_TILT_DEG: f64 = 30.0;
+pub const MIN_TILT_DEG: f64 = 30.0;
 const MAX_TILT_DEG: f64 = 90.0;
 const MAX_ARC_DEG: f64 = 55.0;
 

@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use super::super::measure::{coefficient_of_variation, percentiles};
 use super::super::numbers::Percentiles;
-use crate::light::{lacking, normal_error_deg, percentile_of};
+use crate::light::{lacking, normal_error_deg};
 use domecast_design::sections::ExposureSection;
 use domecast_sim::Scene;
 use domecast_sim::light::direct::EmitterRule;
@@ -64,10 +65,6 @@ impl LightScore {
         let wanted = exposure.brightest_level / brightest.max(f64::MIN_POSITIVE);
         let largest = exposure.max_level_per_mw_mm2;
         let level_per_mw_mm2 = exposure.level_per_mw_mm2.unwrap_or(wanted).min(largest);
-        let percentiles = |values: Vec<Option<f64>>| {
-            let [p5, p50, p95] = [0.05, 0.5, 0.95].map(|part| percentile_of(values.clone(), part));
-            Percentiles { p5, p50, p95 }
-        };
         let seen = light.places.iter().filter(|place| place.image_px.is_some());
         let errors = seen.map(|place| normal_error_deg(light, place, level_per_mw_mm2)).collect();
         let sums: Vec<f64> = light.places.iter().map(|place| place.direct_mw_mm2().iter().sum()).collect();
@@ -95,12 +92,4 @@ impl LightScore {
 /// Level of the brightest channel of a place at an exposure of 1, part of full scale.
 fn brightest_level(light: &Illumination, place: &IlluminatedPlace) -> f64 {
     (light.seen_levels(place, 1.0) * place.normal).max_element() / 255.0
-}
-
-/// Standard deviation over mean; `None` where all is dark.
-fn coefficient_of_variation(values: &[f64]) -> Option<f64> {
-    let count = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
-    (mean > 0.0).then(|| variance.sqrt() / mean)
 }

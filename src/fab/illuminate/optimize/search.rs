@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::axes::{Axes, neighbours};
+use super::axes::{Axes, MIN_TILT_DEG, neighbours};
 use super::candidate::{Given, LightChoice, LightPlace, Violation};
 use super::choices::{Arrangement, DiffuserKind, diffusers};
 use super::cma::{Cma, SearchPoint};
@@ -30,6 +30,12 @@ const WORTH_NARROW: f64 = 1e-3;
 const FIRST_ARCS_DEG: [f64; 3] = [15.0, 30.0, 40.0];
 /// Depths below the given lights at which a hood is first tried, over the radius of the dome's rim.
 const FIRST_DEPTHS: [f64; 2] = [0.0, 0.2];
+/// Ways outwards at which an arrangement is first tried, over the same radius, and by how much less its lights are tilted,
+/// degrees: between them lies the valley along the wall of the view.
+const FIRST_RADII: [f64; 2] = [0.0, 0.08];
+const FIRST_LEANS_DEG: [f64; 2] = [0.0, 15.0];
+/// Arrangements from which the search goes down, the best of the first tries.
+const MAX_DESCENTS: usize = 4;
 /// Share of the evaluations that the arrangements get together; the rest refines the best.
 const BROAD_SHARE: f64 = 0.7;
 /// Lights that the build may refuse, one after another, before a search goes on.
@@ -150,35 +156,24 @@ impl<'a> Search<'a> {
         let arrangements = Arrangement::all(self.given.design);
         let own = LightChoice { arrangement: arrangements[0], diffuser: self.lobes[0].0, adds_hood: false };
         let diffuser = self.best_diffuser(own, start).unwrap_or(own.diffuser);
-        let mut starts = vec![(LightChoice { diffuser, ..own }, start)];
-        let rim_mm = self.given.design.sections().dome.shape().rim_radius_mm();
+        let mut starts = Vec::new();
         for adds_hood in [false, true].into_iter().filter(|adds| !adds || self.given.takes_hood()) {
-            let skipped = usize::from(!adds_hood);
-            // behind a hood lights may stand deeper
-            let depths: &[f64] = if adds_hood { &FIRST_DEPTHS } else { &[0.0] };
-            for arrangement in arrangements.iter().copied().skip(skipped) {
+            for arrangement in arrangements.iter().copied() {
                 let choice = LightChoice { arrangement, diffuser, adds_hood };
-                let arcs: &[f64] = if arrangement.has_arc() { &FIRST_ARCS_DEG } else { &[0.0] };
-                let at = |depth: &f64, arc: &f64| LightPlace {
-                    half_arc_deg: *arc,
-                    center_z_mm: start.center_z_mm - depth * rim_mm,
-                    ..start
-                };
-                let places = depths.iter().flat_map(|depth| arcs.iter().map(move |arc| at(depth, arc)));
-                let tried: Vec<(LightChoice, LightPlace)> =
-                    places.map(|place| (choice, place.rounded())).collect();
-                let looked = self.look(&tried, f64::INFINITY);
-                let first = looked.into_iter().min_by(Looked::order).filter(|one| one.violation.is_none());
-                match first {
-                    Some(first) => starts.push((choice, first.place)),
+                let looked = self.look(&self.first_tries(choice, start), f64::INFINITY);
+                match looked.into_iter().min_by(Looked::order).filter(|one| one.violation.is_none()) {
+                    Some(first) => starts.push(first),
                     None => self.found.arrangements.push((choice, None)),
                 }
             }
         }
+        starts.sort_by(Looked::order);
         let broad = (BROAD_SHARE * self.options.evaluations as f64) as usize;
-        let share = broad.saturating_sub(self.found.evaluations) / starts.len();
-        for (index, (choice, place)) in starts.into_iter().enumerate() {
-            self.descend(choice, place, 1.0, share, index as u64);
+        let share = broad.saturating_sub(self.found.evaluations) / starts.len().clamp(1, MAX_DESCENTS);
+        for (index, Looked { choice, place, .. }) in starts.into_iter().enumerate() {
+            if index < MAX_DESCENTS {
+                self.descend(choice, place, 1.0, share, index as u64);
+            }
             let is_own = |one: &&Looked| {
                 let of = one.choice;
                 (of.arrangement, of.adds_hood) == (choice.arrangement, choice.adds_hood)
@@ -188,6 +183,31 @@ impl<'a> Search<'a> {
         }
         self.refine();
         self.found
+    }
+
+    /// Places of a coarse grid about the given one, in the order in which they are looked at: the search begins at the best of
+    /// them, which no random number moves.
+    fn first_tries(&self, choice: LightChoice, start: LightPlace) -> Vec<(LightChoice, LightPlace)> {
+        let rim_mm = self.given.design.sections().dome.shape().rim_radius_mm();
+        // behind a hood lights may stand deeper
+        let depths: &[f64] = if choice.adds_hood { &FIRST_DEPTHS } else { &[0.0] };
+        let arcs: &[f64] = if choice.arrangement.has_arc() { &FIRST_ARCS_DEG } else { &[0.0] };
+        let mut tries = Vec::new();
+        for (depth, half_arc_deg) in depths.iter().flat_map(|depth| arcs.iter().map(move |arc| (depth, *arc)))
+        {
+            for (out, lean_deg) in
+                FIRST_RADII.iter().flat_map(|out| FIRST_LEANS_DEG.iter().map(move |lean| (out, lean)))
+            {
+                let place = LightPlace {
+                    center_radius_mm: start.center_radius_mm + out * rim_mm,
+                    center_z_mm: start.center_z_mm - depth * rim_mm,
+                    tilt_deg: (start.tilt_deg - lean_deg).max(MIN_TILT_DEG),
+                    half_arc_deg,
+                };
+                tries.push((choice, place.rounded()));
+            }
+        }
+        tries
     }
 
     /// The diffuser that is best at a place.

@@ -12,6 +12,8 @@ use domecast_springs::Wrench;
 const ZOOM: u32 = 2;
 /// Length of the drawn axes, mm.
 const AXIS_MM: f64 = 4.0;
+/// Length of a traction's arrow on the skin for each N/mm2, mm.
+const MM_PER_N_MM2: f64 = 15.0;
 /// Pixels of the frame for each newton.
 const PX_PER_N: f64 = 25.0;
 
@@ -89,7 +91,8 @@ impl Canvas {
 /// A PNG of the frame, at twice its size. Yellow arrows: dots from where the undeformed dome would show them to where
 /// they are, `magnify` times as long; small red circles: where lost dots should be; green circles: white markers; red,
 /// green and blue lines: the platform's axes; a thick red arrow: the force across the image, 25 px a newton; a red
-/// ring around its start: the force along the axis, to the same scale.
+/// ring around its start: the force along the axis, to the same scale; magenta arrows: `tractions`, places of the deformed skin (sensor frame, mm)
+/// with the force on it over its area (N/mm2), 15 mm a N/mm2 into the scene.
 ///
 /// # Errors
 /// [`OverlayError`].
@@ -98,6 +101,7 @@ pub fn overlay_png(
     tracked: &Tracked,
     rest: &SensorOptics,
     magnify: f64,
+    tractions: &[(DVec3, DVec3)],
 ) -> Result<Vec<u8>, OverlayError> {
     let (width, height) = (frame.width() as u32, frame.height() as u32);
     let size = width.checked_mul(ZOOM).zip(height.checked_mul(ZOOM));
@@ -136,6 +140,12 @@ pub fn overlay_png(
         for (axis, color) in axes {
             if let Ok(end) = optics.project(axis * AXIS_MM) {
                 canvas.arrow(origin, end, color, 1.5);
+            }
+        }
+        for (at_mm, traction_n_mm2) in tractions {
+            let end_mm = *at_mm + *traction_n_mm2 * MM_PER_N_MM2;
+            if let (Ok(from), Ok(to)) = (optics.project_deformed(*at_mm), optics.project_deformed(end_mm)) {
+                canvas.arrow(from, to, [255, 60, 255], 2.0);
             }
         }
         if let Some(Wrench { force_n, .. }) = tracked.wrench {

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec2, Vec3A, Vec4};
 
 use super::face::Face;
 use crate::contact::between::Between;
-use crate::splines::{cubic_slopes, cubics};
+use domecast_light::splines::{cubic_slopes, cubics};
 use domecast_optics::DomeShape;
 
 /// Fewest and most nodes along a side.
@@ -203,12 +203,25 @@ impl Chart {
         Vec2::new(rest_mm.dot(side), rest_mm.dot(up)) * stretch
     }
 
+    /// Tangents of the undeformed dome at a place: its derivatives by the chart's coordinates.
+    #[inline]
+    pub fn tangents(&self, place: Vec2) -> [Vec3A; 2] {
+        let Rough { middle, side, up, per_radius, .. } = self.rough;
+        let (x, y) = (place.x, place.y);
+        let quarter = 0.25 * per_radius * per_radius;
+        let k = (1.0 - place.length_squared() * quarter).max(1e-6).sqrt();
+        let bend = quarter / k;
+        let tangent_x = side * (k - x * x * bend) - up * (x * y * bend) - middle * (x * per_radius);
+        let tangent_y = up * (k - y * y * bend) - side * (x * y * bend) - middle * (y * per_radius);
+        let round_mm = self.round_near(place);
+        [tangent_x, tangent_y].map(|t| self.face.tangent(round_mm, t))
+    }
+
     /// The membrane at a place; `None` outside the chart.
     #[inline]
     pub fn at(&self, place: Vec2) -> Option<Moved> {
-        let Rough { middle, side, up, per_radius, half_mm, per_step, last, .. } = self.rough;
-        let (x, y) = (place.x, place.y);
-        let (gx, gy) = ((x + half_mm) * per_step, (y + half_mm) * per_step);
+        let Rough { half_mm, per_step, last, .. } = self.rough;
+        let (gx, gy) = ((place.x + half_mm) * per_step, (place.y + half_mm) * per_step);
         if !(gx >= 1.0 && gy >= 1.0 && gx < last && gy < last) {
             return None;
         }
@@ -230,13 +243,7 @@ impl Chart {
             by_y += across * dy[row];
         }
         // Tangents of the chart, then of the moved surface.
-        let quarter = 0.25 * per_radius * per_radius;
-        let k = (1.0 - place.length_squared() * quarter).max(1e-6).sqrt();
-        let bend = quarter / k;
-        let tangent_x = side * (k - x * x * bend) - up * (x * y * bend) - middle * (x * per_radius);
-        let tangent_y = up * (k - y * y * bend) - side * (x * y * bend) - middle * (y * per_radius);
-        let round_mm = self.round_near(place);
-        let [tangent_x, tangent_y] = [tangent_x, tangent_y].map(|t| self.face.tangent(round_mm, t));
+        let [tangent_x, tangent_y] = self.tangents(place);
         Some(Moved {
             displacement_mm: Vec3A::from_vec4(u),
             along_x: tangent_x + Vec3A::from_vec4(by_x) * per_step,

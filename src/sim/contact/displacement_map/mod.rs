@@ -143,6 +143,14 @@ impl DisplacementMap {
         })
     }
 
+    /// Area of the deformed membrane over that of the undeformed dome at one of its points; 1 where nothing moves.
+    pub fn area_ratio(&self, rest_mm: Vec3A) -> f32 {
+        let Some((chart, place, moved)) = self.near(rest_mm) else { return 1.0 };
+        let [along_x, along_y] = chart.tangents(place);
+        let ratio = moved.along_x.cross(moved.along_y).length() / along_x.cross(along_y).length();
+        if ratio.is_finite() { ratio } else { 1.0 }
+    }
+
     /// Where a ray that meets the undeformed dome at `rest_mm` along the unit direction `inside` meets the deformed
     /// one: the undeformed place of that point, and how it moved. `None` where the membrane does not move. `near_mm` is how
     /// a point nearby moved, or zero: there the search begins.

@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+"""Judges `track --traction` from outside, by NumPy and SciPy on the files alone: simulated presses against their truth.
+
+- The tractions' sum is the tracked wrench, within 3 % and 0.02 N; without springs it is the contact's force as far as the modulus says.
+- The contact's point, normal and area against the truth's; what nothing touches has no contact.
+- The standard deviations at the dots: how often the truth lies within one, two and three of them, where something touches.
+- Two balls in contact at once.
+
+What must hold fails the script; what only is so is printed.
+
+    scripts/check_forces.py target/release/domecast
+"""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+DESIGNS = pathlib.Path(__file__).resolve().parent.parent / "designs"
+
+
+def simulate(program, folder, name, design, objects, count):
+    scene = {"version": 1, "name": name, "design": str(DESIGNS / f"{design}.json"),
+             "frames": {"count": count, "rate_hz": 10}, "tolerance": {"px": 0.005, "grey": 8},
+             "contact": {"level": "linear", "element_mm": 0.5}, "objects": objects}
+    path = folder / f"{name}.json"
+    path.write_text(json.dumps(scene))
+    out = folder / name
+    subprocess.run([program, "simulate", path, "--depth", "--out", out, "--quiet"], check=True)
+    lines = folder / f"{name}.jsonl"
+    subprocess.run([program, "track", out, "--constants", folder / design / "constants" / "constants.json", "--traction",
+                    "--out", lines, "--quiet"], check=True)
+    read = lambda file: [json.loads(line) for line in file.read_text().splitlines()]
+    return read(lines), read(out / "truth.jsonl"), out
+
+
+def ball(name, radius_mm, places):
+    return {"name": name, "shape": {"kind": "sphere", "radius_mm": radius_mm},
+            "path": [{"time_s": 0.1 * k, "position_mm": list(map(float, at))} for k, at in enumerate(places)]}
+
+
+def at(constants, ball_mm, polar_deg, azimuth_deg, depth_mm):
+    radius, center = constants["optics"]["dome_radius_mm"], constants["optics"].get("dome_center_z_mm", 0.0)
+    polar, azimuth = np.radians([polar_deg, azimuth_deg])
+    out = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    return out * (radius + ball_mm - depth_mm) + [0, 0, center]
+
+
+def true_tractions(out, number, frame):
+    """The truth's at the dots' true images, where they lie in the map."""
+    traction = np.load(out / f"frame_{number:04}.traction.npy")
+    pixels = np.array([dot["image_px"] or [np.nan] * 2 for dot in frame["black_dots"]], float)
+    places = np.nan_to_num(pixels, nan=-1).T[::-1]
+    found = np.stack([map_coordinates(traction[..., k], places, order=1, cval=np.nan) for k in range(3)], -1)
+    found[np.isnan(pixels).any(-1)] = np.nan
+    return found
+
+
+def judge(design, tracked, truth, out, has_springs):
+    zs, rows = [], []
+    for number, (line, true) in enumerate(zip(tracked, truth)):
+        assert line["traction_status"] == "ok", (design, number, line["traction_status"])
+        wanted = true["contact"]["force_n"]
+        contact = line["contact"]
+        if wanted is None:
+            # what springs show at rest before a tare may be taken for a touch, but for no more than that
+            rest = np.linalg.norm(line["wrench"][:3]) if has_springs else 0.0  # of stiff springs
+            assert contact is None or np.linalg.norm(contact["force_n"]) < rest + 0.02, (design, number, contact)
+            continue
+        wanted, load = np.array(wanted), np.linalg.norm(true["contact"]["force_n"])
+        force = np.array(contact["force_n"])
+        if has_springs:
+            pose = np.array(line["pose"])
+            wrench = pose[:3, :3].T @ np.array(line["wrench"][:3])
+            off = np.linalg.norm(force - wrench)
+            assert off < max(0.03 * np.linalg.norm(wrench), 0.02), (design, number, force, wrench)
+        else:
+            off = np.linalg.norm(force - wanted)
+            sd = np.linalg.norm(contact["force_sd_n"]) / np.sqrt(3)
+            assert off < 3 * sd, (design, number, force, wanted, sd)
+        apart = np.array(contact["point_mm"]) - true["contact"]["point_mm"]
+        normal = np.array(true["contact"]["normal"])
+        aside = np.linalg.norm(apart - apart @ normal * normal)
+        turned = np.degrees(np.arccos(min(1.0, normal @ contact["normal"])))
+        dots = line["traction"]
+        found = np.array([dot["n_mm2"] for dot in dots])
+        sd = np.array([dot["noise_sd"] for dot in dots])
+        assert np.isfinite(found).all() and (sd > 0).all()
+        expected = true_tractions(out, number, true)
+        touched = (np.linalg.norm(expected, axis=-1) > 0.01) | (np.linalg.norm(found, axis=-1) > 0.01)
+        pressure = lambda t: -(t * np.array([dot["surface_mm"] for dot in dots]) /
+                               np.linalg.norm([dot["surface_mm"] for dot in dots], axis=-1)[:, None]).sum(-1)
+        zs.extend(((pressure(found) - pressure(expected)) / sd)[touched & ~np.isnan(expected[:, 0])])
+        peak = np.nanmax(np.load(out / f"frame_{number:04}.pressure.npy"))
+        rows.append((load, off / load, aside, contact["point_noise_sd_mm"], turned, contact["area_mm2"] / true["contact"]["area_mm2"],
+                     np.linalg.norm(found, axis=-1).max() / peak))
+    return np.array(zs), np.array(rows)
+
+
+def main():
+    program = pathlib.Path(sys.argv[1]).resolve()
+    all_zs = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for design, polars in (("thumb24", (0, 15, 30, 45)), ("digit-rigid", (0, 15, 30)), ("picam-r20", (0, 20, 40))):
+            built = folder / design
+            subprocess.run([program, "build", DESIGNS / f"{design}.json", "--out", built, "--quiet"], check=True)
+            constants = json.loads((built / "constants" / "constants.json").read_text())
+            radius = constants["optics"]["dome_radius_mm"]
+            size, places = 0.5 * radius, []
+            for k, polar in enumerate(polars):
+                places += [at(constants, size, polar, 40 + 130 * k, depth * radius) for depth in (-0.03, 0.06, 0.09)]
+            tracked, truth, out = simulate(program, folder, f"{design}-balls", design, [ball("ball", size, places)], len(places))
+            zs, rows = judge(design, tracked, truth, out, constants.get("springs") is not None)
+            all_zs.append(zs)
+            within = [100 * np.mean(np.abs(zs) <= k) for k in (1, 2, 3)]
+            print(f"{design}: loads {rows[:, 0].min():.2f} to {rows[:, 0].max():.2f} N; sum off by {100 * rows[:, 1].max():.1f} % at most; point "
+                  f"off along the skin by {np.sqrt((rows[:, 2] ** 2).mean()):.3f} mm rms, {rows[:, 2].max():.3f} at most (sd "
+                  f"{rows[:, 3].min():.3f} to {rows[:, 3].max():.3f}); normal by {rows[:, 4].max():.1f} degrees; area {rows[:, 5].min():.2f} to "
+                  f"{rows[:, 5].max():.2f} and largest traction at a dot {rows[:, 6].min():.2f} to {rows[:, 6].max():.2f} of the truth's area and "
+                  f"peak; pressures at dots within 1, 2, 3 sd: {within[0]:.0f} {within[1]:.0f} {within[2]:.0f} %")
+            # without a height map the ray's blind direction limits the point
+            assert rows[:, 2].max() < 0.05 * radius, rows[:, 2]
+        shared = folder / "two"
+        r = 3.0
+        pair = lambda x, depth: [(x, 0, np.sqrt((10 + r - depth) ** 2 - x * x))]
+        balls = [ball("a", r, pair(3, -0.3) + pair(3, 0.5)), ball("b", r, pair(-3, -0.3) + pair(-3, 0.5))]
+        tracked, truth, out = simulate(program, folder, "two-balls", "thumb24", balls, 2)
+        judge("two balls", tracked, truth, out, True)
+        dots = [(d["surface_mm"][0], np.linalg.norm(d["n_mm2"])) for d in tracked[1]["traction"] if abs(d["surface_mm"][1]) < 1.5]
+        middle = np.mean([t for x, t in dots if abs(x) < 1.0])
+        sides = [max(t for x, t in dots if sign * x > 1.0) for sign in (-1, 1)]
+        print(f"two balls 6 mm apart: largest tractions left and right {sides[0]:.3f} {sides[1]:.3f}, between them {middle:.3f} N/mm2")
+        assert middle < 0.5 * min(sides)
+
+
+main()

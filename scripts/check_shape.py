@@ -1,0 +1,233 @@
+"""Judges `track --shape` by numpy alone: heights, normals and contact against what `simulate --depth` says it drew.
+
+    python3 scripts/check_shape.py DOMECAST [--quick] [--keep FOLDER]
+
+Each press is simulated without noise; noise (2 levels) and JPEG (quality 90, 4:2:2) are added here with numpy and OpenCV, with
+seeds of its own, to press and frame at rest alike. Angles are those about the dome's centre from its pole.
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import cv2
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+NOISE_LEVELS = 2.0
+JPEG = [cv2.IMWRITE_JPEG_QUALITY, 90, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_422]
+failed = 0
+
+
+def check(what, holds, detail=""):
+    global failed
+    failed += not holds
+    print(f"{'ok  ' if holds else 'FAIL'} {what:<46} {detail}", flush=True)
+
+
+def ball(radius, polar_deg, azimuth_deg, depth, dome):
+    """A ball pressed `depth` deep towards the dome's centre."""
+    polar, azimuth = np.radians([polar_deg, azimuth_deg])
+    way = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    at = np.array([0, 0, dome["center_z"]]) + way * (dome["radius"] + radius - depth)
+    return [{"name": "ball", "shape": {"kind": "sphere", "radius_mm": radius},
+             "path": [{"time_s": 0, "position_mm": at.tolist()}]}]
+
+
+def nut(depth, dome):
+    return [{"name": "nut", "shape": {"kind": "mesh", "file": str(ROOT / "designs/scenes/meshes/nut.stl")},
+             "path": [{"time_s": 0, "position_mm": [0, 0, dome["center_z"] + dome["radius"] - depth]}]}]
+
+
+def edge(depth, dome):
+    """The long edge of a block, laid across the pole."""
+    size = [12.0, 3.0, 3.0]
+    top = dome["center_z"] + dome["radius"]
+    return [{"name": "edge", "shape": {"kind": "box", "size_mm": size},
+             "path": [{"time_s": 0, "position_mm": [0, 0, top - depth + 1.5 * np.sqrt(2)],
+                       "rotation_deg": [45, 0, 20]}]}]
+
+
+# Height to 45 degrees (rms, 99 of 100) and to 60 (rms), mm; normals to 45, degrees rms. The last two designs' lights leave part
+# of the dome dark (crescents of the lip, a ring without light), so that not every design can hold what thumb24 does.
+BOUNDS = {
+    "thumb24": (0.010, 0.030, 0.020, 1.5),
+    "digit-rigid": (0.025, 0.070, 0.025, 2.2),
+    "picam-r20": (0.040, 0.070, 0.050, 1.5),
+}
+
+PRESSES = {
+    "thumb24": {
+        "ball on the pole": lambda d: ball(5, 0, 0, 0.5, d),
+        "ball at 25 deg": lambda d: ball(3, 25, 40, 0.4, d),
+        "small ball at 40 deg": lambda d: ball(2, 40, 200, 0.3, d),
+        "edge": lambda d: edge(0.3, d),
+        "nut": lambda d: nut(0.3, d),
+    },
+    "digit-rigid": {"ball at 10 deg": lambda d: ball(4, 10, 100, 0.4, d), "edge": lambda d: edge(0.25, d)},
+    "picam-r20": {"ball at 20 deg": lambda d: ball(6, 20, 300, 0.8, d), "nut": lambda d: nut(0.4, d)},
+}
+
+
+def run(*words):
+    done = subprocess.run([str(w) for w in words], capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"{' '.join(map(str, words))}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def simulate(domecast, folder, design, objects):
+    """Frames of a press, or of rest, without noise; made once."""
+    if (folder / "truth.jsonl").exists():
+        return folder
+    light = json.loads((ROOT / "designs/scenes/lit.json").read_text())["light"]
+    report = folder.parent / design / "report/light.json"
+    light["leds"]["level_per_mw_mm2"] = json.loads(report.read_text())["level_per_mw_mm2"]
+    scene = {"version": 1, "name": folder.name, "design": str(ROOT / f"designs/{design}.json"),
+             "frames": {"count": 1, "rate_hz": 30}, "tolerance": {"px": 0.02, "grey": 0.5}, "light": light}
+    if objects:
+        scene["objects"] = objects
+        scene["contact"] = {"level": "linear", "element_mm": 0.5 if design != "picam-r20" else 1.0}
+    file = folder.with_suffix(".json")
+    file.write_text(json.dumps(scene))
+    run(domecast, "simulate", file, "--out", folder, "--depth", "--quiet")
+    return folder
+
+
+def photograph(picture, seed, jpeg=True, noise=NOISE_LEVELS):
+    """What a camera makes of a picture: noise, then JPEG."""
+    noisy = picture + noise * np.random.default_rng(seed).standard_normal(picture.shape)
+    codes = np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+    if not jpeg:
+        return codes
+    return cv2.imdecode(cv2.imencode(".jpg", codes, JPEG)[1], cv2.IMREAD_COLOR)
+
+
+def errors(truth, shape, dome):
+    """Height and normal errors with the angle of their places from the pole."""
+    surface = np.load(truth / "frame_0000.surface.npy").astype(float)
+    normal = np.load(truth / "frame_0000.normal.npy").astype(float)
+    from_center = surface - [0, 0, dome["center_z"]]
+    true = np.linalg.norm(from_center, axis=2) - dome["radius"]
+    polar = np.degrees(np.arctan2(np.linalg.norm(from_center[..., :2], axis=2), from_center[..., 2]))
+    found = np.load(shape / "frame_0000.height.npy")
+    sd = np.load(shape / "frame_0000.height_sd.npy")
+    own = np.load(shape / "frame_0000.normal.npy")
+    cosine = np.clip((own * normal).sum(axis=2), -1, 1)
+    return {"polar": polar, "true": true, "off": found - true, "sd": sd, "turned": np.degrees(np.arccos(cosine)),
+            "known": np.isfinite(found) & np.isfinite(true)}
+
+
+def track(domecast, frame, rest, constants, out):
+    line = run(domecast, "track", frame, "--constants", constants, "--shape", out, "--rest", rest, "--force")
+    return json.loads(line.splitlines()[0])
+
+
+def judge(domecast, work, design, name, objects, dome, constants):
+    label = f"{design}, {name}"
+    folder = work / f"{design}-{name.replace(' ', '-')}"
+    truth = simulate(domecast, folder, design, objects)
+    rest = simulate(domecast, work / f"{design}-rest", design, None)
+    read = lambda where: cv2.imread(str(where / "frame_0000.png"), cv2.IMREAD_COLOR).astype(float)
+    frame, still = folder / "camera_frame.png", folder / "camera_rest.png"
+    cv2.imwrite(str(frame), photograph(read(truth), 1))
+    cv2.imwrite(str(still), photograph(read(rest), 2))
+    shape = folder / "shape"
+    line = track(domecast, frame, still, constants, shape)
+    e = errors(truth, shape, dome)
+    numbers = {}
+    for limit in (45, 60):
+        here = e["known"] & (e["polar"] <= limit)
+        seen = np.isfinite(e["true"]) & (e["polar"] <= limit)
+        off = np.abs(e["off"][here])
+        numbers[limit] = dict(rms=np.sqrt(np.mean(off**2)), p99=np.percentile(off, 99), worst=off.max(),
+                              normal=np.sqrt(np.mean(e["turned"][here] ** 2)), known=here.sum() / max(1, seen.sum()))
+    n45, n60 = numbers[45], numbers[60]
+    rms45, p99, rms60, turned = BOUNDS[design]
+    check(f"{label}: height to 45 deg", n45["rms"] <= rms45 and n45["p99"] <= p99,
+          f"rms {n45['rms']:.4f} p99 {n45['p99']:.4f} max {n45['worst']:.4f} mm, depth {-np.nanmin(e['true']):.3f}, known {n45['known']:.3f}")
+    check(f"{label}: height to 60 deg", n60["rms"] <= rms60, f"rms {n60['rms']:.4f} p99 {n60['p99']:.4f} mm, known {n60['known']:.3f}")
+    check(f"{label}: normals to 45 deg", n45["normal"] <= turned, f"rms {n45['normal']:.2f} deg; to 60: {n60['normal']:.2f}")
+    ratio = (np.abs(e["off"]) / e["sd"])[e["known"] & (e["polar"] <= 60)]
+    inside = [np.mean(ratio <= k) for k in (1, 2, 3)]
+    holds = all(found >= wanted - 0.04 for found, wanted in zip(inside, (0.683, 0.954, 0.997)))
+    check(f"{label}: sd holds", holds, f"within 1, 2, 3: {inside[0]:.2f} {inside[1]:.2f} {inside[2]:.2f}")
+    # What is pressed by less than a fiftieth of the most is the smear of the simulator's elements.
+    pressure = np.load(truth / "frame_0000.pressure.npy")
+    there, found = pressure > 0.02 * np.nanmax(pressure), np.load(shape / "frame_0000.contact.npy") > 0
+    overlap = (there & found).sum() / max(1, (there | found).sum())
+    drawn = json.loads((truth / "truth.jsonl").read_text().splitlines()[0])["contact"]
+    away = np.linalg.norm(np.subtract(line["contact"]["point_mm"], drawn["point_mm"]))
+    detail = f"{away:.3f} mm; IoU {overlap:.2f}, {line['contact']['area_mm2']:.2f} of {drawn['area_mm2']:.2f} mm2"
+    check(f"{label}: centre of the touch", away <= 0.1 or "ball" not in name, detail)
+    outline = np.array(line["contact"]["outline_px"], np.float32)
+    check(f"{label}: outline", cv2.contourArea(outline) > 0 and line["shape"]["status"] == "ok",
+          f"{len(outline)} corners, {cv2.contourArea(outline):.0f} of {found.sum()} px")
+    return e
+
+
+def faults(domecast, work, dome, constants):
+    """A saturated patch, a spot and a scratch leave the rest within its bounds; what cannot be read is refused by name."""
+    truth, rest = work / "thumb24-ball-on-the-pole", work / "thumb24-ball-on-the-pole/camera_rest.png"
+    frame = cv2.imread(str(truth / "camera_frame.png"))
+    frame[195:215, 398:416] = 255
+    cv2.circle(frame, (239, 287), 5, (30, 30, 30), -1)
+    cv2.line(frame, (262, 140), (300, 152), (200, 200, 200), 1)
+    cv2.imwrite(str(truth / "faulty.png"), frame)
+    track(domecast, truth / "faulty.png", rest, constants, truth / "faulty")
+    e = errors(truth, truth / "faulty", dome)
+    here = e["known"] & (e["polar"] <= 45)
+    rms = np.sqrt(np.mean(e["off"][here] ** 2))
+    check("a patch cut off, a spot, a scratch", rms <= 0.010, f"rms {rms:.4f} mm to 45 deg")
+    for what, patch in {"patch": np.s_[195:215, 398:416], "spot": np.s_[282:292, 234:244]}.items():
+        sds = np.nanmean(np.abs(e["off"][patch]) / e["sd"][patch])
+        check(f"its {what} says so", sds < 1.5 and np.nanmean(e["sd"][patch]) > np.nanmedian(e["sd"]), f"{sds:.2f} sd off")
+
+    def refused(what, word, *words):
+        done = subprocess.run([str(w) for w in (domecast, "track", truth / "camera_frame.png", "--shape",
+                                                truth / "refused", *words)], capture_output=True, text=True)
+        check(f"refused: {what}", done.returncode == 1 and word in done.stderr, done.stderr.strip()[-110:])
+
+    still = cv2.imread(str(rest))
+    # Without its own light blue sees what crosstalk leaves of green.
+    dead = np.dstack([np.rint(0.08 * still[..., 1]).astype(np.uint8), still[..., 1:]])
+    for name, picture in {"swapped": still[..., ::-1], "dead": dead}.items():
+        cv2.imwrite(str(truth / f"{name}.png"), picture)
+    refused("red and blue swapped at rest", "swapped", "--constants", constants, "--rest", truth / "swapped.png")
+    refused("blue lights out at rest", "blue", "--constants", constants, "--rest", truth / "dead.png")
+    old = json.loads(constants.read_text())
+    del old["light"]
+    (truth / "old.json").write_text(json.dumps(old))
+    refused("constants without light", "light is not in", "--constants", truth / "old.json", "--rest", truth / "swapped.png")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("domecast", type=pathlib.Path)
+    parser.add_argument("--quick", action="store_true", help="one press of each design")
+    parser.add_argument("--keep", type=pathlib.Path, help="folder that simulated frames are kept in")
+    parser.add_argument("--only", help="a design")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        work = (arguments.keep or pathlib.Path(scratch)).resolve()
+        work.mkdir(parents=True, exist_ok=True)
+        for design, presses in PRESSES.items():
+            if arguments.only not in (None, design):
+                continue
+            built = work / design
+            if not built.exists():
+                run(arguments.domecast, "build", ROOT / f"designs/{design}.json", "--out", built, "--quiet")
+            constants = built / "constants/constants.json"
+            optics = json.loads(constants.read_text())["optics"]
+            dome = {"radius": optics["dome_radius_mm"], "center_z": optics.get("dome_center_z_mm", 0.0)}
+            for name, objects in list(presses.items())[: 1 if arguments.quick else None]:
+                judge(arguments.domecast, work, design, name, objects(dome), dome, constants)
+            if design == "thumb24":
+                faults(arguments.domecast, work, dome, constants)
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()

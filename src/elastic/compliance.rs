@@ -1,0 +1,225 @@
+//! What a force on one contact node does to every other, and to the whole surface.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use faer::Mat;
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+use crate::between::NodePlaces;
+use crate::body::BondedBody;
+use crate::dome::{ElasticDome, FactorError};
+use crate::grid::{Grid, GridNode};
+
+/// Directions in a node's frame: r, z, phi.
+const AXES: usize = 3;
+
+/// Compliance of the bonded dome between contact nodes, and its spectrum for the field.
+#[derive(Debug, Clone)]
+pub struct Compliance {
+    /// The nodes that forces bear on.
+    pub grid: Grid,
+    /// Places between its nodes.
+    pub places: NodePlaces,
+    /// For ring pairs i >= j and azimuth steps 0..=azimuths/2: displacement at ring i for a force at ring j, the
+    /// azimuth of i less that of j, row by row, mm/N.
+    table: Arc<Vec<[f64; 9]>>,
+    /// For each harmonic, displacements of the surface nodes for forces on the rings.
+    spectrum: Arc<Vec<Spectrum>>,
+}
+
+/// One harmonic's response.
+#[derive(Debug)]
+pub struct Spectrum {
+    /// First ring that this harmonic reaches.
+    pub first_ring: usize,
+    /// Column by column, (ring - first_ring, direction): the surface nodes' three amplitudes, hats included, mm/N.
+    pub columns: Vec<Vec<f64>>,
+}
+
+impl Compliance {
+    /// Factors the dome's stiffness for every harmonic and solves it for every ring.
+    pub fn new(elastomer: &ElasticDome, elements: usize) -> Result<Self, FactorError> {
+        let grid = Grid::new(elastomer.dome, elements);
+        let body = BondedBody::new(elastomer, elements)?;
+        let last = (0..grid.elements).map(|ring| grid.harmonics(ring)).max().unwrap_or(1);
+        let hats: Vec<Vec<(usize, f64)>> = (0..grid.elements).map(|ring| grid.hat(ring)).collect();
+        let solved: Vec<(Spectrum, Vec<f64>)> =
+            (0..last).into_par_iter().map(|m| harmonic(&grid, &body, &hats, m)).collect::<Result<_, _>>()?;
+        let mut table = vec![[0.0; 9]; grid.elements * (grid.elements + 1) / 2 * (grid.azimuths / 2 + 1)];
+        let steps = grid.azimuths / 2 + 1;
+        table.par_chunks_mut(steps).enumerate().for_each(|(pair, entries)| {
+            let (i, j) = rings_of(pair);
+            fill_pair(&grid, &solved, i, j, entries);
+        });
+        let spectrum = Arc::new(solved.into_iter().map(|(spectrum, _)| spectrum).collect());
+        let places = NodePlaces::new(&grid);
+        Ok(Self { grid, places, table: Arc::new(table), spectrum })
+    }
+
+    /// The same dome, its nodes moved by forces on others (number; force in the node's frame, N) where `is_near` is true
+    /// of their place at rest: there an object is looked at. The rest stays, for no node of it can be touched.
+    pub fn displaced(&self, forces: &[(usize, DVec3)], is_near: impl Fn(DVec3) -> bool) -> Self {
+        let mut grid = self.grid.clone();
+        grid.offsets_mm.clear();
+        let by: Vec<(GridNode, DVec3)> = forces.iter().map(|(number, f)| (grid.node(*number), *f)).collect();
+        grid.offsets_mm = (0..grid.len())
+            .map(|number| {
+                let node = grid.node(number);
+                if !is_near(grid.place(node)) {
+                    return DVec3::ZERO;
+                }
+                let moved: DVec3 = by.iter().map(|(by, force)| self.between(node, *by) * *force).sum();
+                grid.frame(node) * moved
+            })
+            .collect();
+        Self { grid, ..self.clone() }
+    }
+
+    /// Displacement at node `at` for a unit force at node `by`, each in its own frame (r, z, phi), mm/N.
+    pub fn between(&self, at: GridNode, by: GridNode) -> DMat3 {
+        if at.ring < by.ring {
+            return self.between(by, at).transpose();
+        }
+        let n = self.grid.azimuths;
+        let ahead = (at.step + n - by.step) % n;
+        let (step, sign) = if 2 * ahead <= n { (ahead, 1.0) } else { (n - ahead, -1.0) };
+        let pair = at.ring * (at.ring + 1) / 2 + by.ring;
+        let e = &self.table[pair * (n / 2 + 1) + step];
+        // Mirrored azimuths turn the sign of what couples phi to the rest.
+        DMat3::from_cols(
+            DVec3::new(e[0], e[3], sign * e[6]),
+            DVec3::new(e[1], e[4], sign * e[7]),
+            DVec3::new(sign * e[2], sign * e[5], e[8]),
+        )
+    }
+
+    /// Harmonics of the field.
+    pub fn spectrum(&self) -> &[Spectrum] {
+        &self.spectrum
+    }
+}
+
+/// Pair number to rings i >= j.
+fn rings_of(pair: usize) -> (usize, usize) {
+    let mut i = ((((8 * pair + 1) as f64).sqrt() - 1.0) / 2.0) as usize;
+    while i * (i + 1) / 2 > pair {
+        i -= 1;
+    }
+    while (i + 1) * (i + 2) / 2 <= pair {
+        i += 1;
+    }
+    (i, pair - i * (i + 1) / 2)
+}
+
+/// A ring's unit force along an axis in one harmonic, as parts of the surface nodes' (node, direction).
+///
+/// The pole is one node: it pushes along z in the harmonic 0 alone, and sideways in the harmonic 1 alone, where
+/// the same force is half in u_r and half in -u_phi at every azimuth.
+fn ring_load(
+    grid: &Grid,
+    hat: &[(usize, f64)],
+    ring: usize,
+    axis: usize,
+    m: usize,
+) -> Vec<((usize, usize), f64)> {
+    if grid.harmonics(ring) <= m {
+        return Vec::new();
+    }
+    let factor = grid.hat_harmonic(ring, m);
+    let along =
+        |direction: usize, factor: f64| hat.iter().map(move |(p, part)| ((*p, direction), part * factor));
+    match (ring, axis, m) {
+        (0, 1, 0) => along(1, 1.0).collect(),
+        (0, 0 | 2, 1) => {
+            let half = if axis == 0 { 0.5 } else { -0.5 };
+            along(0, half).chain(along(2, -half)).collect()
+        }
+        (0, ..) => Vec::new(),
+        _ => along(axis, factor).collect(),
+    }
+}
+
+/// Solves one harmonic: the surface's response to every ring that has a hat, and the rings' own, hats included.
+pub(crate) fn harmonic(
+    grid: &Grid,
+    body: &BondedBody,
+    hats: &[Vec<(usize, f64)>],
+    m: usize,
+) -> Result<(Spectrum, Vec<f64>), FactorError> {
+    let first_ring = (0..hats.len()).find(|ring| grid.harmonics(*ring) > m).unwrap_or(hats.len());
+    // Rings between that do not reach this harmonic have zero columns, and are rare.
+    let rings = hats.len() - first_ring;
+    let loads: Vec<Vec<((usize, usize), f64)>> = (0..AXES * rings)
+        .map(|column| {
+            let ring = first_ring + column / AXES;
+            ring_load(grid, &hats[ring], ring, column % AXES, m)
+        })
+        .collect();
+    let mut rhs = Mat::<f64>::zeros(body.unknowns(), AXES * rings);
+    for (column, load) in loads.iter().enumerate() {
+        for &((p, direction), part) in load {
+            let (unknown, sign) = body.surface_unknown(p, direction);
+            rhs[(unknown, column)] += sign * part;
+        }
+    }
+    body.mask(m, &mut rhs);
+    body.factor(m)?.solve(&mut rhs);
+    let surface = 2 * grid.elements + 1;
+    let mut columns = Vec::with_capacity(AXES * rings);
+    for column in 0..AXES * rings {
+        let mut values = Vec::with_capacity(AXES * surface);
+        for p in 0..surface {
+            for axis in 0..AXES {
+                let (unknown, sign) = body.surface_unknown(p, axis);
+                values.push(sign * rhs[(unknown, column)]);
+            }
+        }
+        columns.push(values);
+    }
+    // What the rings see with their own hats.
+    let mut own = Vec::with_capacity((AXES * rings).pow(2));
+    for values in &columns {
+        for load in &loads {
+            own.push(load.iter().map(|&((p, direction), part)| part * values[AXES * p + direction]).sum());
+        }
+    }
+    Ok((Spectrum { first_ring, columns }, own))
+}
+
+/// Sums the harmonics of one pair of rings over the azimuth steps.
+fn fill_pair(grid: &Grid, solved: &[(Spectrum, Vec<f64>)], i: usize, j: usize, entries: &mut [[f64; 9]]) {
+    let waves: Vec<(f64, f64)> = (0..grid.azimuths)
+        .map(|k| {
+            let (sine, cosine) = (TAU * k as f64 / grid.azimuths as f64).sin_cos();
+            (cosine, sine)
+        })
+        .collect();
+    for (m, (spectrum, own)) in solved.iter().enumerate() {
+        if i < spectrum.first_ring || j < spectrum.first_ring {
+            continue;
+        }
+        let rings = AXES * (grid.elements - spectrum.first_ring);
+        let (a, b) = (AXES * (i - spectrum.first_ring), AXES * (j - spectrum.first_ring));
+        let g: [f64; 9] = std::array::from_fn(|e| own[(b + e % 3) * rings + a + e / 3]);
+        if g.iter().all(|v| *v == 0.0) {
+            continue;
+        }
+        for (step, entry) in entries.iter_mut().enumerate() {
+            let (cosine, sine) = waves[m * step % grid.azimuths];
+            for row in 0..3 {
+                for column in 0..3 {
+                    let e = 3 * row + column;
+                    // r, z even; phi odd. A force along phi is the other family, with u_phi = -U_phi cos.
+                    let wave = match (row == 2, column == 2) {
+                        (false, false) | (true, true) => cosine,
+                        (true, false) => sine,
+                        (false, true) => -sine,
+                    };
+                    entry[e] += g[e] * wave;
+                }
+            }
+        }
+    }
+}

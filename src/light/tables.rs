@@ -1,0 +1,203 @@
+//! Each light's own tables over the dome, for a flux of one: computed once for a design, whatever its lights are
+//! driven with, and kept for the next scene of the same design.
+
+use std::sync::{Arc, OnceLock};
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::cavity::Cavities;
+use super::direct::{DirectLight, Emitter, EmitterRule};
+use super::dome_map::{DomeFace, DomeGrid, bicubic};
+use super::radiosity::{DomeRoom, Rings, Underside};
+use super::shelf::Shelf;
+use domecast_optics::SensorOptics;
+
+/// Cells across the table on the dome; those on the shells inside it, where light is smoother, have fewer.
+const DOME_CELLS: usize = 60;
+/// Cells across the tables on the shells.
+pub const SHELL_CELLS: usize = 36;
+
+/// Radii of the shells for moved points, parts of the dome's; in a flat cap nearer to it ([`Ways::shell`]).
+pub const SHELLS: [f64; 3] = [1.0, 0.86, 0.72];
+
+/// Directions in which a table is compared with what it stands for.
+const PROBES: usize = 64;
+
+/// A light and how the camera's channels see it.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// The emitter, at a flux of one.
+    pub emitter: Emitter,
+    /// Layers and dome with the indices of its colour.
+    pub optics: SensorOptics,
+    /// Flux that the red, green and blue channel see of it, mW.
+    pub seen_mw: [f64; 3],
+}
+
+/// What stands between the lights and the membrane.
+#[derive(Debug, Clone)]
+pub struct Ways {
+    /// The lights.
+    pub sources: Vec<Source>,
+    /// Layers and dome for red, green and blue.
+    pub optics: [SensorOptics; 3],
+    /// What the platform leaves open; `None` where its shadow does not count.
+    pub cavities: Option<Cavities>,
+    /// Share of the light that gets through the platform.
+    pub through_platform: f64,
+    /// Half sides of the sheet, mm.
+    pub sheet_half_mm: DVec2,
+    /// Whether the sheet's faces take and send back their share.
+    pub fresnel: bool,
+}
+
+impl Ways {
+    /// Vector irradiance of one source at a point, for a flux of one, 1/mm^2.
+    pub fn flux(&self, source: &Source, point_mm: DVec3, rule: &EmitterRule) -> DVec3 {
+        let light = DirectLight {
+            optics: &source.optics,
+            cavities: self.cavities.as_ref(),
+            through_platform: self.through_platform,
+            sheet_half_mm: self.sheet_half_mm,
+            fresnel: self.fresnel,
+        };
+        light.vector_irradiance(&source.emitter, point_mm, rule)
+    }
+
+    /// Radius of the dome, mm.
+    pub fn radius_mm(&self) -> f64 {
+        self.optics[1].dome_radius_mm()
+    }
+
+    /// The face of the dome.
+    pub fn face(&self) -> DomeFace {
+        DomeFace::of(self.optics[1].dome())
+    }
+
+    /// How far the shells lie apart, over what they do in a hemisphere: a cap has less room.
+    pub fn room(&self) -> f64 {
+        (self.optics[1].dome().height_mm() / self.radius_mm()).min(1.0)
+    }
+
+    /// Radius of a shell, part of the dome's.
+    pub fn shell(&self, part: f64) -> f64 {
+        1.0 - (1.0 - part) * self.room()
+    }
+
+    /// The point of a place of the dome, or of a shell inside it.
+    pub fn point(&self, place: DVec3, part: f64) -> DVec3 {
+        // A shell of the cylinder is narrower, not lower.
+        let up = if place.z < 0.0 { place.z } else { place.z * part };
+        let point = self.optics[1].dome().center_mm() + (place * part).with_z(up) * self.radius_mm();
+        // The rim of the dome is silicone, not the sheet's top beside it.
+        point.with_z(point.z.max(1e-9 * self.radius_mm()))
+    }
+
+    /// Irradiance of the undeformed membrane by one source, for a flux of one.
+    pub fn still(&self, source: &Source, place: DVec3, rule: &EmitterRule) -> f64 {
+        self.flux(source, self.point(place, 1.0), rule).dot(self.face().normal(place)).max(0.0)
+    }
+}
+
+/// A source's vector irradiance along x, y and z, then the irradiance of a surface whose normal is the direction: looked up
+/// for itself, it is smoother than its parts.
+pub type Node = [f64; 4];
+
+/// A table over the dome for each source.
+#[derive(Debug)]
+pub struct Tables {
+    /// Their grid.
+    pub grid: DomeGrid,
+    /// For each source, its values at the nodes.
+    pub sources: Vec<Vec<Node>>,
+    /// Largest error seen in the probes, as a part of the source's largest value.
+    pub error: f64,
+    /// Points at which one source was computed exactly.
+    pub evaluations: u64,
+}
+
+/// All that is computed once for a design and a choice of effects.
+#[derive(Debug, Default)]
+pub struct Prepared {
+    dome: OnceLock<Tables>,
+    shells: OnceLock<Vec<Tables>>,
+    rooms: OnceLock<Vec<DomeRoom>>,
+}
+
+impl Prepared {
+    /// Vector irradiance of each source on the undeformed dome.
+    pub fn dome(&self, ways: &Ways) -> &Tables {
+        self.dome.get_or_init(|| dome_tables(ways))
+    }
+
+    /// The same on the shells inside it.
+    pub fn shells(&self, ways: &Ways) -> &[Tables] {
+        self.shells.get_or_init(|| {
+            SHELLS
+                .iter()
+                .skip(1)
+                .map(|&part| {
+                    tables(ways, ways.shell(part), DomeGrid::with_cells(SHELL_CELLS).over(ways.face()))
+                })
+                .collect()
+        })
+    }
+
+    /// The dome as a room, for each channel.
+    pub fn rooms(&self, ways: &Ways) -> &[DomeRoom] {
+        let underside = if ways.fresnel { Underside::Fresnel } else { Underside::Dark };
+        let room = |optics| DomeRoom::new(optics, Rings::usual(ways.face()), underside);
+        self.rooms.get_or_init(|| ways.optics.par_iter().map(room).collect())
+    }
+}
+
+/// The tables for a key: text of the design and flags of the effects.
+pub fn prepared(key: &str) -> Arc<Prepared> {
+    static SHELF: Shelf<Prepared> = Shelf::new();
+    SHELF.get(key)
+}
+
+fn dome_tables(ways: &Ways) -> Tables {
+    let rule = EmitterRule::default();
+    let made = tables(ways, 1.0, DomeGrid::with_cells(DOME_CELLS).over(ways.face()));
+    let off = |(source, table): (&Source, &Vec<Node>)| {
+        let probes = (0..PROBES).into_par_iter().map(|i| {
+            let direction = probe(ways.face(), i);
+            let [.., found] = bicubic(&made.grid, table, made.grid.coordinates(direction));
+            let exact = ways.still(source, direction, &rule);
+            (exact, (found - exact).abs())
+        });
+        let larger = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.max(b.1));
+        let (largest, off) = probes.reduce(|| (f64::MIN_POSITIVE, 0.0), larger);
+        off / largest
+    };
+    let error = ways.sources.iter().zip(&made.sources).map(off).fold(0.0, f64::max);
+    Tables { error, evaluations: made.evaluations + PROBES as u64, ..made }
+}
+
+/// Vector irradiance of each source on the sphere of a part of the dome's radius.
+fn tables(ways: &Ways, part: f64, grid: DomeGrid) -> Tables {
+    let rule = EmitterRule::default();
+    let fill = |source| {
+        grid.fill_in_parallel(|direction| {
+            let flux = ways.flux(source, ways.point(direction, part), &rule);
+            flux.extend(flux.dot(grid.face.normal(direction)).max(0.0)).to_array()
+        })
+    };
+    let sources = ways.sources.iter().map(fill).collect();
+    Tables { grid, sources, error: 0.0, evaluations: grid.evaluations() }
+}
+
+/// Exact evaluations of each source, with or without shells.
+pub fn predicted_evaluations(shells: bool) -> u64 {
+    let of = |cells| DomeGrid::with_cells(cells).evaluations();
+    let inside = if shells { (SHELLS.len() as u64 - 1) * of(SHELL_CELLS) } else { 0 };
+    PROBES as u64 + of(DOME_CELLS) + inside
+}
+
+/// Places spread evenly over the dome (a golden spiral), none of them a node of a table.
+fn probe(face: DomeFace, i: usize) -> DVec3 {
+    let z = face.level((i as f64 + 0.5) / PROBES as f64);
+    face.place(i as f64 * 2.399_963_229_728_653, z)
+}

@@ -1,0 +1,275 @@
+//! Where the skin is touched, from its shape.
+//!
+//! On a soft half-space the pressure `p` of a touch and the depth `u` of the skin are bound by `p = E*/2 |k| u` in the Fourier
+//! plane (K. L. Johnson, Contact Mechanics, 1985, 3.2). So the pressure over half the modulus is `|k| u`: as large as slopes are,
+//! and as noisy. It ends where the touch does, with a steep edge, while the depth goes on smoothly for long. The depth is laid
+//! out about the deepest place by the stereographic projection, which keeps circles.
+
+use glam::{DMat2, DVec2, DVec3, Vec2, Vec3A};
+use nalgebra::{SMatrix, SVector};
+
+use super::cells::{Cells, View};
+use super::fill::{Pyramid, Weighted};
+use super::fourier;
+use domecast_optics::DomeShape;
+
+/// Places along each side of the chart.
+const SIDE: usize = 128;
+
+/// Depth from which on a touch is looked for, mm, and in deviations of the depth.
+const MIN_DEPTH_MM: f32 = 0.015;
+const MIN_DEPTH_SDS: f32 = 4.0;
+
+/// The chart reaches this much farther than where the skin is pressed in by a fifth of the depth.
+const REACH: f32 = 1.8;
+
+/// Smoothing, standard deviation in steps of the chart.
+const SMOOTHING_STEPS: f32 = 1.2;
+
+/// Pressure at the edge of a ball's touch of radius a, smoothed by s, over its largest: this times `sqrt(2 s / a)`. It is the
+/// mean of `sqrt(max(0, z))` over a normal z (Hertz' pressure falls as the root of the distance to the edge).
+const EDGE_PART: f32 = 0.411;
+
+/// The same where nothing is known of the radius yet, and its bounds.
+const FIRST_PART: f32 = 0.15;
+const PARTS: [f32; 2] = [0.08, 0.3];
+
+/// A touch of the skin. Sensor frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkinContact {
+    /// Area, on the dome at rest, mm^2.
+    pub area_mm2: f64,
+    /// Centre of pressure on the skin, mm.
+    pub point_mm: DVec3,
+    /// Mean outward normal by pressure.
+    pub normal: DVec3,
+    /// The deepest place of the skin, mm.
+    pub deepest_mm: DVec3,
+    /// How deep it lies under its shape at rest, mm.
+    pub depth_mm: f64,
+    /// Standard deviation of that, mm.
+    pub depth_sd_mm: f64,
+    /// Outline of the touched pixels about the deepest place, raw px, in their order.
+    pub outline_px: Vec<Vec2>,
+    /// Principal curvatures of the skin at the deepest place, 1/mm, the larger first: positive where it is hollow, as under a
+    /// ball. `None` where the touch is too small to tell.
+    pub curvatures_per_mm: Option<[f64; 2]>,
+}
+
+/// The chart of one touch.
+pub(super) struct Chart {
+    center: Vec3A,
+    side_x: Vec3A,
+    side_y: Vec3A,
+    step_mm: f32,
+    radius_mm: f32,
+    center_mm: Vec3A,
+    pressure: Vec<f32>,
+    threshold: f32,
+}
+
+impl Chart {
+    /// The pressure of a touch; `None` where nothing is pressed in. `depths` are signed distances, NaN beside the dome.
+    pub fn new(
+        cells: &Cells,
+        view: &View,
+        points: &[Vec3A],
+        depths: &[f32],
+        sd_mm: f32,
+        dome: &DomeShape,
+    ) -> Option<Self> {
+        let deepest = deepest(depths)?;
+        if depths[deepest] > -MIN_DEPTH_MM.max(MIN_DEPTH_SDS * sd_mm) {
+            return None;
+        }
+        let center_mm = dome.center_mm().as_vec3a();
+        let out = |cell: usize| (points[cell] - center_mm).normalize_or(Vec3A::Z);
+        let is_pressed = |cell: &usize| view.is_dome[*cell] && depths[*cell] < 0.2 * depths[deepest];
+        let pressed: Vec<usize> = (0..cells.count()).filter(is_pressed).collect();
+        let center = pressed.iter().map(|cell| out(*cell)).sum::<Vec3A>().normalize_or(out(deepest));
+        let side_x = center.any_orthonormal_vector();
+        let mut chart = Self {
+            center,
+            side_x,
+            side_y: center.cross(side_x),
+            step_mm: 1.0,
+            radius_mm: dome.radius_mm() as f32,
+            center_mm,
+            pressure: Vec::new(),
+            threshold: f32::INFINITY,
+        };
+        let far = pressed.iter().map(|cell| chart.flat(points[*cell]).length()).fold(0.0, f32::max);
+        // At least sixteen cells to each side: the edge of a small touch needs places around it.
+        let near = (points[deepest] - points[(deepest + 1).min(points.len() - 1)]).length();
+        let reach = (REACH * far).max(16.0 * near.min(0.1 * chart.radius_mm)).min(1.5 * chart.radius_mm);
+        chart.step_mm = 2.0 * reach / SIDE as f32;
+        chart.pressure = chart.depth_map(cells, view, points, depths);
+        chart.find_pressure(near.min(reach));
+        Some(chart)
+    }
+
+    /// Stereographic coordinates of a point of the skin, mm.
+    #[inline]
+    fn flat(&self, point_mm: Vec3A) -> Vec2 {
+        let out = (point_mm - self.center_mm).normalize_or(self.center);
+        let along = 2.0 * self.radius_mm / (1.0 + out.dot(self.center)).max(1e-3);
+        Vec2::new(out.dot(self.side_x), out.dot(self.side_y)) * along
+    }
+
+    #[inline]
+    fn place(&self, point_mm: Vec3A) -> Vec2 {
+        self.flat(point_mm) / self.step_mm + Vec2::splat(0.5 * SIDE as f32)
+    }
+
+    /// The depths at the chart's places.
+    fn depth_map(&self, cells: &Cells, view: &View, points: &[Vec3A], depths: &[f32]) -> Vec<f32> {
+        let mut values: Vec<Weighted> = vec![(Vec3A::ZERO, 0.0); SIDE * SIDE];
+        for cell in (0..cells.count()).filter(|cell| view.is_dome[*cell]) {
+            let at = self.place(points[cell]);
+            let low = at.floor();
+            let part = at - low;
+            for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+                let (x, y) = (low.x + dx, low.y + dy);
+                if x >= 0.0 && y >= 0.0 && x < SIDE as f32 && y < SIDE as f32 {
+                    let weight = (1.0 - (part.x - dx).abs()) * (1.0 - (part.y - dy).abs());
+                    let place = &mut values[y as usize * SIDE + x as usize];
+                    place.0.x += weight * depths[cell];
+                    place.1 += weight;
+                }
+            }
+        }
+        for place in &mut values {
+            *place = if place.1 > 0.0 { (place.0 / place.1, place.1.min(1.0)) } else { (Vec3A::ZERO, 0.0) };
+        }
+        Pyramid::default().fill(SIDE, &mut values);
+        // The square goes on periodically: its margin leads to zero.
+        let fade = |i: usize| {
+            let to_edge = i.min(SIDE - 1 - i) as f32 / (0.15 * SIDE as f32);
+            if to_edge < 1.0 { 0.5 - 0.5 * (std::f32::consts::PI * to_edge).cos() } else { 1.0 }
+        };
+        values.iter().enumerate().map(|(i, (v, _))| v.x * fade(i % SIDE) * fade(i / SIDE)).collect()
+    }
+
+    /// From depth to pressure over half the modulus, and the level at which it ends.
+    fn find_pressure(&mut self, cell_mm: f32) {
+        let per_mm = std::f32::consts::TAU / (SIDE as f32 * self.step_mm);
+        let smooth = SMOOTHING_STEPS * std::f32::consts::TAU / SIDE as f32;
+        fourier::filter(&mut self.pressure, SIDE, |x, y| {
+            let wave = (x * x + y * y).sqrt();
+            -wave * per_mm * (-0.5 * (wave * smooth).powi(2)).exp()
+        });
+        let largest = self.pressure.iter().fold(0.0_f32, |max, p| max.max(*p));
+        self.threshold = FIRST_PART * largest;
+        let radius_mm = (self.area_mm2() / std::f64::consts::PI).sqrt() as f32;
+        let smoothed_mm = (SMOOTHING_STEPS * self.step_mm).hypot(0.5 * cell_mm);
+        let part = EDGE_PART * (2.0 * smoothed_mm / radius_mm.max(smoothed_mm)).sqrt();
+        self.threshold = part.clamp(PARTS[0], PARTS[1]) * largest;
+    }
+
+    /// Pressure at a point of the skin, over that at the edge of the touch.
+    #[inline]
+    pub fn at(&self, point_mm: Vec3A) -> f32 {
+        let at = self.place(point_mm);
+        let low = at.floor();
+        let last = SIDE as f32 - 1.0;
+        if !(low.x >= 0.0 && low.y >= 0.0 && low.x < last && low.y < last) {
+            return 0.0;
+        }
+        let (part, start) = (at - low, low.y as usize * SIDE + low.x as usize);
+        let of = |i: usize| self.pressure[start + i];
+        let mix = |a: f32, b: f32, part: f32| a + (b - a) * part;
+        mix(mix(of(0), of(1), part.x), mix(of(SIDE), of(SIDE + 1), part.x), part.y) / self.threshold
+    }
+
+    /// Area where the pressure is above its level at the edge, on the dome at rest.
+    fn area_mm2(&self) -> f64 {
+        let inside = (0..SIDE * SIDE).filter(|i| self.pressure[*i] > self.threshold);
+        let areas = inside.map(|i| {
+            let flat = Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) - Vec2::splat(0.5 * SIDE as f32);
+            // The projection's scale.
+            let square = (flat * self.step_mm).length_squared() / (4.0 * self.radius_mm * self.radius_mm);
+            f64::from((self.step_mm / (1.0 + square)).powi(2))
+        });
+        areas.sum()
+    }
+
+    /// What the touch is as a whole; `pressures` are [`Chart::at`] of the cells.
+    pub fn contact(
+        &self,
+        points: &[Vec3A],
+        normals: &[Vec3A],
+        depths: &[f32],
+        pressures: &[f32],
+    ) -> Option<SkinContact> {
+        let deepest = deepest(depths)?;
+        let (mut sum, mut point, mut normal) = (0.0, DVec3::ZERO, DVec3::ZERO);
+        for (cell, pressure) in pressures.iter().enumerate().filter(|(_, p)| **p > 1.0) {
+            let load = f64::from(*pressure);
+            sum += load;
+            point += load * points[cell].as_dvec3();
+            normal += load * normals[cell].as_dvec3();
+        }
+        let area_mm2 = self.area_mm2();
+        (sum > 0.0).then(|| SkinContact {
+            area_mm2,
+            point_mm: point / sum,
+            normal: normal.normalize_or_zero(),
+            deepest_mm: points[deepest].as_dvec3(),
+            depth_mm: f64::from(-depths[deepest]),
+            depth_sd_mm: f64::NAN,
+            outline_px: Vec::new(),
+            curvatures_per_mm: curvatures(points, normals, pressures, deepest, area_mm2),
+        })
+    }
+}
+
+fn deepest(depths: &[f32]) -> Option<usize> {
+    let known = depths.iter().enumerate().filter(|(_, depth)| depth.is_finite());
+    known.min_by(|a, b| a.1.total_cmp(b.1)).map(|(cell, _)| cell)
+}
+
+/// Fewest cells that curvatures are fitted to.
+const MIN_FITTED: usize = 30;
+
+/// Curvatures of the skin at a cell: of the paraboloid through the points of the touch within half its radius.
+fn curvatures(
+    points: &[Vec3A],
+    normals: &[Vec3A],
+    pressures: &[f32],
+    at: usize,
+    area_mm2: f64,
+) -> Option<[f64; 2]> {
+    let (origin, up) = (points[at].as_dvec3(), normals[at].as_dvec3().try_normalize()?);
+    let (x, y) = up.any_orthonormal_pair();
+    let reach = 0.5 * (area_mm2 / std::f64::consts::PI).sqrt();
+    let mut normal = SMatrix::<f64, 6, 6>::zeros();
+    let mut right = SVector::<f64, 6>::zeros();
+    let mut count = 0;
+    for (cell, _) in pressures.iter().enumerate().filter(|(_, p)| **p > 1.0) {
+        let away = points[cell].as_dvec3() - origin;
+        let flat = DVec2::new(away.dot(x), away.dot(y)) / reach;
+        if flat.length_squared() > 1.0 {
+            continue;
+        }
+        let row = SVector::<f64, 6>::from([
+            1.0,
+            flat.x,
+            flat.y,
+            0.5 * flat.x * flat.x,
+            flat.x * flat.y,
+            0.5 * flat.y * flat.y,
+        ]);
+        normal += row * row.transpose();
+        right += row * away.dot(up);
+        count += 1;
+    }
+    if count < MIN_FITTED {
+        return None;
+    }
+    let fit = normal.cholesky()?.solve(&right) / (reach * reach);
+    let bend = DMat2::from_cols(DVec2::new(fit[3], fit[4]), DVec2::new(fit[4], fit[5]));
+    let (mean, half) = (0.5 * (bend.x_axis.x + bend.y_axis.y), 0.5 * (bend.x_axis.x - bend.y_axis.y));
+    let spread = half.hypot(bend.x_axis.y);
+    let both = [mean + spread, mean - spread];
+    both.iter().all(|v| v.is_finite()).then_some(both)
+}

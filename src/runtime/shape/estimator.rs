@@ -1,0 +1,344 @@
+//! The stages in their order, frame by frame.
+
+use glam::Vec3A;
+
+use super::cells::{CELL_PX, Cells, View};
+use super::deviation::Deviations;
+use super::error::ShapeError;
+use super::fill::{Pyramid, Weighted};
+use super::lattice::Lattice;
+use super::levels::{self, Level};
+use super::light::ShapeLight;
+use super::map::ShapeMap;
+use super::marks::Marks;
+use super::normals;
+use super::rest::RestMap;
+use super::system::{SolveStatus, System};
+use crate::constants::Constants;
+use crate::track::{CameraFrame, Tracked, Tracker};
+use domecast_optics::SensorOptics;
+use domecast_optics::numeric::Rigid;
+
+/// Step along the ray over which the readings' turn is taken, mm, and what each channel is known to there: a hundredth.
+const TURN_STEP_MM: f32 = 0.2;
+const TURN_PRECISION: f32 = 1e4;
+
+/// Tilt of a normal that was filled in from around, rad.
+const FILLED_SD_RAD: f32 = 0.09;
+
+/// Variance of a reading's tilt, rad^2, from which on there is no light to read by: the skin is taken to be as
+/// at rest there.
+const MAX_SPREAD: f32 = 0.03;
+
+/// How often normals are read and integrated again, and the largest motion, mm, after which once more changes nothing.
+const MAX_PASSES: usize = 3;
+const STILL_MM: f64 = 0.03;
+
+/// By how much a level may be off beside noise, of itself and of the brightest channel beside it: the constants' light, a part
+/// of a hundred, and what a camera's JPEG makes of colours.
+const LEVEL_ERROR: f32 = 0.005;
+
+/// Most by which the skin moves, part of its height over the sheet: it is bonded at the rim.
+const MAX_STRAIN: f32 = 0.5;
+
+/// Squares of what is left over, in deviations, up to which a reading counts in full, and from which on not at all.
+const GOOD_MISFIT: f32 = 6.0;
+const BAD_MISFIT: f32 = 30.0;
+
+/// Settings of a [`ShapeFromColor`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapeOptions {
+    /// Standard deviation of a pixel's value, levels of 255.
+    pub noise_levels: f64,
+}
+
+impl Default for ShapeOptions {
+    fn default() -> Self {
+        Self { noise_levels: 2.0 }
+    }
+}
+
+/// Reads the shape of the skin from the colours of frames.
+#[derive(Debug, Clone)]
+pub struct ShapeFromColor {
+    options: ShapeOptions,
+    light: ShapeLight,
+    marks: Marks,
+    cells: Cells,
+    rest_optics: SensorOptics,
+    optics: SensorOptics,
+    /// Constants without white markers are those of a rigid mount.
+    is_rigid: bool,
+    rest: Option<RestMap>,
+    /// As it stood in the frame at rest.
+    rest_seen: SensorOptics,
+    view: View,
+    levels: Vec<Level>,
+    covered: Vec<bool>,
+    gain: Vec<Vec3A>,
+    /// By how much a reading's normal turns where the point lies 1 mm further along its ray, for the same colours.
+    turn_per_mm: Vec<Vec3A>,
+    /// Tilt of the normals away from the undeformed dome's, and its weight.
+    tilt: Vec<Weighted>,
+    /// Variance of the tilt across and down, rad^2.
+    spread: Vec<[f32; 2]>,
+    /// Whether the cell's colours say a normal.
+    is_read: Vec<bool>,
+    deviations: Deviations,
+    pyramid: Pyramid,
+    system: System,
+    /// How far each cell's point has moved along its ray, mm.
+    moved_mm: Vec<f64>,
+    last_mm: Vec<f64>,
+    map: ShapeMap,
+}
+
+impl ShapeFromColor {
+    /// For the sensor that the constants describe and the tracker follows.
+    ///
+    /// # Errors
+    /// [`ShapeError`] names the field of the constants that is missing or at fault.
+    pub fn new(constants: &Constants, tracker: &Tracker, options: ShapeOptions) -> Result<Self, ShapeError> {
+        if !(options.noise_levels > 0.0 && options.noise_levels < 255.0) {
+            return Err(ShapeError::new(
+                "noise_levels",
+                "is no deviation of a pixel",
+                "give one above 0, below 255",
+            ));
+        }
+        let optics = tracker.optics().clone();
+        let light = ShapeLight::new(constants, &optics)?;
+        let cells = Cells::new(&optics);
+        let count = cells.count();
+        Ok(Self {
+            options,
+            light,
+            marks: Marks::new(constants, &optics),
+            is_rigid: constants.white_markers.is_empty(),
+            rest: None,
+            rest_seen: optics.clone(),
+            view: View::default(),
+            levels: Vec::new(),
+            covered: vec![false; count],
+            gain: Vec::new(),
+            turn_per_mm: vec![Vec3A::ZERO; count],
+            tilt: vec![(Vec3A::ZERO, 0.0); count],
+            spread: vec![[0.0; 2]; count],
+            is_read: vec![false; count],
+            deviations: Deviations::default(),
+            pyramid: Pyramid::default(),
+            system: System::new(cells.width, cells.height),
+            moved_mm: vec![0.0; count],
+            last_mm: Vec::new(),
+            map: ShapeMap::new(&cells, &optics),
+            cells,
+            rest_optics: optics.clone(),
+            optics,
+        })
+    }
+
+    /// Takes a frame of the untouched sensor: what the membrane, the lens and the exposure have that the constants do not
+    /// say is taken from it.
+    ///
+    /// # Errors
+    /// A frame that is not of an untouched sensor under the constants' light: colours swapped, a light out, cut off.
+    pub fn set_rest(&mut self, frame: &CameraFrame<'_>, tracked: &Tracked) -> Result<(), ShapeError> {
+        if !self.see(frame, tracked)? {
+            let problem = format!("has no pose: {}", tracked.status());
+            return Err(ShapeError::new("rest", problem, "take a frame in which the white markers are seen"));
+        }
+        let noise = self.options.noise_levels as f32 / 255.0 / CELL_PX as f32;
+        let (levels, covered) = (&self.levels, &self.covered);
+        self.rest = Some(RestMap::measured(levels, covered, &self.cells, &self.view, &self.light, noise)?);
+        self.rest_seen = self.optics.clone();
+        Ok(())
+    }
+
+    /// The last frame's result.
+    pub fn map(&self) -> &ShapeMap {
+        &self.map
+    }
+
+    fn see(&mut self, frame: &CameraFrame<'_>, tracked: &Tracked) -> Result<bool, ShapeError> {
+        let spec = self.rest_optics.lens().spec();
+        let is_size = (frame.width(), frame.height()) == (spec.width as usize, spec.height as usize);
+        if frame.channels() != 3 || !is_size {
+            let problem =
+                format!("is {} x {} of {} channels", frame.width(), frame.height(), frame.channels());
+            return Err(ShapeError::new("frame", problem, "give frames in colour of the constants' size"));
+        }
+        let Some(pose) = tracked.pose.or_else(|| self.is_rigid.then(Rigid::identity)) else {
+            return Ok(false);
+        };
+        self.optics = self.rest_optics.clone();
+        if self.optics.move_to(&pose).is_err() {
+            return Ok(false);
+        }
+        if self.cells.look(&self.optics, &pose, &mut self.view) {
+            self.turn();
+        }
+        levels::read(frame, &self.cells, &self.view, &self.light.linear, &mut self.levels);
+        self.marks.cover(tracked, &self.cells, &mut self.covered);
+        Ok(true)
+    }
+
+    /// Takes the next frame in, with what the tracker says of it.
+    ///
+    /// # Errors
+    /// A frame of another form than the constants'; no frame at rest before it.
+    pub fn measure(&mut self, frame: &CameraFrame<'_>, tracked: &Tracked) -> Result<&ShapeMap, ShapeError> {
+        let is_seen = self.see(frame, tracked)?;
+        let Some(rest) = &self.rest else {
+            return Err(ShapeError::new(
+                "rest",
+                "was not given",
+                "give a frame of the untouched sensor first",
+            ));
+        };
+        if !is_seen {
+            self.map.forget();
+            return Ok(&self.map);
+        }
+        rest.at_pose(&self.cells, &self.view, &self.rest_seen, self.is_rigid, &mut self.gain);
+        let mut status = SolveStatus::default();
+        for _ in 0..MAX_PASSES {
+            self.read_normals();
+            self.pyramid.fill(self.cells.width, &mut self.tilt);
+            self.last_mm.clone_from(&self.moved_mm);
+            status = self.integrate();
+            let steps = self.moved_mm.iter().zip(&self.last_mm).map(|(a, b)| (a - b).abs());
+            if steps.fold(0.0, f64::max) < STILL_MM {
+                break;
+            }
+        }
+        let (width, is_read) = (self.cells.width, &self.is_read);
+        self.deviations.measure(&self.cells, &self.view, &self.spread, |cell| is_read[cell]);
+        let sd_mm = |cell: usize, height_mm: f32| self.deviations.of(cell, width, height_mm);
+        self.map.draw(&self.cells, &self.view, &self.moved_mm, sd_mm, self.optics.dome(), status);
+        Ok(&self.map)
+    }
+
+    /// How readings turn with depth, on the undeformed dome: with it the light need not be taken again and again.
+    fn turn(&mut self) {
+        let (light, view) = (&self.light, &self.view);
+        let turns = Lattice::new(&self.cells, view, |cell| {
+            let (at, ray, out) = (view.surface_mm[cell], view.ray[cell], view.normal[cell]);
+            let here = light.at(at);
+            let irradiance = here.base + here.direct(out);
+            let precision = irradiance.max(Vec3A::splat(1e-12)).powf(-2.0) * TURN_PRECISION;
+            let deeper = light.at(at - ray * TURN_STEP_MM);
+            let reading = normals::read(&deeper, irradiance, precision, out, out.any_orthonormal_vector())?;
+            Some((out - reading.normal) / TURN_STEP_MM)
+        });
+        for (row, span) in view.spans.iter().enumerate() {
+            for column in span.clone() {
+                self.turn_per_mm[row * self.cells.width + column] = turns.at(column, row);
+            }
+        }
+    }
+
+    /// Reads every cell's normal, one step from that of the skin as it is known.
+    fn read_normals(&mut self) {
+        let pixels = (CELL_PX * CELL_PX) as f32;
+        let noise = self.options.noise_levels as f32 / 255.0;
+        let variance = noise * noise / pixels;
+        let width = self.cells.width;
+        let view = &self.view;
+        let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
+        let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * self.moved_mm[cell] as f32;
+        for (row, span) in view.spans.iter().enumerate() {
+            for cell in row * width + span.start..row * width + span.end {
+                self.tilt[cell] = (Vec3A::ZERO, 0.0);
+                self.is_read[cell] = false;
+                self.spread[cell] = [FILLED_SD_RAD * FILLED_SD_RAD; 2];
+                if !is_dome(cell) || self.covered[cell] {
+                    continue;
+                }
+                let at = point(cell);
+                let between = |before: usize, after: usize| match (is_dome(before), is_dome(after)) {
+                    (true, true) => Some(point(after) - point(before)),
+                    (false, true) => Some(point(after) - at),
+                    (true, false) => Some(at - point(before)),
+                    (false, false) => None,
+                };
+                let right = between(cell.wrapping_sub(1), cell + 1);
+                let below = between(cell.wrapping_sub(width), cell + width);
+                let (Some(right), Some(below)) = (right, below) else { continue };
+                let level = &self.levels[cell];
+                let gain = self.light.passed(view.ray[cell].z) * self.gain[cell];
+                let irradiance =
+                    (level.light - Vec3A::splat(self.light.stray)) / gain.max(Vec3A::splat(1e-12));
+                // Where noise would be cut off at black its mean is not the light.
+                let expected = gain * self.light.still(view.place[cell]);
+                let is_lit =
+                    Vec3A::select(expected.cmpgt(Vec3A::splat(2.0 * noise)), Vec3A::ONE, Vec3A::ZERO);
+                let off = (level.light + Vec3A::splat(level.light.max_element())) * LEVEL_ERROR;
+                let precision = gain * gain * level.is_known * is_lit / (off * off + variance);
+                let light = self.light.at(at);
+                let (out, ray) = (view.normal[cell], view.ray[cell]);
+                let guess = right.cross(below).normalize_or(out);
+                let guess = if guess.dot(ray) < 0.0 { -guess } else { guess };
+                let Some(reading) = normals::read(&light, irradiance, precision, guess, right) else {
+                    self.tilt[cell].1 = 1.0;
+                    continue;
+                };
+                let [xx, xy, yy] = reading.covariance;
+                if reading.misfit > BAD_MISFIT {
+                    continue;
+                }
+                if 0.5 * (xx + yy) > MAX_SPREAD {
+                    self.tilt[cell].1 = 1.0;
+                    continue;
+                }
+                let good = (GOOD_MISFIT / reading.misfit.max(GOOD_MISFIT)).min(1.0);
+                let [t1, t2] = normals::tangents(guess, right);
+                let turn = glam::Vec2::new(below.dot(t1), below.dot(t2)).normalize_or_zero();
+                let along = turn.x * turn.x * xx + 2.0 * turn.x * turn.y * xy + turn.y * turn.y * yy;
+                // What the reading and its surroundings say together.
+                let filled = FILLED_SD_RAD * FILLED_SD_RAD;
+                self.spread[cell] = [xx, along].map(|v| v * filled / (v + good * filled));
+                let weight = good * filled / (good * filled + 0.5 * (xx + yy));
+                self.tilt[cell] = (reading.normal - out, weight);
+                self.is_read[cell] = true;
+            }
+        }
+    }
+
+    /// Finds the skin that is perpendicular to the normals.
+    fn integrate(&mut self) -> SolveStatus {
+        let view = &self.view;
+        self.system.clear(&view.spans);
+        let width = self.cells.width;
+        let normal_of = |i: usize| view.normal[i] + self.tilt[i].0;
+        let is_dome = |i: usize| view.is_dome.get(i).copied().unwrap_or(false);
+        for (row, span) in view.spans.iter().enumerate() {
+            for cell in row * width + span.start..row * width + span.end {
+                if !is_dome(cell) {
+                    self.moved_mm[cell] = 0.0;
+                    continue;
+                }
+                let (own, ray, moved_mm) = (normal_of(cell), view.ray[cell], self.moved_mm[cell] as f32);
+                let held = 1.0 / (MAX_STRAIN * view.surface_mm[cell].z);
+                self.system.hold(cell, held * held);
+                let is_last = cell + 1 == row * width + span.end;
+                for (next, is_right) in [(cell + 1, true), (cell + width, false)] {
+                    if (is_right && is_last) || !is_dome(next) {
+                        continue;
+                    }
+                    let normal = 0.5 * (own + normal_of(next));
+                    let at_rest = view.surface_mm[next] - view.surface_mm[cell];
+                    let next_mm = self.moved_mm[next] as f32;
+                    let between = at_rest + view.ray[next] * next_mm - ray * moved_mm;
+                    let turns = [cell, next].map(|i| 0.5 * self.turn_per_mm[i].dot(between));
+                    let side = usize::from(!is_right);
+                    let variance = 0.5 * (self.spread[cell][side] + self.spread[next][side]);
+                    let weight = 1.0 / (at_rest.length_squared() * variance).max(1e-12);
+                    let along = [normal.dot(ray) - turns[0], normal.dot(view.ray[next]) + turns[1]];
+                    let offset = normal.dot(at_rest) - turns[0] * moved_mm - turns[1] * next_mm;
+                    self.system.join(cell, is_right, weight, along, offset);
+                }
+            }
+        }
+        self.system.solve(&mut self.moved_mm)
+    }
+}

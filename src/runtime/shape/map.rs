@@ -1,0 +1,174 @@
+//! The shape on the raw image's grid.
+
+use glam::{Vec3, Vec3A};
+
+use super::cells::{CELL_PX, Cells, View};
+use super::contact::{Chart, SkinContact};
+use super::outline::outline;
+use super::system::SolveStatus;
+use domecast_optics::{DomeShape, SensorOptics};
+
+/// The skin as a frame shows it: a value for each raw pixel, row by row; NaN where nothing is known.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ShapeMap {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Signed distance of the skin from its shape at rest, mm; negative where it is pressed in.
+    pub height_mm: Vec<f32>,
+    /// Its standard deviation, mm.
+    pub height_sd_mm: Vec<f32>,
+    /// Outward unit normal, sensor frame.
+    pub normal: Vec<Vec3>,
+    /// Whether the skin is touched there.
+    pub is_touched: Vec<bool>,
+    /// The touch, where there is one.
+    pub contact: Option<SkinContact>,
+    /// How the solve ended; `None` where the pose has no picture of the dome.
+    pub status: Option<SolveStatus>,
+    /// The same for each cell, before it is drawn.
+    cell_mm: Vec<f32>,
+    cell_normal: Vec<Vec3A>,
+    cell_point: Vec<Vec3A>,
+    /// Pressure over that at the edge of the touch.
+    cell_pressure: Vec<f32>,
+    cell_sd_mm: Vec<f32>,
+}
+
+impl ShapeMap {
+    pub(super) fn new(cells: &Cells, optics: &SensorOptics) -> Self {
+        let spec = optics.lens().spec();
+        let (width, height) = (spec.width as usize, spec.height as usize);
+        let pixels = width * height;
+        Self {
+            width,
+            height,
+            height_mm: vec![f32::NAN; pixels],
+            height_sd_mm: vec![f32::NAN; pixels],
+            normal: vec![Vec3::NAN; pixels],
+            is_touched: vec![false; pixels],
+            contact: None,
+            status: None,
+            cell_mm: vec![f32::NAN; cells.count()],
+            cell_normal: vec![Vec3A::NAN; cells.count()],
+            cell_point: vec![Vec3A::NAN; cells.count()],
+            cell_pressure: vec![0.0; cells.count()],
+            cell_sd_mm: vec![f32::NAN; cells.count()],
+        }
+    }
+
+    /// Nothing is known.
+    pub(super) fn forget(&mut self) {
+        self.height_mm.fill(f32::NAN);
+        self.height_sd_mm.fill(f32::NAN);
+        self.normal.fill(Vec3::NAN);
+        self.is_touched.fill(false);
+        self.contact = None;
+        self.status = None;
+    }
+
+    /// Draws what the solve found; `sd_mm` is the deviation of a cell's height.
+    pub(super) fn draw(
+        &mut self,
+        cells: &Cells,
+        view: &View,
+        moved_mm: &[f64],
+        sd_mm: impl Fn(usize, f32) -> f32,
+        dome: &DomeShape,
+        status: SolveStatus,
+    ) {
+        self.forget();
+        self.status = Some(status);
+        let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * moved_mm[cell] as f32;
+        let w = cells.width;
+        let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
+        self.cell_mm.fill(f32::NAN);
+        for (row, span) in view.spans.iter().enumerate() {
+            for cell in row * w + span.start..row * w + span.end {
+                if !is_dome(cell) {
+                    continue;
+                }
+                let at = point(cell);
+                self.cell_point[cell] = at;
+                self.cell_mm[cell] = dome.distance_mm(at.as_dvec3()) as f32;
+                self.cell_sd_mm[cell] = sd_mm(cell, self.cell_mm[cell]);
+                let side = |next: usize| if is_dome(next) { point(next) } else { at };
+                let along = side(cell + 1) - side(cell.wrapping_sub(1));
+                let down = side(cell + w) - side(cell.wrapping_sub(w));
+                let normal = along.cross(down).normalize_or(view.normal[cell]);
+                // The camera looks from inside.
+                self.cell_normal[cell] = if normal.dot(view.ray[cell]) < 0.0 { -normal } else { normal };
+            }
+        }
+        self.touch(cells, view, dome);
+        self.spread(cells, view);
+        self.draw_outline(cells);
+    }
+
+    /// Finds the outline of the touch about its deepest place, or its middle, where an object's hole is deepest.
+    fn draw_outline(&mut self, cells: &Cells) {
+        let Some(contact) = &mut self.contact else { return };
+        let known = self.cell_mm.iter().enumerate().filter(|(_, depth)| depth.is_finite());
+        let touched = known.filter(|(cell, _)| self.cell_pressure[*cell] > 1.0);
+        let Some((cell, _)) = touched.min_by(|a, b| a.1.total_cmp(b.1)) else { return };
+        contact.depth_sd_mm = f64::from(self.cell_sd_mm[cell]);
+        let (width, height) = (self.width as i64, self.height as i64);
+        let is_in = |x: i64, y: i64| {
+            let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
+            is_inside && self.is_touched[(y * width + x) as usize]
+        };
+        let own = |k: usize| (k * CELL_PX) as i64;
+        let from = (own(cell % cells.width), own(cell / cells.width));
+        contact.outline_px = outline(is_in, from, (width, height));
+    }
+
+    fn touch(&mut self, cells: &Cells, view: &View, dome: &DomeShape) {
+        self.cell_pressure.fill(0.0);
+        let deepest = self.cell_mm.iter().zip(&self.cell_sd_mm).filter(|(depth, _)| depth.is_finite());
+        let sd_mm = deepest.min_by(|a, b| a.0.total_cmp(b.0)).map_or(0.0, |(_, sd)| *sd);
+        let chart = Chart::new(cells, view, &self.cell_point, &self.cell_mm, sd_mm, dome);
+        let Some(chart) = chart else { return };
+        for cell in (0..cells.count()).filter(|cell| view.is_dome[*cell]) {
+            self.cell_pressure[cell] = chart.at(self.cell_point[cell]);
+        }
+        self.contact = chart.contact(&self.cell_point, &self.cell_normal, &self.cell_mm, &self.cell_pressure);
+    }
+
+    /// Linear between the cells; a pixel whose own cell sees no dome has nothing.
+    fn spread(&mut self, cells: &Cells, view: &View) {
+        for y in 0..cells.height * CELL_PX {
+            let Some(span) = view.spans.get(y / CELL_PX) else { return };
+            for x in span.start * CELL_PX..span.end * CELL_PX {
+                let own = y / CELL_PX * cells.width + x / CELL_PX;
+                if self.cell_mm[own].is_nan() {
+                    continue;
+                }
+                let place = |v: usize, n: usize| {
+                    let at = (v as f32 - 0.5 * (CELL_PX as f32 - 1.0)) / CELL_PX as f32;
+                    let first = (at.floor().max(0.0) as usize).min(n.saturating_sub(2));
+                    (first, at - first as f32)
+                };
+                let ((i, px), (j, py)) = (place(x, cells.width), place(y, cells.height));
+                let corner = |i: usize, j: usize| {
+                    let cell = j * cells.width + i;
+                    if self.cell_mm[cell].is_nan() { own } else { cell }
+                };
+                let corners = [corner(i, j), corner(i + 1, j), corner(i, j + 1), corner(i + 1, j + 1)];
+                let parts = [(1.0 - px) * (1.0 - py), px * (1.0 - py), (1.0 - px) * py, px * py];
+                let (mut height, mut normal, mut sd, mut pressure) = (0.0, Vec3A::ZERO, 0.0, 0.0);
+                for (cell, part) in corners.into_iter().zip(parts) {
+                    sd += self.cell_sd_mm[cell] * part;
+                    pressure += self.cell_pressure[cell] * part;
+                    height += self.cell_mm[cell] * part;
+                    normal += self.cell_normal[cell] * part;
+                }
+                let pixel = y * self.width + x;
+                self.height_mm[pixel] = height;
+                self.height_sd_mm[pixel] = sd;
+                self.is_touched[pixel] = pressure > 1.0;
+                self.normal[pixel] = normal.normalize_or_zero().into();
+            }
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! The dots and white markers in the picture: where the membrane's colour is not seen.
+
+use glam::{DMat2, DVec2, DVec3};
+
+use super::cells::{CELL_PX, Cells};
+use crate::constants::Constants;
+use crate::track::{MarkState, Tracked};
+use domecast_optics::SensorOptics;
+
+/// How far beyond its edge a mark still colours the picture, px: blur, and what JPEG spreads.
+const MARGIN_PX: f64 = 2.0;
+
+/// The same where the mark was not found, and may be that far from where the undeformed dome would show it.
+const LOST_MARGIN_PX: f64 = 5.0;
+
+/// A mark's ellipse in the picture: the images of two of its radii at right angles, px.
+#[derive(Debug, Clone, Copy)]
+struct Ellipse {
+    radii_px: [DVec2; 2],
+}
+
+/// The marks of a sensor, in the order of its constants.
+#[derive(Debug, Clone)]
+pub(super) struct Marks {
+    dots: Vec<Option<Ellipse>>,
+    markers: Vec<Option<Ellipse>>,
+}
+
+impl Marks {
+    pub fn new(constants: &Constants, optics: &SensorOptics) -> Self {
+        let ellipse = |at_mm: DVec3, normal: DVec3, diameter_mm: f64| {
+            let [a, b] = <[DVec3; 2]>::from(normal.try_normalize()?.any_orthonormal_pair());
+            let across = |along: DVec3| {
+                let end = |side: f64| optics.project(optics.dome().nearest_mm(at_mm + along * side)).ok();
+                Some(0.5 * (end(0.5 * diameter_mm)? - end(-0.5 * diameter_mm)?))
+            };
+            Some(Ellipse { radii_px: [across(a)?, across(b)?] })
+        };
+        let flat = |at_mm: DVec3, diameter_mm: f64| {
+            let across = |along: DVec3| {
+                let end = |side: f64| optics.project(at_mm + along * side).ok();
+                Some(0.5 * (end(0.5 * diameter_mm)? - end(-0.5 * diameter_mm)?))
+            };
+            Some(Ellipse { radii_px: [across(DVec3::X)?, across(DVec3::Y)?] })
+        };
+        let array = DVec3::from_array;
+        let dots = constants.black_dots.iter();
+        let markers = constants.white_markers.iter();
+        Self {
+            dots: dots
+                .map(|dot| ellipse(array(dot.surface_mm), array(dot.normal), dot.diameter_mm))
+                .collect(),
+            markers: markers.map(|marker| flat(array(marker.position_mm), marker.diameter_mm)).collect(),
+        }
+    }
+
+    /// Marks the cells that a frame's dots and markers cover.
+    pub fn cover(&self, tracked: &Tracked, cells: &Cells, covered: &mut [bool]) {
+        covered.fill(false);
+        for (dot, ellipse) in tracked.black_dots.iter().zip(&self.dots) {
+            let Some(ellipse) = ellipse else { continue };
+            let seen = dot.centroid_px.filter(|_| dot.state == MarkState::Ok);
+            let margin_px = if seen.is_some() { MARGIN_PX } else { LOST_MARGIN_PX };
+            // A dot that is not sure may be at either place.
+            for at in [seen.or(dot.undeformed_px), dot.centroid_px].into_iter().flatten() {
+                ellipse.cover(at, margin_px, cells, covered);
+            }
+        }
+        for (marker, ellipse) in tracked.white_markers.iter().zip(&self.markers) {
+            if let (Some(ellipse), Some(at)) = (ellipse, marker.centroid_px) {
+                ellipse.cover(at, MARGIN_PX, cells, covered);
+            }
+        }
+        for at in &tracked.false_dots {
+            let Some(ellipse) = self.dots.iter().flatten().next() else { continue };
+            ellipse.cover(*at, MARGIN_PX, cells, covered);
+        }
+    }
+}
+
+impl Ellipse {
+    fn cover(&self, at_px: DVec2, margin_px: f64, cells: &Cells, covered: &mut [bool]) {
+        // The margin, and half of a cell's diagonal.
+        let more = margin_px + 0.5 * std::f64::consts::SQRT_2 * CELL_PX as f64;
+        let [a, b] = self.radii_px.map(|radius| radius * (1.0 + more / radius.length().max(1e-3)));
+        let matrix = DMat2::from_cols(a, b);
+        let is_ellipse = matrix.determinant().abs() > 1e-6;
+        if !is_ellipse || !at_px.is_finite() {
+            return;
+        }
+        let unit_from_px = matrix.inverse();
+        let reach = DVec2::new(a.x.abs() + b.x.abs(), a.y.abs() + b.y.abs());
+        let low = Cells::of_pixel(at_px - reach).max(DVec2::ZERO);
+        let high = Cells::of_pixel(at_px + reach);
+        let (right, bottom) = (cells.width as f64 - 1.0, cells.height as f64 - 1.0);
+        for row in low.y.ceil() as usize..=high.y.min(bottom).max(-1.0) as usize {
+            for column in low.x.ceil() as usize..=high.x.min(right).max(-1.0) as usize {
+                let away = unit_from_px * (Cells::center_of(column, row) - at_px);
+                if away.length_squared() <= 1.0
+                    && let Some(covered) = covered.get_mut(row * cells.width + column)
+                {
+                    *covered = true;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! Forces on the skin from the dots' motion: pressure and shear by the elastic model of the bonded dome.
+//!
+//! | file | what |
+//! |---|---|
+//! | `model` | what a traction on each node moves, and which pressures are likely |
+//! | `active_set` | least squares with pressures that are not negative |
+//! | `forces` | rows of a frame: dots, wrench, heights; the turns that make it consistent with the moved skin |
+//! | `heights` | a height map as heights of nodes |
+//! | `posterior` | what is left open |
+//! | `contact` | area, point, normal, force |
+
+mod active_set;
+mod cholesky;
+mod contact;
+mod forces;
+mod heights;
+mod model;
+mod posterior;
+mod result;
+mod write;
+
+pub use forces::ForceDistribution;
+pub use result::{ContactEstimate, DotTraction, HeightSample, LocalForces, TractionStatus};
+pub use write::write_json_forces;

@@ -1,0 +1,114 @@
+//! How exact the pressures are: the covariance that rows and prior leave them about the touched nodes.
+
+use glam::DVec3;
+
+use super::active_set::{ActiveSet, Rows};
+use super::cholesky::{factor, forward};
+use super::model::ElasticModel;
+
+/// A dot without a deviation of its own, px.
+pub(super) const USUAL_DOT_SD_PX: f64 = 0.02;
+
+/// Nodes that are looked at: those that bear a pressure, and those beside them.
+const MAX_NODES: usize = 160;
+
+/// Covariance of the pressures about the touched nodes, as the factor of its inverse.
+#[derive(Debug, Clone)]
+pub(super) struct Posterior {
+    /// The nodes, and the place of each in that list.
+    pub nodes: Vec<usize>,
+    place: Vec<Option<usize>>,
+    factored: Vec<f64>,
+    is_known: bool,
+    /// By how much deviations are larger than the rows' own say.
+    wider: f64,
+    solved: Vec<f64>,
+    /// By dot: deviation of a pressure about it that nothing else is near, N/mm2.
+    alone_n_mm2: Vec<f64>,
+}
+
+impl Posterior {
+    /// For dots at these places, whose images move so with them.
+    pub fn new(model: &ElasticModel, dots_mm: &[DVec3], by_point: &[[DVec3; 2]]) -> Self {
+        let n = model.nodes.len();
+        let alone = |at: &DVec3| {
+            // A smooth pressure about the dot, of height 1.
+            let height = |k: usize| {
+                let q = model.nodes[k].at_mm.distance_squared(*at);
+                (-q / (2.0 * model.correlation_mm * model.correlation_mm)).exp()
+            };
+            let heights: Vec<(usize, f64)> =
+                (0..n).map(|k| (k, height(k))).filter(|(_, height)| *height > 0.01).collect();
+            let mut seen = 1.0 / (model.pressure_sd_n_mm2 * model.pressure_sd_n_mm2);
+            for (d, by) in by_point.iter().enumerate() {
+                let u: DVec3 = heights.iter().map(|(k, h)| model.dots_mm[k * dots_mm.len() + d] * *h).sum();
+                seen += (by[0].dot(u).powi(2) + by[1].dot(u).powi(2)) / (USUAL_DOT_SD_PX * USUAL_DOT_SD_PX);
+            }
+            1.0 / seen.sqrt()
+        };
+        Self {
+            nodes: Vec::with_capacity(MAX_NODES),
+            place: vec![None; n],
+            factored: vec![0.0; MAX_NODES * MAX_NODES],
+            is_known: false,
+            wider: 1.0,
+            solved: Vec::with_capacity(MAX_NODES),
+            alone_n_mm2: dots_mm.iter().map(alone).collect(),
+        }
+    }
+
+    /// Takes a frame's rows.
+    pub fn take(&mut self, model: &ElasticModel, set: &ActiveSet, rows: &Rows<'_>) {
+        self.nodes.iter().for_each(|node| self.place[*node] = None);
+        self.nodes.clear();
+        let own = set.active.iter().copied();
+        let beside = set.active.iter().flat_map(|node| model.nodes[*node].beside.iter().map(|b| b.0));
+        for node in own.chain(beside) {
+            if self.place[node].is_none() && self.nodes.len() < MAX_NODES {
+                self.place[node] = Some(self.nodes.len());
+                self.nodes.push(node);
+            }
+        }
+        // Pressures of neighbouring nodes are taken for independent: edges of objects make them so, and deviations must cover that.
+        let prior = 1.0 / (model.pressure_sd_n_mm2 * model.pressure_sd_n_mm2);
+        for (i, &node) in self.nodes.iter().enumerate() {
+            for (j, &other) in self.nodes.iter().enumerate().take(i + 1) {
+                self.factored[i * MAX_NODES + j] =
+                    rows.product((0, node), (0, other)) + if i == j { prior } else { 0.0 };
+            }
+        }
+        self.is_known = factor(&mut self.factored, self.nodes.len(), MAX_NODES);
+    }
+
+    /// Makes all deviations of the frame larger by a factor.
+    pub fn widen(&mut self, factor: f64) {
+        self.wider = factor;
+    }
+
+    /// Deviation of a weighted sum of pressures; nodes that are not looked at count nothing.
+    pub fn sd_of(&mut self, weights: impl Iterator<Item = (usize, f64)>) -> Option<f64> {
+        if !self.is_known || self.nodes.is_empty() {
+            return None;
+        }
+        self.solved.clear();
+        self.solved.resize(self.nodes.len(), 0.0);
+        let mut any = false;
+        for (node, weight) in weights {
+            if let Some(place) = self.place[node] {
+                self.solved[place] += weight;
+                any = true;
+            }
+        }
+        if !any {
+            return None;
+        }
+        forward(&self.factored, MAX_NODES, &mut self.solved);
+        Some(self.wider * self.solved.iter().map(|v| v * v).sum::<f64>().sqrt())
+    }
+
+    /// Deviation of the pressure at a dot, N/mm2.
+    pub fn sd_at(&mut self, model: &ElasticModel, dot: usize, at_mm: DVec3) -> f64 {
+        let alone = self.alone_n_mm2.get(dot).copied().unwrap_or(model.pressure_sd_n_mm2);
+        self.sd_of(model.about(at_mm)).unwrap_or(alone)
+    }
+}

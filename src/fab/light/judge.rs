@@ -162,6 +162,18 @@ pub(super) fn warnings(design: &Design, report: &LightReport) -> Vec<(String, St
             ),
         );
     }
+    let through = design.sections().leds.through_platform;
+    if through > 0.0 && !design.sections().leds.list.is_empty() {
+        // Neither the lit platform nor what the lens sees of the lights through it is simulated.
+        warn(
+            "leds.through_platform",
+            format!(
+                "the platforms let {} of the light through: the lens sees the lights through them, as spots that are not \
+                 in report/light-frame.png; paint them black, or judge a frame of the real sensor",
+                percent(through)
+            ),
+        );
+    }
     if dome.percentile_5_level < MIN_DOME_LEVEL {
         warn(
             "leds",

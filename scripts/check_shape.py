@@ -14,6 +14,7 @@ import tempfile
 
 import cv2
 import numpy as np
+import trimesh
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 NOISE_LEVELS = 2.0
@@ -165,7 +166,33 @@ def judge(domecast, work, design, name, objects, dome, constants):
     outline = np.array(line["contact"]["outline_px"], np.float32)
     check(f"{label}: outline", cv2.contourArea(outline) > 0 and line["shape"]["status"] == "ok",
           f"{len(outline)} corners, {cv2.contourArea(outline):.0f} of {found.sum()} px")
+    wrong = written_alike(shape, dome)
+    check(f"{label}: picture and triangles", not wrong, ", ".join(wrong))
     return e
+
+
+def written_alike(shape, dome):
+    """What is wrong with the picture and the triangles beside the heights, by OpenCV and trimesh."""
+    height = np.load(shape / "frame_0000.height.npy")
+    levels = cv2.imread(str(shape / "frame_0000.height.png"), cv2.IMREAD_UNCHANGED)
+    known, wrong = np.isfinite(height), []
+    if levels.dtype != np.uint16 or levels.shape != height.shape or ((levels > 0) != known).any():
+        return ["the picture is of another kind or size, or knows other pixels"]
+    if np.abs((levels[known] - 32768.0) * 0.001 - height[known]).max() > 0.00051:
+        wrong.append("the picture's heights")
+    skin = trimesh.load(shape / "frame_0000.ply", process=False)
+    data = skin.metadata["_ply_raw"]["vertex"]["data"]
+    away = np.linalg.norm(skin.vertices - [0, 0, dome["center_z"]], axis=1) - dome["radius"]
+    if np.abs(away - data["height_mm"]).max() > 1e-4 or not (data["height_sd_mm"] > 0).all():
+        wrong.append("heights of the triangles' corners")
+    if (skin.area_faces <= 0).any() or ((skin.triangles_center - [0, 0, dome["center_z"]]) * skin.face_normals).sum(axis=1).min() <= 0:
+        wrong.append("triangles that face inwards or have no area")
+    if len(skin.split(only_watertight=False)) != 1 or len(skin.faces) < known.sum() / 4:
+        wrong.append("triangles that do not hang together")
+    normals = np.column_stack([data[name] for name in ("nx", "ny", "nz")])
+    if (normals * skin.vertex_normals).sum(axis=1).mean() < 0.99:
+        wrong.append("normals that are not the surface's")
+    return wrong
 
 
 def faults(domecast, work, dome, constants):

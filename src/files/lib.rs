@@ -3,7 +3,8 @@
 //! A [`StagedFolder`] is made before the work begins. It refuses a place that holds anything but an earlier result as
 //! that was written, an input, a mount point, a link that leads elsewhere; then it is filled in a hidden folder beside
 //! its place and changes places with what stood there, in one step where the system has one. A [`StagedFile`] does the
-//! same for one file. What a stopped run left is ended by [`recover`].
+//! same for one file. What a stopped run left is ended by [`recover`]. Arrays and surfaces are put into the formats that
+//! other programs read by [`npy_f32`], [`npy_u8`], [`png_u16`] and [`ply`].
 //!
 //! ```
 //! use domecast_files::{OutputRules, StagedFile, StagedFolder, list_files};
@@ -30,6 +31,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod arrays;
 mod error;
 mod listing;
 mod marker;
@@ -44,6 +46,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+pub use arrays::{npy_f32, npy_u8, ply, png_u16};
 pub use error::{ForeignEntries, WriteError};
 pub use marker::{MARKER_NAME, list_files, marked_files};
 pub use place::OutputRules;

@@ -8,6 +8,21 @@ use super::outline::outline;
 use super::system::SolveStatus;
 use domecast_optics::{DomeShape, SensorOptics};
 
+/// The skin as triangles between the cells of a [`ShapeMap`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SkinSurface {
+    /// Points of the skin, sensor frame, mm.
+    pub points_mm: Vec<Vec3>,
+    /// Outward unit normal of each.
+    pub normals: Vec<Vec3>,
+    /// Signed distance of each from the skin at rest, mm; negative where it is pressed in.
+    pub heights_mm: Vec<f32>,
+    /// Standard deviation of each height, mm.
+    pub height_sds_mm: Vec<f32>,
+    /// Corners of the triangles, counter-clockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
 /// The skin as a frame shows it: a value for each raw pixel, row by row; NaN where nothing is known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ShapeMap {
@@ -29,6 +44,7 @@ pub struct ShapeMap {
     pub status: Option<SolveStatus>,
     /// The same for each cell, before it is drawn.
     cell_mm: Vec<f32>,
+    cells_across: usize,
     cell_normal: Vec<Vec3A>,
     cell_point: Vec<Vec3A>,
     /// Pressure over that at the edge of the touch.
@@ -51,11 +67,42 @@ impl ShapeMap {
             contact: None,
             status: None,
             cell_mm: vec![f32::NAN; cells.count()],
+            cells_across: cells.width,
             cell_normal: vec![Vec3A::NAN; cells.count()],
             cell_point: vec![Vec3A::NAN; cells.count()],
             cell_pressure: vec![0.0; cells.count()],
             cell_sd_mm: vec![f32::NAN; cells.count()],
         }
+    }
+
+    /// The skin as triangles; empty where nothing is known.
+    pub fn surface(&self) -> SkinSurface {
+        let mut surface = SkinSurface::default();
+        if self.status.is_none() {
+            return surface;
+        }
+        let mut vertex: Vec<Option<u32>> = vec![None; self.cell_mm.len()];
+        for (cell, height_mm) in self.cell_mm.iter().enumerate().filter(|(_, height)| height.is_finite()) {
+            vertex[cell] = u32::try_from(surface.points_mm.len()).ok();
+            surface.points_mm.push(self.cell_point[cell].into());
+            surface.normals.push(self.cell_normal[cell].into());
+            surface.heights_mm.push(*height_mm);
+            surface.height_sds_mm.push(self.cell_sd_mm[cell]);
+        }
+        let across = self.cells_across;
+        for cell in 0..vertex.len().saturating_sub(across + 1) {
+            if cell % across == across - 1 {
+                continue;
+            }
+            let corners = [cell, cell + 1, cell + across + 1, cell + across].map(|cell| vertex[cell]);
+            for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
+                let (Some(a), Some(b), Some(c)) = (corners[a], corners[b], corners[c]) else { continue };
+                let [p, q, r] = [a, b, c].map(|corner| surface.points_mm[corner as usize]);
+                let is_outward = (q - p).cross(r - p).dot(surface.normals[a as usize]) > 0.0;
+                surface.triangles.push(if is_outward { [a, b, c] } else { [a, c, b] });
+            }
+        }
+        surface
     }
 
     /// Nothing is known.

@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use crate::contact::between::Between;
 use crate::contact::displacement_map::DisplacementMap;
-use crate::output::npy::npy_f32;
 use crate::raster::sensor_state::SensorState;
 use domecast_contact::ContactState;
+use domecast_files::{npy_f32, png_u16};
 use domecast_optics::SensorOptics;
 
 /// A point that is found further off its ray than this is none, mm.
@@ -128,39 +128,23 @@ impl DepthMaps {
     /// # Errors
     /// A depth picture that cannot be coded.
     pub(super) fn files(&self, number: u32) -> Result<Vec<(String, Vec<u8>)>, png::EncodingError> {
+        let of_points = [self.size[0], self.size[1], 3];
+        let points = |values: &[[f32; 3]]| npy_f32(&of_points, values.as_flattened().iter().copied());
         let mut files = vec![
-            ("surface.npy", npy_f32(&[self.size[0], self.size[1], 3], self.surface_mm.as_flattened())),
-            ("normal.npy", npy_f32(&[self.size[0], self.size[1], 3], self.normal.as_flattened())),
-            (
-                "displacement.npy",
-                npy_f32(&[self.size[0], self.size[1], 3], self.displacement_mm.as_flattened()),
-            ),
-            (DEPTH_PNG, self.depth_png()?),
+            ("surface.npy", points(&self.surface_mm)),
+            ("normal.npy", points(&self.normal)),
+            ("displacement.npy", points(&self.displacement_mm)),
+            (DEPTH_PNG, png_u16(self.size, &self.depth)?),
         ];
         if let Some(bearing) = &self.bearing {
-            let traction = bearing.traction_n_mm2.as_flattened();
-            files.push(("traction.npy", npy_f32(&[self.size[0], self.size[1], 3], traction)));
-            files.push(("pressure.npy", npy_f32(&self.size, &bearing.pressure_n_mm2)));
+            files.push(("traction.npy", points(&bearing.traction_n_mm2)));
+            files.push(("pressure.npy", npy_f32(&self.size, bearing.pressure_n_mm2.iter().copied())));
         }
         let named = |(name, bytes): (&str, Vec<u8>)| match name {
             DEPTH_PNG => (format!("{DEPTH_FOLDER}/frame_{number:04}.png"), bytes),
             name => (format!("frame_{number:04}.{name}"), bytes),
         };
         Ok(files.into_iter().map(named).collect())
-    }
-
-    /// The depth picture: grey, 16 bits.
-    fn depth_png(&self) -> Result<Vec<u8>, png::EncodingError> {
-        let mut bytes = Vec::new();
-        let [height, width] = self.size.map(|n| u32::try_from(n).unwrap_or(u32::MAX));
-        let mut encoder = png::Encoder::new(&mut bytes, width, height);
-        encoder.set_color(png::ColorType::Grayscale);
-        encoder.set_depth(png::BitDepth::Sixteen);
-        let levels: Vec<u8> = self.depth.iter().flat_map(|level| level.to_be_bytes()).collect();
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&levels)?;
-        writer.finish()?;
-        Ok(bytes)
     }
 }
 

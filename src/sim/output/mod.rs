@@ -9,7 +9,6 @@ mod develop;
 pub(crate) mod drawn;
 mod error;
 mod in_order;
-mod npy;
 mod parts;
 pub(crate) mod render;
 mod timing;

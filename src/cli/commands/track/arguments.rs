@@ -58,7 +58,8 @@ pub struct TrackArguments {
     #[arg(long)]
     pub undistorted: Option<PathBuf>,
     /// Read the skin's shape from each frame's colours, into this folder: `frame_NNNN.height.npy` (mm from its shape at
-    /// rest, negative where it is pressed in), `.height_sd.npy`, `.normal.npy` and `.contact.npy`, all on the raw image's grid.
+    /// rest, negative where it is pressed in), `.height_sd.npy`, `.normal.npy` and `.contact.npy`, all on the raw image's grid;
+    /// `.height.png` (16 bits) and `.ply` (the skin as triangles).
     #[arg(long, requires = "rest")]
     pub shape: Option<PathBuf>,
     /// A frame of the untouched sensor, which the shape is read against.

@@ -8,9 +8,9 @@ use super::arguments::TrackArguments;
 use super::decode;
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
-use domecast_files::{OutputRules, StagedFolder};
+use domecast_files::{OutputRules, StagedFolder, npy_f32, npy_u8, ply, png_u16};
 use domecast_runtime::constants::Constants;
-use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeMap, ShapeOptions, npy_f32, npy_u8};
+use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeMap, ShapeOptions};
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
 
 /// What reads the shape, and the folder for its maps.
@@ -61,7 +61,7 @@ impl ShapeFiles {
         has_forces: bool,
     ) -> Result<(), Failure> {
         let map = self.shape.map();
-        for (name, bytes) in files(map) {
+        for (name, bytes) in files(map).map_err(|error| Failure::Internal(error.to_string()))? {
             self.folder.write(&format!("frame_{number:04}.{name}"), &bytes)?;
         }
         let Some(line) = line else { return Ok(()) };
@@ -79,14 +79,38 @@ impl ShapeFiles {
     }
 }
 
-fn files(map: &ShapeMap) -> [(&'static str, Vec<u8>); 4] {
+/// A level of the height picture, mm, and the level of the skin at rest; 0 where nothing is known.
+const HEIGHT_STEP_MM: f32 = 0.001;
+const AT_REST: f32 = 32768.0;
+
+fn files(map: &ShapeMap) -> Result<[(&'static str, Vec<u8>); 6], png::EncodingError> {
     let grid = [map.height, map.width];
-    [
+    let level = |height_mm: &f32| {
+        let level = (AT_REST + height_mm / HEIGHT_STEP_MM).round();
+        if level.is_nan() { 0 } else { level.clamp(1.0, f32::from(u16::MAX)) as u16 }
+    };
+    let levels: Vec<u16> = map.height_mm.iter().map(level).collect();
+    Ok([
         ("height.npy", npy_f32(&grid, map.height_mm.iter().copied())),
         ("height_sd.npy", npy_f32(&grid, map.height_sd_mm.iter().copied())),
-        ("contact.npy", npy_u8(&grid, &map.is_touched.iter().map(|is| u8::from(*is)).collect::<Vec<u8>>())),
+        ("contact.npy", npy_u8(&grid, map.is_touched.iter().map(|is| u8::from(*is)))),
         ("normal.npy", npy_f32(&[map.height, map.width, 3], map.normal.iter().flat_map(|n| n.to_array()))),
-    ]
+        ("height.png", png_u16(grid, &levels)?),
+        ("ply", surface_ply(map)),
+    ])
+}
+
+/// The skin as triangles; its points' properties beside place and normal are `height_mm` and `height_sd_mm`.
+fn surface_ply(map: &ShapeMap) -> Vec<u8> {
+    const PROPERTIES: [&str; 8] = ["x", "y", "z", "nx", "ny", "nz", "height_mm", "height_sd_mm"];
+    let surface = map.surface();
+    let mut rows = Vec::with_capacity(PROPERTIES.len() * surface.points_mm.len());
+    for (i, point) in surface.points_mm.iter().enumerate() {
+        rows.extend(point.to_array());
+        rows.extend(surface.normals[i].to_array());
+        rows.extend([surface.heights_mm[i], surface.height_sds_mm[i]]);
+    }
+    ply(&PROPERTIES, rows.into_iter(), &surface.triangles)
 }
 
 fn unfit(path: &Path, error: &ShapeError) -> Failure {

@@ -93,6 +93,19 @@ def run(program, *arguments):
     return done.stdout
 
 
+# As the guide's file formats give it.
+RECORD = np.dtype([("frame", "<u8"), ("time_s", "<f8"), ("problems", "<u8"), ("dots_ok", "<u8"), ("displacement", "<f8", 6),
+                   ("pose_sd", "<f8", 6), ("wrench", "<f8", 6), ("wrench_sd", "<f8", 6), ("pose_rms_px", "<f8"), ("_", "<f8")])
+
+
+def turned(vector):
+    """The matrix of a rotation vector (Rodrigues)."""
+    angle = np.linalg.norm(vector)
+    x, y, z = vector / angle if angle > 0 else vector
+    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * across @ across
+
+
 def compare(program, build, folder):
     scene = folder / "scene.json"
     scene.write_text(json.dumps(scene_of(build)))
@@ -110,6 +123,18 @@ def compare(program, build, folder):
     statuses = [line["status"] for line in lines]
     read = set(statuses) == {"ok"}
     check("every frame is read", read, ", ".join(sorted(set(statuses))))
+
+    run(program, "track", *frames, "--constants", constants, "--out", folder / "track.bin", "--format", "records", "--quiet")
+    records = np.fromfile(folder / "track.bin", RECORD)
+    same = len(records) == len(lines) and all(
+        r["frame"] == line["frame"] and r["problems"] == 0
+        and r["dots_ok"] == sum(dot["state"] == "ok" for dot in line["black_dots"])
+        and all(np.isnan(r[name]).all() if line[name] is None else np.allclose(r[name], line[name], atol=1e-6)
+                for name in ("pose_sd", "wrench", "wrench_sd"))
+        and (np.isnan(r["displacement"]).all() if line["pose"] is None
+             else np.allclose(turned(r["displacement"][3:]), np.array(line["pose"])[:3, :3], atol=1e-8))
+        for r, line in zip(records, lines))
+    check("binary records say what the lines say", same)
 
     away, lost, wanted = [], 0, 0
     for line, true in zip(lines, truth):

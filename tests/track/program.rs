@@ -127,6 +127,9 @@ fn frames_of_every_kind_come_in() {
     let text = std::fs::read_to_string(at("d.csv")).unwrap();
     assert_eq!(text.lines().count(), 1 + 5 * SENSOR.constants.black_dots.len());
     assert!(text.lines().all(|l| l.split(',').count() == 10));
+    // Records of one size, on standard output too.
+    let told = run(folder.path(), &["seq", "--constants", "constants.json", "--format", "records"], b"");
+    assert_eq!(told.stdout.len(), 5 * domecast::track::RECORD_BYTES);
 }
 
 #[test]

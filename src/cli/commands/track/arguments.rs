@@ -15,6 +15,8 @@ pub enum Format {
     Csv,
     /// The dots, a line each.
     DotsCsv,
+    /// Pose and wrench as binary records of 240 bytes, a frame each: for loops that have no time to read text.
+    Records,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

@@ -21,7 +21,7 @@ use domecast_optics::SensorOptics;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
     CSV_HEADER, CameraFrame, CameraTurn, DOTS_CSV_HEADER, ForceDistribution, Tracked, Tracker, Undistorted,
-    overlay_png, write_csv, write_dots_csv, write_json_fields, write_json_forces,
+    overlay_png, write_csv, write_dots_csv, write_json_fields, write_json_forces, write_record,
 };
 use shape::ShapeFiles;
 use source::FrameSource;
@@ -184,7 +184,7 @@ fn tell_turn(output: &Output, turn: Option<CameraTurn>, tally: &Tally) {
 /// What stands before the lines.
 fn header(format: Format) -> String {
     match format {
-        Format::Jsonl => String::new(),
+        Format::Jsonl | Format::Records => String::new(),
         Format::Csv => format!("{CSV_HEADER}\n"),
         Format::DotsCsv => format!("{DOTS_CSV_HEADER}\n"),
     }
@@ -205,6 +205,7 @@ fn write_line(
         },
         Format::Csv => write_csv(line, tracked, at_mm),
         Format::DotsCsv => write_dots_csv(line, tracked),
+        Format::Records => write_record(line, tracked, at_mm),
     }
 }
 

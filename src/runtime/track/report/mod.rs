@@ -10,6 +10,7 @@ mod fields;
 mod overlay;
 mod pace;
 mod problem;
+mod record;
 mod reference;
 mod reporter;
 mod result;
@@ -20,6 +21,7 @@ pub use fields::Field;
 #[cfg(feature = "overlay")]
 pub use overlay::{OverlayError, overlay_png};
 pub use problem::{Problem, Problems};
+pub use record::{RECORD_BYTES, write_record};
 pub(super) use reporter::{FrameFindings, Reporter};
 pub use result::{DotResult, MarkerResult, Tracked};
 pub use write::{CSV_HEADER, DOTS_CSV_HEADER, write_csv, write_dots_csv, write_json, write_json_fields};

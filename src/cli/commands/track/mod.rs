@@ -2,29 +2,30 @@
 
 mod arguments;
 mod decode;
+mod pictures;
 mod shape;
 mod source;
+mod tally;
 mod times;
 
-use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::DVec3;
-use serde_json::json;
 
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
-use domecast_files::{OutputRules, StagedFile, StagedFolder};
-use domecast_optics::SensorOptics;
+use domecast_files::{OutputRules, StagedFile};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
-    CSV_HEADER, CameraFrame, CameraTurn, DOTS_CSV_HEADER, ForceDistribution, Tracked, Tracker, Undistorted,
-    overlay_png, write_csv, write_dots_csv, write_json_fields, write_json_forces,
+    CSV_HEADER, CameraFrame, CameraTurn, DOTS_CSV_HEADER, ForceDistribution, Tracked, Tracker, write_csv,
+    write_dots_csv, write_json_fields, write_json_forces,
 };
+use pictures::Pictures;
 use shape::ShapeFiles;
 use source::FrameSource;
+use tally::Tally;
 use times::FrameTimes;
 
 use arguments::Format;
@@ -56,99 +57,6 @@ impl Sink {
             output.kept(file.commit()?);
         }
         Ok(())
-    }
-}
-
-/// Folders that get a picture of each frame.
-struct Pictures {
-    overlay: Option<StagedFolder>,
-    magnify: f64,
-    rest: SensorOptics,
-    undistorted: Option<(StagedFolder, Undistorted)>,
-    buffer: Vec<u8>,
-}
-
-impl Pictures {
-    fn new(
-        arguments: &TrackArguments,
-        rules: &OutputRules<'_>,
-        constants: &Constants,
-        tracker: &Tracker,
-    ) -> Result<Self, Failure> {
-        let folder = |path: &PathBuf| StagedFolder::new(path, "track", rules);
-        let undistorted = match &arguments.undistorted {
-            Some(path) => {
-                Some((folder(path)?, Undistorted::new(constants).map_err(|e| unfit(arguments, &e))?))
-            }
-            None => None,
-        };
-        let overlay = arguments.overlay.as_ref().map(folder).transpose()?;
-        let rest = tracker.optics().clone();
-        Ok(Self { overlay, magnify: arguments.magnify, rest, undistorted, buffer: Vec::new() })
-    }
-
-    fn write(
-        &mut self,
-        output: &Output,
-        number: u64,
-        frame: &CameraFrame<'_>,
-        tracked: &Tracked,
-        tractions: &[(DVec3, DVec3)],
-    ) -> Result<(), Failure> {
-        if let Some(folder) = &self.overlay {
-            let name = format!("overlay_{number:04}.png");
-            match overlay_png(frame, tracked, &self.rest, self.magnify, tractions) {
-                Ok(png) => folder.write(&name, &png)?,
-                Err(error) => output.warn(&format!("{name}: {error}")),
-            }
-        }
-        if let Some((folder, map)) = &self.undistorted
-            && let Some(bytes) = map.of(frame, &mut self.buffer)
-        {
-            let png = decode::png_of(frame.width(), frame.height(), frame.channels(), bytes);
-            folder.write(&format!("undistorted_{number:04}.png"), &png.map_err(Failure::Internal)?)?;
-        }
-        Ok(())
-    }
-
-    fn end(self, output: &Output) -> Result<(), Failure> {
-        for folder in self.overlay.into_iter().chain(self.undistorted.map(|(folder, _)| folder)) {
-            output.kept(folder.commit()?);
-        }
-        Ok(())
-    }
-}
-
-/// What happened to the frames.
-#[derive(Default)]
-struct Tally {
-    counts: BTreeMap<&'static str, u64>,
-    times: Vec<Duration>,
-}
-
-impl Tally {
-    /// The time, ms, that a share of the frames took at most.
-    fn quantile_ms(&self, share: f64) -> f64 {
-        let index = ((self.times.len() as f64 * share) as usize).min(self.times.len().saturating_sub(1));
-        self.times.get(index).map_or(0.0, |t| 1e3 * t.as_secs_f64())
-    }
-
-    fn summarize(&mut self, output: &Output, out: Option<&Path>) -> Result<(), Failure> {
-        let Some(path) = out else { return Ok(()) };
-        self.times.sort_unstable();
-        let (median, p99) = (self.quantile_ms(0.5), self.quantile_ms(0.99));
-        let frames: u64 = self.counts.values().sum();
-        let statuses: Vec<String> = self.counts.iter().map(|(status, n)| format!("{n} {status}")).collect();
-        output.say(&format!("{}: {frames} frames, {}", path.display(), statuses.join(", ")))?;
-        output.say(&format!("{median:.2} ms a frame (median), {p99:.2} ms (99 of 100)"))?;
-        output.result(&json!({
-            "ok": true,
-            "out": path.display().to_string(),
-            "frames": frames,
-            "status": self.counts,
-            "median_ms": median,
-            "p99_ms": p99,
-        }))
     }
 }
 
@@ -295,7 +203,8 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         if let Ok(frame) = &picture {
             let dots = forces.as_ref().map_or(&[][..], |forces| &forces.result().dots);
             let tractions: Vec<_> = dots.iter().map(|dot| (dot.surface_mm, dot.traction_n_mm2)).collect();
-            pictures.write(output, next.number, frame, tracked, &tractions)?;
+            let skin = shape.as_ref().map(ShapeFiles::map);
+            pictures.write(output, next.number, frame, tracked, &tractions, skin)?;
         }
         source.reuse(next.picture);
     }

@@ -10,6 +10,8 @@ use crate::shape::ShapeMap;
 const OPACITY: f64 = 0.65;
 /// Below this share of the scale colours fade out, so that the picture of a skin at rest stays as it is.
 const FADE: f64 = 0.1;
+/// Deviations of the depth from which on there is a colour, and where it is whole.
+const SDS: [f64; 2] = [1.0, 3.0];
 const WHITE: [u8; 3] = [255; 3];
 const BLACK: [u8; 3] = [0; 3];
 
@@ -26,12 +28,15 @@ pub(super) fn draw_skin(canvas: &mut Canvas, map: &ShapeMap, range_mm: f64) {
         return;
     }
     canvas.recolor(|x, y, under| {
-        let height_mm = map.height_mm.get(y * map.width + x).filter(|_| x < map.width);
+        let pixel = y * map.width + x;
+        let height_mm = map.height_mm.get(pixel).filter(|_| x < map.width);
         let Some(depth_mm) = height_mm.map(|height| -f64::from(*height)).filter(|depth| *depth > 0.0) else {
             return under;
         };
         let share = depth_mm / range_mm;
-        let fade = (share / FADE).min(1.0);
+        let sd_mm = map.height_sd_mm.get(pixel).filter(|sd| sd.is_finite()).map_or(0.0, |sd| f64::from(*sd));
+        let sds = depth_mm / sd_mm.max(1e-9);
+        let fade = (share / FADE).min(1.0) * ((sds - SDS[0]) / (SDS[1] - SDS[0])).clamp(0.0, 1.0);
         // The lights' own colours would mix with those of the scale: below them the picture is grey.
         let gray = 0.299 * f64::from(under[0]) + 0.587 * f64::from(under[1]) + 0.114 * f64::from(under[2]);
         let color = viridis(share);

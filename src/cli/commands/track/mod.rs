@@ -3,62 +3,25 @@
 mod arguments;
 mod decode;
 mod pictures;
+mod results;
 mod shape;
 mod source;
 mod tally;
 mod times;
 
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use glam::DVec3;
-
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
-use domecast_files::{OutputRules, StagedFile};
 use domecast_runtime::constants::Constants;
-use domecast_runtime::track::{
-    CSV_HEADER, CameraFrame, CameraTurn, DOTS_CSV_HEADER, ForceDistribution, Tracked, Tracker, write_csv,
-    write_dots_csv, write_json_fields, write_json_forces,
-};
-use pictures::Pictures;
-use shape::ShapeFiles;
+use domecast_runtime::track::{CameraFrame, CameraTurn, ForceDistribution, Tracked, Tracker};
+use results::Results;
 use source::FrameSource;
 use tally::Tally;
 use times::FrameTimes;
 
-use arguments::Format;
 pub use arguments::TrackArguments;
-
-/// Where the lines go: a file that is there whole or not at all, or standard output, frame by frame.
-enum Sink {
-    File(StagedFile),
-    Standard(io::Stdout),
-}
-
-impl Sink {
-    fn new(out: Option<&Path>, rules: &OutputRules<'_>) -> Result<Self, Failure> {
-        Ok(match out {
-            Some(path) => Self::File(StagedFile::new(path, "track", rules)?),
-            None => Self::Standard(io::stdout()),
-        })
-    }
-
-    fn put(&mut self, bytes: &[u8]) -> Result<(), Failure> {
-        match self {
-            Self::File(file) => Ok(file.write(bytes)?),
-            Self::Standard(out) => Ok(out.write_all(bytes).and_then(|()| out.flush())?),
-        }
-    }
-
-    fn end(self, output: &Output) -> Result<(), Failure> {
-        if let Self::File(file) = self {
-            output.kept(file.commit()?);
-        }
-        Ok(())
-    }
-}
 
 fn unfit(arguments: &TrackArguments, error: &domecast_runtime::track::TrackError) -> Failure {
     input_fault(&arguments.constants, error.to_string(), "constants of a sensor")
@@ -86,33 +49,6 @@ fn tell_turn(output: &Output, turn: Option<CameraTurn>, tally: &Tally) {
         let whether = "the gap that tells how the picture lies is not seen (dirt, or a broken dot); nothing is stated of such \
             frames: if the camera is as the constants say, track with --camera-turned 0";
         output.warn(whether);
-    }
-}
-
-/// What stands before the lines.
-fn header(format: Format) -> String {
-    match format {
-        Format::Jsonl => String::new(),
-        Format::Csv => format!("{CSV_HEADER}\n"),
-        Format::DotsCsv => format!("{DOTS_CSV_HEADER}\n"),
-    }
-}
-
-/// Writes a frame's line or lines.
-fn write_line(
-    line: &mut Vec<u8>,
-    arguments: &TrackArguments,
-    tracked: &Tracked,
-    at_mm: DVec3,
-    forces: Option<&ForceDistribution>,
-) -> io::Result<()> {
-    match arguments.format {
-        Format::Jsonl => match forces {
-            Some(forces) => write_json_forces(line, tracked, &arguments.fields, forces.result()),
-            None => write_json_fields(line, tracked, &arguments.fields),
-        },
-        Format::Csv => write_csv(line, tracked, at_mm),
-        Format::DotsCsv => write_dots_csv(line, tracked),
     }
 }
 
@@ -152,14 +88,10 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     let mut forces = forces_of(arguments, &constants)?;
     let inputs = inputs_of(arguments);
     let rules = output.rules(&inputs);
-    let mut pictures = Pictures::new(arguments, &rules, &constants, &tracker)?;
-    let mut shape = ShapeFiles::open(arguments, &rules, &constants, &tracker)?;
-    let mut sink = Sink::new(arguments.out.as_deref(), &rules)?;
+    let mut results = Results::open(arguments, &rules, &constants, &tracker)?;
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
     let mut times = FrameTimes::open(arguments.times.as_deref())?;
-    let mut line = Vec::new();
-    sink.put(header(arguments.format).as_bytes())?;
-    let at_mm = tracker.springs().map_or(DVec3::ZERO, domecast_runtime::track::Springs::at_mm);
+    results.begin(arguments)?;
     let mut tally = Tally::default();
     warn_without_key(output, arguments, &constants);
     let mut turn = None;
@@ -182,8 +114,8 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
                 tracker.skip(next.number)
             }
         };
-        if let (Ok(frame), Some(shape)) = (&picture, &mut shape) {
-            shape.measure(frame, tracked)?;
+        if let Ok(frame) = &picture {
+            results.measure(frame, tracked)?;
         }
         if let Some(forces) = &mut forces {
             forces.update(tracked, &[]);
@@ -193,28 +125,12 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         }
         turn = tracked.camera_turn.or(turn);
         *tally.counts.entry(tracked.status()).or_default() += 1;
-        line.clear();
-        write_line(&mut line, arguments, tracked, at_mm, forces.as_ref())?;
-        if let (Ok(_), Some(shape)) = (&picture, &mut shape) {
-            let line = (arguments.format == Format::Jsonl).then_some(&mut line);
-            shape.write(next.number, line, forces.is_some())?;
-        }
-        sink.put(&line)?;
-        if let Ok(frame) = &picture {
-            let dots = forces.as_ref().map_or(&[][..], |forces| &forces.result().dots);
-            let tractions: Vec<_> = dots.iter().map(|dot| (dot.surface_mm, dot.traction_n_mm2)).collect();
-            let skin = shape.as_ref().map(ShapeFiles::map);
-            pictures.write(output, next.number, frame, tracked, &tractions, skin)?;
-        }
+        results.write(output, arguments, picture.as_ref().ok(), tracked, forces.as_ref())?;
         source.reuse(next.picture);
     }
     output.steps_done();
     if !tally.counts.is_empty() {
-        sink.end(output)?;
-        pictures.end(output)?;
-        if let Some(shape) = shape {
-            shape.end(output)?;
-        }
+        results.end(output)?;
     }
     source.end()?;
     if tally.counts.is_empty() {

@@ -26,6 +26,7 @@
 //! | replace nominal numbers by measured ones | [`calibrate`] |
 //! | turn frames into markers, pose, wrench and displacement | [`Tracker`]; [`track`] |
 //! | read the skin's shape from their colours | [`ShapeFromColor`]; [`shape`] |
+//! | draw what was found over a frame | [`overlay`] |
 //! | simulate what the sensor sees | [`Scene`]; [`sim`] |
 //! | look at the lit sensor before it is made | [`light`] |
 //! | do all of it | [`build`], and [`report`] for its page; [`compare`] two of them |
@@ -55,7 +56,7 @@ pub use domecast_fab::{artwork, build, compare, light, report};
 pub use domecast_mesh as mesh;
 pub use domecast_optics as optics;
 pub use domecast_optics::{camera, numeric, pose};
-pub use domecast_runtime::{calibrate, frames, shape, track};
+pub use domecast_runtime::{calibrate, frames, overlay, shape, track};
 pub use domecast_sim as sim;
 pub use domecast_springs as springs;
 

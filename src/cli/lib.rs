@@ -3,5 +3,6 @@
 mod accuracy;
 mod commands;
 mod touch_scene;
+mod track_report;
 
 pub use commands::run;

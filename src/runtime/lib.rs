@@ -3,5 +3,7 @@
 pub mod calibrate;
 pub mod constants;
 pub mod frames;
+#[cfg(feature = "overlay")]
+pub mod overlay;
 pub mod shape;
 pub mod track;

@@ -150,7 +150,8 @@ fn any_pose_is_found_in_the_first_frame() {
             assert!(moved.length() < 0.02, "dot {} {moved}", dot.id);
         }
         if let Ok(dir) = std::env::var("DOMECAST_PICTURES") {
-            let png = domecast::track::overlay_png(&frame(&drawn.bytes), tracked, &SENSOR.optics, 1.0, &[]);
+            let layers = domecast::overlay::OverlayLayers::default();
+            let png = domecast::overlay::overlay_png(&frame(&drawn.bytes), tracked, &SENSOR.optics, &layers);
             std::fs::write(format!("{dir}/overlay_{}.png", t[2]), png.unwrap()).unwrap();
         }
     }

@@ -5,21 +5,18 @@ use super::result::Accuracy;
 use super::sweep::{Law, Sweep, SweepSample};
 use super::sweep_chart::sweep_chart;
 use super::tenth;
-use domecast_fab::html::{Html, STYLE, bars, figure, html, table};
+use domecast_fab::html::{Html, bars, document, figure, html, table};
 use domecast_fab::numbers::{duration, significant};
 
 /// The page: what a tenth of the error costs, the conclusions, the budgets, then a picture for each sweep; tables are folded.
 pub fn page(accuracy: &Accuracy) -> Html {
     let link = |sweep: &Sweep| html!("<li><a href=\"#{}\">{}</a></li>\n", sweep.name, sweep.title);
-    html!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\">\n<title>What accuracy costs: {0}</title>\n<link \
-         rel=\"icon\" href=\"data:,\">\n<style>\n{1}</style>\n</head>\n<body>\n<header>\n<h1>What accuracy costs: \
-         {0}</h1>\n<p class=\"soft\">{2}, {3} threads, {4}; domecast {5}{6}. Times are medians after a warm-up; bars in the \
-         pictures reach from the lower to the upper quartile.</p>\n<nav aria-label=\"Settings\"><ul>\n{7}</ul></nav>\n\
-         </header>\n<main>\n{8}{9}{10}{11}</main>\n</body>\n</html>\n",
+    let body = html!(
+        "<header>\n<h1>What accuracy costs: \
+         {0}</h1>\n<p class=\"soft\">{1}, {2} threads, {3}; domecast {4}{5}. Times are medians after a warm-up; bars in the \
+         pictures reach from the lower to the upper quartile.</p>\n<nav aria-label=\"Settings\"><ul>\n{6}</ul></nav>\n\
+         </header>\n<main>\n{7}{8}{9}{10}</main>\n",
         accuracy.design,
-        Html::trusted(STYLE),
         accuracy.machine.processor,
         accuracy.machine.threads,
         accuracy.machine.system,
@@ -30,7 +27,8 @@ pub fn page(accuracy: &Accuracy) -> Html {
         summary(accuracy),
         accuracy.budgets.iter().map(budget).collect::<Html>(),
         accuracy.sweeps.iter().map(chapter).collect::<Html>(),
-    )
+    );
+    document(&format!("What accuracy costs: {}", accuracy.design), "", &body)
 }
 
 /// A table behind its name.

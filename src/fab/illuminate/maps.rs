@@ -8,6 +8,7 @@ use super::measure::POLAR_ANGLES_DEG;
 use super::numbers::IlluminationReport;
 use crate::artwork::canvas::{color, fill_hard, stroke};
 use domecast_design::{Design, DesignError};
+use domecast_runtime::overlay::viridis;
 use domecast_sim::light::illumination::Illumination;
 
 /// A map as a PNG.
@@ -27,10 +28,6 @@ pub struct Map {
 const SIDE_PX: u32 = 420;
 const MAX_WIDTH_PX: u32 = 560;
 
-/// Colours from low to high, evenly spaced: viridis at its quarters (S. van der Walt, N. Smith, matplotlib), which grows
-/// evenly in lightness, so that it can be read without colours.
-pub(super) const SCALE: [[u8; 3]; 5] =
-    [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 /// Around the dome, where the value is missing, and the lines of polar angles.
 const AROUND: [u8; 3] = [58, 58, 62];
 const MISSING: [u8; 3] = [200, 40, 30];
@@ -107,12 +104,13 @@ fn layers(light: &Illumination, report: &IlluminationReport) -> Vec<Layer> {
             name,
             title: format!("Direct irradiance by the {color} lights"),
             scale: format!("0 to {} mW/mm²", crate::numbers::typeset(largest)),
-            colors: values.iter().map(|v| shade(v / largest.max(f64::MIN_POSITIVE))).collect(),
+            colors: values.iter().map(|v| viridis(v / largest.max(f64::MIN_POSITIVE))).collect(),
         });
     }
     let places = &report.places;
     let logarithmic = |values: &[Option<f64>], [low, high]: [f64; 2]| -> Vec<[u8; 3]> {
-        let one = |value: &Option<f64>| value.map_or(MISSING, |v| shade((v / low).ln() / (high / low).ln()));
+        let one =
+            |value: &Option<f64>| value.map_or(MISSING, |v| viridis((v / low).ln() / (high / low).ln()));
         values.iter().map(one).collect()
     };
     layers.push(Layer {
@@ -139,17 +137,6 @@ fn layers(light: &Illumination, report: &IlluminationReport) -> Vec<Layer> {
         colors: places.is_lacking.iter().map(lacking).collect(),
     });
     layers
-}
-
-/// The colour of a share of a scale.
-fn shade(share: f64) -> [u8; 3] {
-    let place = share.clamp(0.0, 1.0) * (SCALE.len() - 1) as f64;
-    let low = (place as usize).min(SCALE.len() - 2);
-    let part = place - low as f64;
-    std::array::from_fn(|c| {
-        let [from, to] = [SCALE[low][c], SCALE[low + 1][c]].map(f64::from);
-        (from + part * (to - from)).round() as u8
-    })
 }
 
 /// Corners of every place in a picture; `None` where one of them is not in it.

@@ -1,14 +1,15 @@
 //! The page of `illuminate`: one file that opens from a disk.
 
 use super::crescents::{COLORS, Crescent};
-use super::maps::{Map, SCALE};
+use super::maps::Map;
 use super::numbers::{IlluminationReport, LightEvenness, Percentiles, Within};
 use super::optimize::Optimization;
 use super::search_page;
 use super::tilt::TiltStudy;
-use crate::html::{Html, STYLE, figure, html, picture, table};
+use crate::html::{Html, color_bar, document, figure, html, picture, table};
 use crate::numbers::{percent, typeset};
 use crate::report::markers;
+use domecast_runtime::overlay::VIRIDIS;
 
 /// Crescents that the page lists; the JSON has all.
 const MAX_CRESCENTS: usize = 12;
@@ -29,27 +30,24 @@ pub(super) fn page(
             })
             .collect()
     };
-    html!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\">\n<title>Light on the dome: {0}</title>\n<link rel=\"icon\" \
-         href=\"data:,\">\n<style>\n{1}</style>\n</head>\n<body>\n<header>\n<h1>Light on the dome: {0}</h1>\n<p \
-         class=\"soft\">domecast {2}. At rest, exposure and gain: level {3} for each mW/mm² on a white \
-         surface{4}.</p>\n<nav aria-label=\"Chapters\"><ul>\n<li><a href=\"#numbers\">Numbers</a></li>\n<li><a \
+    let body = html!(
+        "<header>\n<h1>Light on the dome: {0}</h1>\n<p \
+         class=\"soft\">domecast {1}. At rest, exposure and gain: level {2} for each mW/mm² on a white \
+         surface{3}.</p>\n<nav aria-label=\"Chapters\"><ul>\n<li><a href=\"#numbers\">Numbers</a></li>\n<li><a \
          href=\"#dome\">On the dome</a></li>\n<li><a href=\"#image\">In the image</a></li>\n<li><a \
          href=\"#seen\">Markers, dots, reflections</a></li>\n<li><a href=\"#tilt\">Tilt and \
-         diffuser</a></li>\n{10}</ul></nav>\n</header>\n<main>\n<section id=\"numbers\">\n\
-         <h2>Numbers</h2>\n{5}</section>\n<section id=\"dome\">\n<h2>On the dome</h2>\n<p>Seen from outside: the pole in the \
-         middle, x to the right, y up; circles at polar angles of 45°, 60° and 75°.</p>\n{6}<div \
-         class=\"row\">\n{7}</div>\n</section>\n<section id=\"image\">\n<h2>In the image</h2>\n<div \
-         class=\"row\">\n{8}</div>\n</section>\n<section id=\"seen\">\n<h2>Markers, dots, \
-         reflections</h2>\n{9}</section>\n{11}{12}</main>\n</body>\n</html>\n",
+         diffuser</a></li>\n{9}</ul></nav>\n</header>\n<main>\n<section id=\"numbers\">\n\
+         <h2>Numbers</h2>\n{4}</section>\n<section id=\"dome\">\n<h2>On the dome</h2>\n<p>Seen from outside: the pole in the \
+         middle, x to the right, y up; circles at polar angles of 45°, 60° and 75°.</p>\n{5}<div \
+         class=\"row\">\n{6}</div>\n</section>\n<section id=\"image\">\n<h2>In the image</h2>\n<div \
+         class=\"row\">\n{7}</div>\n</section>\n<section id=\"seen\">\n<h2>Markers, dots, \
+         reflections</h2>\n{8}</section>\n{10}{11}</main>\n",
         report.design,
-        Html::trusted(STYLE),
         report.domecast,
         typeset(report.level_per_mw_mm2),
         if report.is_exposure_at_limit { ", the camera's largest" } else { "" },
         numbers(report),
-        scale_bar(),
+        color_bar(&VIRIDIS, "low", "high"),
         figures("dome"),
         figures("image"),
         seen(report),
@@ -60,21 +58,8 @@ pub(super) fn page(
         }),
         search_page::tilt(study),
         searched.map(search_page::search).unwrap_or_default(),
-    )
-}
-
-/// The colours of the maps from low to high.
-fn scale_bar() -> Html {
-    let stop = |(k, [r, g, b]): (usize, &[u8; 3])| {
-        let fill = format!("rgb({r},{g},{b})");
-        html!("<rect x=\"{}\" y=\"0\" width=\"40\" height=\"14\" fill=\"{}\"/>", 40 * k, fill)
-    };
-    let stops: Html = SCALE.iter().enumerate().map(stop).collect();
-    html!(
-        "<p>low <svg role=\"img\" aria-label=\"Colours of the maps from low to high\" width=\"200\" height=\"14\" \
-         viewBox=\"0 0 200 14\">{}</svg> high</p>\n",
-        stops
-    )
+    );
+    document(&format!("Light on the dome: {}", report.design), "", &body)
 }
 
 fn or_dash(value: Option<f64>, unit: &str) -> String {

@@ -1,15 +1,10 @@
 //! The page: what is to be seen first, then a chapter for each subject.
 
-use std::io::Write as _;
-
-use flate2::Compression;
-use flate2::write::GzEncoder;
-
 use super::subject::ReportSubject;
 use super::{
     constants, electrical, forces, light, making, measured, overlay, parts, pattern, section, verdict,
 };
-use crate::html::{Html, STYLE, base64, figure, html, table};
+use crate::html::{Html, ORBIT, document, figure, html, packed, table};
 use crate::numbers::{dimension, typeset};
 use domecast_optics::DomeShape;
 
@@ -49,16 +44,13 @@ pub fn page(subject: &ReportSubject<'_>) -> Html {
     let sections = chapters
         .iter()
         .map(|c| html!("<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n", c.anchor, c.heading, c.content));
-    html!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\">\n<title>{0} – domecast</title>\n<link rel=\"icon\" \
-         href=\"data:,\">\n<style>\n{1}</style>\n</head>\n<body>\n<a class=\"skip\" href=\"#verdict\">To the \
-         content</a>\n<header>\n<h1>{0}</h1>\n{2}<p class=\"soft\">Design <a href=\"../design.json\"><code>{3}</code></a>, \
-         domecast {4}</p>\n<nav aria-label=\"Chapters\"><ul>\n{5}</ul></nav>\n</header>\n<main>\n{6}{7}{8}</main>\n\
+    let body = html!(
+        "<a class=\"skip\" href=\"#verdict\">To the \
+         content</a>\n<header>\n<h1>{0}</h1>\n{1}<p class=\"soft\">Design <a href=\"../design.json\"><code>{2}</code></a>, \
+         domecast {3}</p>\n<nav aria-label=\"Chapters\"><ul>\n{4}</ul></nav>\n</header>\n<main>\n{5}{6}{7}</main>\n\
          <footer><p>Lengths mm, angles degrees, forces N, pixels px. Made by domecast from the design (and the \
-         measurement, where one is shown) alone: the same design gives the same page.</p></footer>\n{9}</body>\n</html>\n",
+         measurement, where one is shown) alone: the same design gives the same page.</p></footer>\n{8}",
         subject.design.name(),
-        Html::trusted(STYLE),
         description.map_or_else(Html::default, |text| html!("<p>{}</p>\n", text)),
         subject.hash.chars().take(12).collect::<String>(),
         env!("CARGO_PKG_VERSION"),
@@ -67,26 +59,19 @@ pub fn page(subject: &ReportSubject<'_>) -> Html {
         key_figures(subject),
         sections.collect::<Html>(),
         viewer(subject),
-    )
-}
-
-/// The bytes gzipped (RFC 1952), which a browser's `DecompressionStream` opens; without a time, so that the same bytes give the same.
-fn gzip(bytes: &[u8]) -> Vec<u8> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    // writing to a Vec cannot fail
-    let _ = encoder.write_all(bytes);
-    encoder.finish().unwrap_or_default()
+    );
+    document(&format!("{} – domecast", subject.design.name()), "", &body)
 }
 
 /// The assembly and the script that shows it.
 fn viewer(subject: &ReportSubject<'_>) -> Html {
     subject.file("parts/assembly.glb").map_or_else(Html::default, |bytes| {
         html!(
-            "<script type=\"application/gzip\" id=\"assembly\">{}</script>\n<script type=\"application/json\" \
-             id=\"overlay\">{}</script>\n<script>\n{}</script>\n",
-            base64(&gzip(bytes)),
+            "{}<script type=\"application/json\" id=\"overlay\">{}</script>\n<script>\n{}{}</script>\n",
+            packed("assembly", bytes),
             // numbers and fixed names only: nothing that could end the element
             Html::trusted(overlay::overlay(subject).to_string()),
+            Html::trusted(ORBIT),
             Html::trusted(include_str!("viewer.js")),
         )
     })

@@ -41,24 +41,16 @@
     return found;
   });
 
-  const compile = (kind, source) => {
-    const shader = gl.createShader(kind);
-    gl.shaderSource(shader, source); gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-    return shader;
-  };
-  const program = gl.createProgram();
-  gl.attachShader(program, compile(gl.VERTEX_SHADER, `#version 300 es
+  const orbit = domecastOrbit(canvas, gl, () => draw()), ask = orbit.ask;
+  const program = orbit.program(`#version 300 es
     in vec3 p; uniform mat4 m; uniform vec3 shift; uniform float size; out vec3 q;
-    void main() { q = p + shift; gl_Position = m * vec4(q, 1.0); gl_PointSize = size; }`));
-  gl.attachShader(program, compile(gl.FRAGMENT_SHADER, `#version 300 es
+    void main() { q = p + shift; gl_Position = m * vec4(q, 1.0); gl_PointSize = size; }`, `#version 300 es
     precision highp float; in vec3 q; uniform vec4 color; uniform vec3 eye; uniform float cut, plain; out vec4 o;
     void main() { if (cut > 0.5 && q.z > 0.0) discard;
       if (plain > 0.5) { o = color; return; }
       vec3 n = normalize(cross(dFdx(q), dFdy(q)));
       float l = 0.35 + 0.5 * abs(dot(n, normalize(eye))) + 0.15 * max(0.0, n.y);
-      o = vec4(pow(color.rgb, vec3(1.0 / 2.2)) * l, color.a); }`));
-  gl.linkProgram(program); gl.useProgram(program);
+      o = vec4(pow(color.rgb, vec3(1.0 / 2.2)) * l, color.a); }`);
   const at = (name) => gl.getUniformLocation(program, name);
   const u = { m: at("m"), shift: at("shift"), color: at("color"), eye: at("eye"), cut: at("cut"), plain: at("plain"), size: at("size") };
 
@@ -111,25 +103,12 @@
   }
   choice("cut in half", false, (on) => { isCut = on; });
 
-  let turn = 0.7, lift = 0.35, near = 1, asked = false;
   const draw = () => {
-    asked = false;
-    const wide = canvas.clientWidth, tall = canvas.clientHeight, dense = Math.min(window.devicePixelRatio || 1, 2);
-    canvas.width = Math.max(1, wide * dense); canvas.height = Math.max(1, tall * dense);
-    gl.viewport(0, 0, canvas.width, canvas.height);
-    gl.clearColor(0, 0, 0, 0); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT); gl.enable(gl.DEPTH_TEST);
     const pull = slider.value / 100;
     const between = (name) => room[0][name].map((v, k) => v + pull * ((room[1] || room[0])[name][k] - v));
     const low = between("low"), high = between("high");
-    const mid = low.map((v, k) => (v + high[k]) / 2);
-    const size = Math.hypot(...low.map((v, k) => high[k] - v)) * 0.5 / near;
-    const [ct, st, cl, sl] = [Math.cos(turn), Math.sin(turn), Math.cos(lift), Math.sin(lift)];
-    const right = [ct, 0, -st], up = [-st * sl, cl, -ct * sl], eye = [st * cl, sl, ct * cl];
-    const aspect = wide / tall, fx = aspect > 1 ? 1 / (size * aspect) : 1 / size, fy = aspect > 1 ? 1 / size : aspect / size;
-    const line = (axis, f) => axis.map((a) => a * f), dot = (a) => a[0] * mid[0] + a[1] * mid[1] + a[2] * mid[2];
-    const r = line(right, fx), t = line(up, fy), d = line(eye, -0.25 / size);
-    const m = new Float32Array([r[0], t[0], d[0], 0, r[1], t[1], d[1], 0, r[2], t[2], d[2], 0, -dot(r), -dot(t), -dot(d), 1]);
-    gl.uniformMatrix4fv(u.m, false, m); gl.uniform3fv(u.eye, eye);
+    const { matrix, eye, dense } = orbit.frame(low, high);
+    gl.uniformMatrix4fv(u.m, false, matrix); gl.uniform3fv(u.eye, eye);
     const shown = items.filter((item) => families.get(item.family));
     gl.uniform1f(u.cut, isCut ? 1 : 0); gl.uniform1f(u.size, 5 * dense);
     for (const clear of [false, true]) {
@@ -157,30 +136,6 @@
     gl.depthMask(true);
     box.dataset.state = "drawn " + Math.round(pull * 100);
   };
-  const ask = () => { if (!asked) { asked = true; requestAnimationFrame(draw); } };
-  // one finger turns, two fingers zoom
-  const held = new Map();
-  const apart = () => { const [a, b] = [...held.values()]; return Math.hypot(a[0] - b[0], a[1] - b[1]); };
-  canvas.addEventListener("pointerdown", (e) => { held.set(e.pointerId, [e.clientX, e.clientY]); canvas.setPointerCapture(e.pointerId); });
-  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (e) => held.delete(e.pointerId));
-  canvas.addEventListener("pointermove", (e) => {
-    const before = held.get(e.pointerId);
-    if (!before) return;
-    const width = held.size === 2 ? apart() : 0;
-    held.set(e.pointerId, [e.clientX, e.clientY]);
-    if (width) near = Math.max(0.5, Math.min(8, near * apart() / width));
-    else { turn -= (e.clientX - before[0]) * 0.01; lift = Math.max(-1.5, Math.min(1.5, lift + (e.clientY - before[1]) * 0.01)); }
-    ask();
-  });
-  canvas.addEventListener("keydown", (e) => {
-    const move = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] }[e.key];
-    if (move) { turn += move[0]; lift = Math.max(-1.5, Math.min(1.5, lift + move[1])); }
-    else if (e.key === "+" || e.key === "=") near = Math.min(8, near * 1.15);
-    else if (e.key === "-") near = Math.max(0.5, near / 1.15);
-    else return;
-    e.preventDefault(); ask();
-  });
   slider.addEventListener("input", ask);
-  window.addEventListener("resize", ask);
   ask();
 })();

@@ -30,7 +30,7 @@
 //! | `identities` | marks, and optics at a pose to look from | a disc for each white marker, a track for each dot |
 //! | `pose` | the white markers | the platform's pose with its covariance |
 //! | `wrench` | the pose, and the dots at it | displacement and wrench with deviations, displacement of each dot |
-//! | `report` | what all of them found | [`Tracked`], its JSON and CSV lines, a picture |
+//! | `report` | what all of them found | [`Tracked`], its JSON and CSV lines |
 //!
 //! A stage knows only the types of the ones before it. The white markers are looked for where the last frame's pose
 //! puts them, the dots where this frame's does.
@@ -83,8 +83,6 @@ pub use report::{
     CSV_HEADER, DOTS_CSV_HEADER, DotResult, Field, MarkerResult, Problem, Problems, RECORD_BYTES, Tracked,
     write_csv, write_dots_csv, write_json, write_json_fields, write_record,
 };
-#[cfg(feature = "overlay")]
-pub use report::{OverlayError, overlay_png};
 pub use tracker::Tracker;
 #[cfg(feature = "traction")]
 pub use traction::{

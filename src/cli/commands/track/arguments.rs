@@ -50,9 +50,14 @@ pub struct TrackArguments {
     /// State the forces on the skin as well: traction (pressure and shear) at each dot, and what touches as a whole.
     #[arg(long)]
     pub traction: bool,
-    /// Draw dots, axes and force over each frame, into this folder.
+    /// Draw dots, axes and force over each frame, into this folder; with --shape the skin's depth as colours and the outline
+    /// of what touches too, with --traction the forces on the skin.
     #[arg(long)]
     pub overlay: Option<PathBuf>,
+    /// Write a page (HTML) of all frames: a summary, curves of force, torque, pose, and with --shape of the contact, and the
+    /// skin in 3D. It opens from a disk without a network.
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
     /// How many times as long as they are the arrows of the dots are drawn.
     #[arg(long, default_value_t = 1.0)]
     pub magnify: f64,

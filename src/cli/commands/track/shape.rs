@@ -52,6 +52,11 @@ impl ShapeFiles {
         measured.map(|_| ()).map_err(|error| unfit(Path::new("the frames"), &error))
     }
 
+    /// The measured frame's shape.
+    pub fn map(&self) -> &ShapeMap {
+        self.shape.map()
+    }
+
     /// Writes the measured frame's maps, and puts `contact` and `shape` into its JSON line, which ends with `}` and a line feed;
     /// the first into the second where forces have one of their own.
     pub fn write(

@@ -1,13 +1,11 @@
 //! Stage 6: one frame's result, and its files.
 //!
-//! In: [`FrameFindings`], what all stages found. Out: [`Tracked`], its JSON and CSV lines, and with the feature `overlay` a picture.
+//! In: [`FrameFindings`], what all stages found. Out: [`Tracked`], its JSON and CSV lines.
 
 mod affine;
 mod checks;
 mod drift;
 mod fields;
-#[cfg(feature = "overlay")]
-mod overlay;
 mod pace;
 mod problem;
 mod record;
@@ -18,8 +16,6 @@ mod tear;
 mod write;
 
 pub use fields::Field;
-#[cfg(feature = "overlay")]
-pub use overlay::{OverlayError, overlay_png};
 pub use problem::{Problem, Problems};
 pub use record::{RECORD_BYTES, write_record};
 pub(super) use reporter::{FrameFindings, Reporter};

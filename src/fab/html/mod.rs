@@ -12,8 +12,15 @@
 
 use std::fmt::{self, Write as _};
 
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
 /// The style of every page: light, dark, print, phone.
-pub const STYLE: &str = include_str!("report/style.css");
+const STYLE: &str = include_str!("style.css");
+
+/// The script that every 3D view of a page stands on: `domecastOrbit(canvas, gl, draw)` turns and zooms a WebGL 2 canvas by
+/// mouse, fingers and keys.
+pub const ORBIT: &str = include_str!("orbit.js");
 
 /// A piece of HTML.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -149,6 +156,29 @@ macro_rules! html {
 }
 pub use crate::html;
 
+/// A whole page in the style of all pages, with more `style` of its own; it opens from a disk without a network.
+pub fn document(title: &str, style: &str, body: &Html) -> Html {
+    html!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+         content=\"width=device-width, initial-scale=1\">\n<title>{}</title>\n<link rel=\"icon\" \
+         href=\"data:,\">\n<style>\n{}{}</style>\n</head>\n<body>\n{}</body>\n</html>\n",
+        title,
+        Html::trusted(STYLE),
+        Html::trusted(style),
+        body,
+    )
+}
+
+/// Bytes for a page's script, gzipped (RFC 1952) as a browser's `DecompressionStream` opens it; without a time, so that the same bytes
+/// give the same. `id` is the element's.
+pub fn packed(id: &str, bytes: &[u8]) -> Html {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    // writing to a Vec cannot fail
+    let _ = std::io::Write::write_all(&mut encoder, bytes);
+    let gzipped = encoder.finish().unwrap_or_default();
+    html!("<script type=\"application/gzip\" id=\"{}\">{}</script>\n", id, base64(&gzipped))
+}
+
 /// A table; the first column names the row. An empty caption is left out.
 pub fn table(caption: &str, heads: &[&str], rows: &[Vec<Html>]) -> Html {
     let head = |head: &&str| match *head {
@@ -214,6 +244,22 @@ pub fn bars(rows: &[(String, f64, String)]) -> Html {
         html!("<li><span>{}</span>{}</li>", name, bar((value / max).min(1.0), label))
     };
     html!("<ul class=\"bars\">{}</ul>\n", rows.iter().map(line).collect::<Html>())
+}
+
+/// The colours of a scale from low to high, between the names of its ends.
+pub fn color_bar(colors: &[[u8; 3]], low: &str, high: &str) -> Html {
+    let stop = |(k, [r, g, b]): (usize, &[u8; 3])| {
+        let fill = format!("rgb({r},{g},{b})");
+        html!("<rect x=\"{}\" y=\"0\" width=\"40\" height=\"14\" fill=\"{}\"/>", 40 * k, fill)
+    };
+    html!(
+        "<p>{0} <svg role=\"img\" aria-label=\"Colours from {0} to {1}\" width=\"{2}\" height=\"14\" \
+         viewBox=\"0 0 {2} 14\">{3}</svg> {1}</p>\n",
+        low,
+        high,
+        40 * colors.len(),
+        colors.iter().enumerate().map(stop).collect::<Html>()
+    )
 }
 
 #[cfg(test)]

@@ -1,0 +1,162 @@
+//! Everything that `track` writes, frame by frame.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::arguments::{Format, TrackArguments};
+use super::pictures::Pictures;
+use super::shape::ShapeFiles;
+use crate::commands::output::{Failure, Output};
+use crate::track_report::TrackReport;
+use domecast_files::{OutputRules, StagedFile};
+use domecast_runtime::constants::Constants;
+use domecast_runtime::track::{
+    CSV_HEADER, CameraFrame, DOTS_CSV_HEADER, ForceDistribution, Springs, Tracked, Tracker, write_csv,
+    write_dots_csv, write_json_fields, write_json_forces, write_record,
+};
+
+/// Where the lines go: a file that is there whole or not at all, or standard output, frame by frame.
+enum Sink {
+    File(StagedFile),
+    Standard(io::Stdout),
+}
+
+impl Sink {
+    fn new(out: Option<&Path>, rules: &OutputRules<'_>) -> Result<Self, Failure> {
+        Ok(match out {
+            Some(path) => Self::File(StagedFile::new(path, "track", rules)?),
+            None => Self::Standard(io::stdout()),
+        })
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        match self {
+            Self::File(file) => Ok(file.write(bytes)?),
+            Self::Standard(out) => Ok(out.write_all(bytes).and_then(|()| out.flush())?),
+        }
+    }
+
+    fn end(self, output: &Output) -> Result<(), Failure> {
+        if let Self::File(file) = self {
+            output.kept(file.commit()?);
+        }
+        Ok(())
+    }
+}
+
+/// What stands before the lines.
+fn header(format: Format) -> String {
+    match format {
+        Format::Jsonl | Format::Records => String::new(),
+        Format::Csv => format!("{CSV_HEADER}\n"),
+        Format::DotsCsv => format!("{DOTS_CSV_HEADER}\n"),
+    }
+}
+
+/// Writes a frame's line or lines.
+fn write_line(
+    line: &mut Vec<u8>,
+    arguments: &TrackArguments,
+    tracked: &Tracked,
+    at_mm: DVec3,
+    forces: Option<&ForceDistribution>,
+) -> io::Result<()> {
+    match arguments.format {
+        Format::Jsonl => match forces {
+            Some(forces) => write_json_forces(line, tracked, &arguments.fields, forces.result()),
+            None => write_json_fields(line, tracked, &arguments.fields),
+        },
+        Format::Csv => write_csv(line, tracked, at_mm),
+        Format::DotsCsv => write_dots_csv(line, tracked),
+        Format::Records => write_record(line, tracked, at_mm),
+    }
+}
+
+/// Lines, pictures, maps and the page of a run: all in their places at its end, or none.
+pub(super) struct Results {
+    sink: Sink,
+    pictures: Pictures,
+    shape: Option<ShapeFiles>,
+    page: Option<(StagedFile, TrackReport)>,
+    at_mm: DVec3,
+    line: Vec<u8>,
+}
+
+impl Results {
+    /// Opens all that is asked for, and refuses what could not be written.
+    pub fn open(
+        arguments: &TrackArguments,
+        rules: &OutputRules<'_>,
+        constants: &Constants,
+        tracker: &Tracker,
+    ) -> Result<Self, Failure> {
+        let at_mm = tracker.springs().map_or(DVec3::ZERO, Springs::at_mm);
+        let pictures = Pictures::new(arguments, rules, constants, tracker)?;
+        let shape = ShapeFiles::open(arguments, rules, constants, tracker)?;
+        let sink = Sink::new(arguments.out.as_deref(), rules)?;
+        let page = match &arguments.report {
+            Some(path) => {
+                let report =
+                    TrackReport::new(&constants.design, tracker.optics(), at_mm, arguments.shape.is_some());
+                Some((StagedFile::new(path, "track", rules)?, report))
+            }
+            None => None,
+        };
+        Ok(Self { sink, pictures, shape, page, at_mm, line: Vec::new() })
+    }
+
+    /// Writes what stands before the lines.
+    pub fn begin(&mut self, arguments: &TrackArguments) -> Result<(), Failure> {
+        self.sink.put(header(arguments.format).as_bytes())
+    }
+
+    /// Reads the frame's shape, where it is asked for.
+    pub fn measure(&mut self, frame: &CameraFrame<'_>, tracked: &Tracked) -> Result<(), Failure> {
+        self.shape.as_mut().map_or(Ok(()), |shape| shape.measure(frame, tracked))
+    }
+
+    /// Writes all of a frame; there is none where it could not be read.
+    pub fn write(
+        &mut self,
+        output: &Output,
+        arguments: &TrackArguments,
+        frame: Option<&CameraFrame<'_>>,
+        tracked: &Tracked,
+        forces: Option<&ForceDistribution>,
+    ) -> Result<(), Failure> {
+        let number = tracked.frame;
+        self.line.clear();
+        write_line(&mut self.line, arguments, tracked, self.at_mm, forces)?;
+        if let (Some(_), Some(shape)) = (frame, &mut self.shape) {
+            let line = (arguments.format == Format::Jsonl).then_some(&mut self.line);
+            shape.write(number, line, forces.is_some())?;
+        }
+        self.sink.put(&self.line)?;
+        let skin = frame.and(self.shape.as_ref()).map(ShapeFiles::map);
+        if let Some(frame) = frame {
+            let dots = forces.map_or(&[][..], |forces| &forces.result().dots);
+            let tractions: Vec<_> = dots.iter().map(|dot| (dot.surface_mm, dot.traction_n_mm2)).collect();
+            self.pictures.write(output, number, frame, tracked, &tractions, skin)?;
+        }
+        if let Some((_, report)) = &mut self.page {
+            report.add(tracked, skin);
+        }
+        Ok(())
+    }
+
+    /// Puts all in its place.
+    pub fn end(self, output: &Output) -> Result<(), Failure> {
+        self.sink.end(output)?;
+        self.pictures.end(output)?;
+        if let Some(shape) = self.shape {
+            shape.end(output)?;
+        }
+        if let Some((mut file, report)) = self.page {
+            file.write(&report.to_html())?;
+            output.kept(file.commit()?);
+        }
+        Ok(())
+    }
+}

@@ -5,6 +5,7 @@
 mod bad;
 mod program;
 mod render;
+mod report;
 mod rigid;
 mod sequences;
 mod simulated;

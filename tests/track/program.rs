@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::render::{Picture, still};
 use super::{SENSOR, drawn, pose};
 
-fn png(bytes: &[u8]) -> Vec<u8> {
+pub(super) fn png(bytes: &[u8]) -> Vec<u8> {
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, 640, 480);
     encoder.set_color(png::ColorType::Grayscale);
@@ -18,7 +18,7 @@ fn png(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-fn run(folder: &Path, arguments: &[&str], input: &[u8]) -> Output {
+pub(super) fn run(folder: &Path, arguments: &[&str], input: &[u8]) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_domecast"))
         .current_dir(folder)
         .arg("track")
@@ -38,7 +38,7 @@ fn run(folder: &Path, arguments: &[&str], input: &[u8]) -> Output {
     })
 }
 
-fn lines(output: &Output) -> Vec<Value> {
+pub(super) fn lines(output: &Output) -> Vec<Value> {
     let text = String::from_utf8(output.stdout.clone()).unwrap();
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }

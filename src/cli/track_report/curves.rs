@@ -81,15 +81,8 @@ fn curve(report: &TrackReport, index: usize, quantity: &Quantity) -> Chart {
     let [left, top, right, bottom] = PLOT;
     let [first, last] = ends(report);
     let across = Axis::linear(first, last, [left, right]);
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for (_, values, sd) in runs.iter().flatten() {
-        for (k, value) in values.iter().enumerate() {
-            let sd = sd.filter(|_| k < quantity.components.len()).map_or(0.0, |sd| sd.to_array()[k.min(2)]);
-            (low, high) = (low.min(value - sd), high.max(value + sd));
-        }
-    }
-    let padding = (0.06 * (high - low)).max(0.5 * (quantity.min_span - (high - low)));
-    let up = Axis::linear(low - padding, high + padding, [bottom, top]);
+    let [low, high] = span(&runs, quantity);
+    let up = Axis::linear(low, high, [bottom, top]);
 
     let name = format!("{} in {} over the frames", quantity.title, quantity.unit);
     let mut chart = Chart::new(&name, SIZE);
@@ -119,7 +112,24 @@ fn curve(report: &TrackReport, index: usize, quantity: &Quantity) -> Chart {
     chart
 }
 
-/// One deviation to either side of a component.
+/// The ends of the axis: all values, and of their deviations no more than would double what the values span.
+fn span(runs: &[Vec<Shown>], quantity: &Quantity) -> [f64; 2] {
+    let values = || runs.iter().flatten().flat_map(|(_, values, _)| values.iter().copied());
+    let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    let reach = (most - least).max(quantity.min_span);
+    let (mut low, mut high) = (least, most);
+    for (_, values, sd) in runs.iter().flatten() {
+        let Some(sd) = sd else { continue };
+        for (value, sd) in values.iter().zip(sd.to_array()) {
+            (low, high) = (low.min(value - sd), high.max(value + sd));
+        }
+    }
+    (low, high) = (low.max(least - 0.5 * reach), high.min(most + 0.5 * reach));
+    let padding = (0.06 * (high - low)).max(0.5 * (quantity.min_span - (high - low)));
+    [low - padding, high + padding]
+}
+
+/// One deviation to either side of a component, as far as the plot goes.
 fn shade(chart: &mut Chart, run: &[Shown], k: usize, across: &Axis, up: &Axis) {
     let color = if run.first().is_some_and(|shown| shown.1.len() == 1) { SHADES[2] } else { SHADES[k] };
     // frames without a deviation part what is shaded
@@ -127,7 +137,8 @@ fn shade(chart: &mut Chart, run: &[Shown], k: usize, across: &Axis, up: &Axis) {
         let side = |sign: f64| {
             let edge = move |(frame, values, sd): &Shown| {
                 let sd = (*sd)?.to_array()[k];
-                Some(DVec2::new(across.px(*frame), up.px(values[k] + sign * sd)))
+                let y = up.px(values[k] + sign * sd).clamp(PLOT[1], PLOT[3]);
+                Some(DVec2::new(across.px(*frame), y))
             };
             part.iter().filter_map(edge)
         };
@@ -210,7 +221,7 @@ pub(super) fn explained() -> Html {
         )
     };
     html!(
-        "<p>Shaded: one standard deviation to either side, of all causes. A curve has a gap where a frame has no number or is missing. \
+        "<p>Shaded: one standard deviation to either side, of all causes; where it is much more than the curve, the plot ends within it. A curve has a gap where a frame has no number or is missing. \
          Under each curve the frames' status: {} ok, {} something is wrong but there are numbers, {} no number; nothing where no frame \
          is.</p>\n",
         swatch(OK, OK_PART),

@@ -6,6 +6,7 @@ use super::curves::{PLOT, ends};
 use super::quantities::QUANTITIES;
 use super::record::TrackReport;
 use super::skin::{AROUND, HEIGHT_UNIT_MM, RINGS, UNSEEN};
+use super::still::{FADE, REST_COLOR};
 use domecast_runtime::overlay::VIRIDIS;
 
 /// To the places of the JSON lines.
@@ -60,6 +61,8 @@ pub(super) fn data(report: &TrackReport) -> Value {
             "unseen": UNSEEN,
             "range_mm": report.skins.range_mm(),
             "colors": VIRIDIS,
+            "rest_color": REST_COLOR,
+            "fade": FADE,
         });
     }
     data

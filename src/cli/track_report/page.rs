@@ -4,10 +4,12 @@ use super::curves::{curves, explained};
 use super::data::{data, skin_bytes};
 use super::quantities::QUANTITIES;
 use super::record::{Extremes, TrackReport};
-use super::still::still;
+use super::still::{depth_color, still};
 use domecast_fab::html::{Html, ORBIT, color_bar, document, html, packed, picture, table};
 use domecast_fab::numbers::{percent, typeset};
-use domecast_runtime::overlay::VIRIDIS;
+
+/// Colours of the scale's bar.
+const COLORS: usize = 50;
 
 /// The whole page.
 pub(super) fn page(report: &TrackReport) -> Html {
@@ -19,7 +21,7 @@ pub(super) fn page(report: &TrackReport) -> Html {
          href=\"#curves\">Curves</a></li>\n</ul></nav>\n</header>\n<main>\n<section id=\"summary\">\n<h2>In short</h2>\n{4}</section>\n\
          {5}<section id=\"curves\">\n<h2>Curves</h2>\n{6}{7}<div class=\"row wide\">\n{8}</div>\n</section>\n</main>\n<footer><p>Force and \
          torque are what the world puts on dome and platform, in the rest frame, about the springs' reference point: a push on the pole \
-         has a negative z. Shift and turn are that point's and the platform's.</p></footer>\n<script type=\"application/json\" \
+         has a negative z. Shift is that point's from rest, turn the platform's rotation vector.</p></footer>\n<script type=\"application/json\" \
          id=\"track\">{9}</script>\n{10}",
         report.design,
         frames_in_words(report.frames.seen()),
@@ -83,7 +85,7 @@ fn summary(report: &TrackReport) -> Html {
     };
     html!(
         "{}{}{}",
-        table("Status of the frames", &["status", "frames", "share, %", "frames with numbers"], &rows),
+        table("Status of the frames", &["status", "frames", "share", "frames with numbers"], &rows),
         missing,
         ranges(report),
     )
@@ -130,6 +132,7 @@ fn skin(report: &TrackReport) -> Html {
     let image = still(skins, deepest, range_mm);
     let image = image.map_or_else(Html::default, |png| picture("image/png", &png, &alt, ""));
     let kept = skins.frames.kept();
+    let colors: Vec<[u8; 3]> = (0..COLORS).map(|k| depth_color((k as f64 + 0.5) / COLORS as f64)).collect();
     html!(
         "<section id=\"skin\">\n<h2>The skin</h2>\n<p>The dome (radius {0} mm) with its height map, coloured by depth; a white line is around \
          what touches; grey is not seen. {1} of {2} frames with a shape{3}. Drag or use the arrow keys to turn it, plus and minus to \
@@ -145,7 +148,7 @@ fn skin(report: &TrackReport) -> Html {
             1 => String::new(),
             stride => format!(", every {stride}th"),
         },
-        color_bar(&VIRIDIS, "0 mm", &format!("{} mm", typeset(range_mm))),
+        color_bar(&colors, "0 mm", &format!("{} mm deep", typeset(range_mm))),
         image,
         deepest.frame.to_string(),
         kept.len() - 1,

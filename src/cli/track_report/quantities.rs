@@ -50,7 +50,7 @@ pub const QUANTITIES: [Quantity; 6] = [
     Quantity {
         key: "translation_mm",
         sd_key: Some("translation_sd_mm"),
-        title: "Shift of the platform",
+        title: "Shift",
         unit: "mm",
         factor: 1.0,
         components: XYZ,
@@ -59,7 +59,7 @@ pub const QUANTITIES: [Quantity; 6] = [
     Quantity {
         key: "rotation_rad",
         sd_key: Some("rotation_sd_rad"),
-        title: "Turn of the platform",
+        title: "Turn",
         unit: "mrad",
         factor: 1e3,
         components: XYZ,

@@ -25,26 +25,33 @@
     if (ring) corners.push(node(ring, step), node(ring + 1, step + 1), node(ring, step + 1));
   }
   const view = new DataView(raw), frames = skin.frames.length;
-  // depth (mm), whether it is seen, whether it is touched
+  // depth (mm), whether it is seen, how much of it and its neighbours is touched
   const state = (index) => {
-    const values = new Float32Array(3 * count);
+    const values = new Float32Array(3 * count), touched = new Uint8Array(raw, 2 * frames * count + index * count, count);
+    const share = (k) => {
+      if (k === 0) return touched[0];
+      const ring = Math.floor((k - 1) / around) + 1, step = (k - 1) % around, out = Math.min(ring + 1, rings.length - 1);
+      const near = [node(ring, step + 1), node(ring, step + around - 1), node(ring - 1, step), node(out, step)];
+      return 0.4 * touched[k] + 0.15 * near.reduce((sum, other) => sum + touched[other], 0);
+    };
     for (let k = 0; k < count; k++) {
       const height = view.getInt16(2 * (index * count + k), true), isSeen = height !== skin.unseen;
-      values.set([isSeen ? -height * skin.unit_mm : 0, isSeen ? 1 : 0, view.getUint8(2 * frames * count + index * count + k)], 3 * k);
+      values.set([isSeen ? -height * skin.unit_mm : 0, isSeen ? 1 : 0, share(k)], 3 * k);
     }
     return values;
   };
 
-  const orbit = domecastOrbit(canvas, gl, () => draw());
-  const color = skin.colors.map((rgb) => `vec3(${rgb.map((v) => (v / 255).toFixed(5)).join(", ")})`);
+  const orbit = domecastOrbit(canvas, gl, () => draw(), { lift: 0.75, near: 1.3 });
+  const vector = (rgb) => `vec3(${rgb.map((v) => (v / 255).toFixed(5)).join(", ")})`, color = skin.colors.map(vector);
   const program = orbit.program(`#version 300 es
     in vec3 p, n, s; uniform mat4 m; uniform float deeper; out vec3 q, v;
     void main() { q = p - n * s.x * deeper; v = s; gl_Position = m * vec4(q, 1.0); }`, `#version 300 es
     precision highp float; in vec3 q, v; uniform vec3 eye; uniform float range; out vec4 o;
     void main() {
       vec3 stops[${color.length}] = vec3[](${color.join(", ")});
-      float at = clamp(v.x / range, 0.0, 1.0) * ${color.length - 1}.0; int low = min(int(at), ${color.length - 2});
-      vec3 c = v.y > 0.999 ? mix(stops[low], stops[low + 1], at - float(low)) : vec3(0.62);
+      float share = clamp(v.x / range, 0.0, 1.0), at = share * ${color.length - 1}.0; int low = min(int(at), ${color.length - 2});
+      vec3 deep = mix(stops[low], stops[low + 1], at - float(low));
+      vec3 c = v.y > 0.999 ? mix(${vector(skin.rest_color)}, deep, min(share / ${skin.fade.toFixed(5)}, 1.0)) : vec3(0.55);
       vec3 n = normalize(cross(dFdx(q), dFdy(q)));
       float l = 0.55 + 0.45 * abs(dot(n, normalize(eye + vec3(0.3, 0.6, -0.2))));
       c = mix(c * l, vec3(1.0), 1.0 - smoothstep(0.8, 1.6, abs(v.z - 0.5) / max(fwidth(v.z), 1e-4)));
@@ -77,7 +84,7 @@
     chart.append(line);
     return line;
   });
-  const number = (v, digits) => v.toFixed(digits).replace("-", "−");
+  const number = (v, digits) => v.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
   const choose = () => {
     const index = Number(slider.value), frame = skin.frames[index], at = data.frames.indexOf(frame);
     gl.bindBuffer(gl.ARRAY_BUFFER, states); gl.bufferSubData(gl.ARRAY_BUFFER, 0, state(index));

@@ -7,8 +7,21 @@ use glam::DVec3;
 
 const SIZE: (u32, u32) = (720, 520);
 /// Colours that the scale is cut into.
-const BANDS: usize = 32;
-const UNSEEN_COLOR: [f32; 3] = [0.62, 0.62, 0.62];
+const BANDS: usize = 128;
+const UNSEEN_COLOR: [u8; 3] = [140; 3];
+/// The skin at rest, and the share of the scale up to which its colour fades into those of depth.
+pub(super) const REST_COLOR: [u8; 3] = [226, 223, 214];
+pub(super) const FADE: f64 = 0.1;
+
+/// The colour of a share of the scale of depths.
+pub(super) fn depth_color(share: f64) -> [u8; 3] {
+    let part = (share / FADE).clamp(0.0, 1.0);
+    let deep = viridis(share);
+    std::array::from_fn(|c| {
+        let [rest, deep] = [REST_COLOR[c], deep[c]].map(f64::from);
+        (rest + part * (deep - rest)).round() as u8
+    })
+}
 
 /// A PNG of the skin, coloured by depth from 0 to `range_mm`; `None` if it could not be coded.
 pub(super) fn still(skins: &Skins, frame: &SkinFrame, range_mm: f64) -> Option<Vec<u8>> {
@@ -17,11 +30,14 @@ pub(super) fn still(skins: &Skins, frame: &SkinFrame, range_mm: f64) -> Option<V
         *at_mm + *normal * f64::from(height) * HEIGHT_UNIT_MM
     };
     let vertices_mm: Vec<DVec3> = skins.places.iter().enumerate().map(place).collect();
-    // Places that are not seen are a band of their own.
-    let mut bands = vec![Vec::new(); BANDS + 1];
+    // Places that are not seen are a band of their own, and so is the edge of what touches.
+    let mut bands = vec![Vec::new(); BANDS + 2];
     for triangle in triangles() {
         let heights = triangle.map(|node| frame.heights.get(node as usize).copied().unwrap_or(UNSEEN));
-        let band = if heights.contains(&UNSEEN) {
+        let touched = triangle.map(|node| frame.is_touched.get(node as usize).copied().unwrap_or(false));
+        let band = if touched.contains(&true) && touched.contains(&false) {
+            BANDS + 1
+        } else if heights.contains(&UNSEEN) {
             BANDS
         } else {
             let depth_mm =
@@ -33,8 +49,12 @@ pub(super) fn still(skins: &Skins, frame: &SkinFrame, range_mm: f64) -> Option<V
     let meshes: Vec<TriMesh> =
         bands.into_iter().map(|triangles| TriMesh { vertices_mm: vertices_mm.clone(), triangles }).collect();
     let color = |band: usize| {
-        let rgb = viridis(band as f64 / (BANDS - 1) as f64).map(|value| f32::from(value) / 255.0);
-        if band == BANDS { UNSEEN_COLOR } else { rgb }
+        let rgb = match band {
+            ..BANDS => depth_color(band as f64 / (BANDS - 1) as f64),
+            BANDS => UNSEEN_COLOR,
+            _ => [255; 3],
+        };
+        rgb.map(|value| f32::from(value) / 255.0)
     };
     let item = |(band, mesh)| PictureItem { mesh, shift_mm: DVec3::ZERO, color: color(band) };
     let items: Vec<PictureItem<'_>> = meshes.iter().enumerate().map(item).collect();

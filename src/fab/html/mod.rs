@@ -250,14 +250,16 @@ pub fn bars(rows: &[(String, f64, String)]) -> Html {
 pub fn color_bar(colors: &[[u8; 3]], low: &str, high: &str) -> Html {
     let stop = |(k, [r, g, b]): (usize, &[u8; 3])| {
         let fill = format!("rgb({r},{g},{b})");
-        html!("<rect x=\"{}\" y=\"0\" width=\"40\" height=\"14\" fill=\"{}\"/>", 40 * k, fill)
+        let width = 200.0 / colors.len() as f64;
+        // a little wider: no seams between them
+        let (x, wider) = (width * k as f64, width + 0.5);
+        html!("<rect x=\"{}\" y=\"0\" width=\"{}\" height=\"14\" fill=\"{}\"/>", x, wider, fill)
     };
     html!(
-        "<p>{0} <svg role=\"img\" aria-label=\"Colours from {0} to {1}\" width=\"{2}\" height=\"14\" \
-         viewBox=\"0 0 {2} 14\">{3}</svg> {1}</p>\n",
+        "<p>{0} <svg role=\"img\" aria-label=\"Colours from {0} to {1}\" width=\"200\" height=\"14\" \
+         viewBox=\"0 0 200 14\">{2}</svg> {1}</p>\n",
         low,
         high,
-        40 * colors.len(),
         colors.iter().enumerate().map(stop).collect::<Html>()
     )
 }

@@ -1,7 +1,7 @@
-// Turns and zooms a WebGL 2 canvas by mouse, fingers and keys, and calls draw when it is to be drawn again. Y is up.
-const domecastOrbit = (canvas, gl, draw) => {
-  "use strict";
-  let turn = 0.7, lift = 0.35, near = 1, asked = false;
+// Turns and zooms a WebGL 2 canvas by mouse, fingers and keys, and calls draw when it is to be drawn again. Y is up; lift is how far
+// from above it is seen at first (rad), near how large.
+const domecastOrbit = (canvas, gl, draw, { lift = 0.35, near = 1 } = {}) => {
+  let turn = 0.7, asked = false;
   const ask = () => {
     if (asked) return;
     asked = true;

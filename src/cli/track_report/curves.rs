@@ -16,7 +16,7 @@ const BAND_GAP: f64 = 4.0;
 const OK_PART: f64 = 0.4;
 const FONT: f64 = 11.0;
 const GRID: ChartColor = ChartColor { rgb: [222, 222, 222], class: "grid" };
-/// Lines and their deviations by component: colours that are told apart by all who see (M. Okabe and K. Ito), dashes in the style.
+/// Lines and their deviations by component: colours that are distinguished by all who see (M. Okabe and K. Ito), dashes in the style.
 const LINES: [ChartColor; 4] = [
     ChartColor { rgb: [213, 94, 0], class: "line-x" },
     ChartColor { rgb: [0, 158, 115], class: "line-y" },
@@ -115,16 +115,17 @@ fn curve(report: &TrackReport, index: usize, quantity: &Quantity) -> Chart {
 /// The ends of the axis: all values, and of their deviations no more than would double what the values span.
 fn span(runs: &[Vec<Shown>], quantity: &Quantity) -> [f64; 2] {
     let values = || runs.iter().flatten().flat_map(|(_, values, _)| values.iter().copied());
-    let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    let reach = (most - least).max(quantity.min_span);
-    let (mut low, mut high) = (least, most);
+    let (min_value, max_value) =
+        (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    let reach = (max_value - min_value).max(quantity.min_span);
+    let (mut low, mut high) = (min_value, max_value);
     for (_, values, sd) in runs.iter().flatten() {
         let Some(sd) = sd else { continue };
         for (value, sd) in values.iter().zip(sd.to_array()) {
             (low, high) = (low.min(value - sd), high.max(value + sd));
         }
     }
-    (low, high) = (low.max(least - 0.5 * reach), high.min(most + 0.5 * reach));
+    (low, high) = (low.max(min_value - 0.5 * reach), high.min(max_value + 0.5 * reach));
     let padding = (0.06 * (high - low)).max(0.5 * (quantity.min_span - (high - low)));
     [low - padding, high + padding]
 }

@@ -11,8 +11,8 @@ use domecast_fab::numbers::{percent, typeset};
 /// Colours of the scale's bar.
 const COLORS: usize = 50;
 
-/// The whole page.
-pub(super) fn page(report: &TrackReport) -> Html {
+/// The page of all frames so far.
+pub fn page(report: &TrackReport) -> Html {
     let skin = skin(report);
     let skin_link = if skin.is_empty() { "" } else { "<li><a href=\"#skin\">The skin</a></li>\n" };
     let body = html!(
@@ -48,7 +48,7 @@ fn every(stride: u64, kept: usize, verb: &str) -> Html {
     match stride {
         1 => Html::default(),
         _ => html!(
-            "<p>Every {}th frame is {} ({} of them); the tables are of all.</p>\n",
+            "<p>Every {}th frame is {} ({} of them), so what is shorter may not show; the tables are of all.</p>\n",
             stride.to_string(),
             verb,
             kept

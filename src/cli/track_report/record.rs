@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::page::page;
 use super::quantities::{QUANTITIES, Reading, readings};
 use super::skin::Skins;
 use super::thinned::Thinned;
@@ -108,10 +107,5 @@ impl TrackReport {
         if let Some(map) = skin {
             self.skins.add(tracked, map);
         }
-    }
-
-    /// The page of all frames so far.
-    pub fn to_html(&self) -> Vec<u8> {
-        page(self).into_bytes()
     }
 }

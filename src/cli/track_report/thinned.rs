@@ -4,20 +4,20 @@
 #[derive(Debug, Clone)]
 pub struct Thinned<T> {
     kept: Vec<T>,
-    most: usize,
+    max_kept: usize,
     stride: u64,
     seen: u64,
 }
 
 impl<T> Thinned<T> {
     /// Keeps at most so many, at least one.
-    pub fn new(most: usize) -> Self {
-        Self { kept: Vec::new(), most: most.max(1), stride: 1, seen: 0 }
+    pub fn new(max_kept: usize) -> Self {
+        Self { kept: Vec::new(), max_kept: max_kept.max(1), stride: 1, seen: 0 }
     }
 
     /// Offers the next thing, which is made only where it is kept.
     pub fn offer(&mut self, make: impl FnOnce() -> T) {
-        if self.seen.is_multiple_of(self.stride) && self.kept.len() >= self.most {
+        if self.seen.is_multiple_of(self.stride) && self.kept.len() >= self.max_kept {
             let mut is_even = false;
             self.kept.retain(|_| {
                 is_even = !is_even;
@@ -53,11 +53,14 @@ mod tests {
 
     #[test]
     fn what_is_kept_is_evenly_spaced_and_bounded() {
-        for (most, count) in [(60, 1), (60, 60), (60, 61), (60, 1000), (1, 9), (3, 100)] {
-            let mut thinned = Thinned::new(most);
+        for (max_kept, count) in [(60, 1), (60, 60), (60, 61), (60, 1000), (1, 9), (3, 100)] {
+            let mut thinned = Thinned::new(max_kept);
             (0..count).for_each(|n| thinned.offer(|| n));
             let kept = thinned.kept();
-            assert!(kept.len() <= most && (2 * kept.len() >= most || kept.len() as u64 == count), "{kept:?}");
+            assert!(
+                kept.len() <= max_kept && (2 * kept.len() >= max_kept || kept.len() as u64 == count),
+                "{kept:?}"
+            );
             assert!(kept.iter().enumerate().all(|(i, n)| *n == i as u64 * thinned.stride()), "{kept:?}");
             assert!(count - kept.last().unwrap() <= thinned.stride(), "{kept:?}");
         }

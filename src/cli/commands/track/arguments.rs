@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use super::source::RawSize;
-use crate::commands::output::Output;
-use domecast_runtime::track::{Channel, Field, Reference, Steps, Thresholds, TrackOptions};
+use crate::commands::input::input_fault;
+use crate::commands::output::{Failure, Output};
+use domecast_runtime::track::{Channel, Field, Reference, Steps, Thresholds, TrackError, TrackOptions};
 
 /// What is written for each frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -148,6 +149,11 @@ impl TrackArguments {
     fn camera_turned_rad(&self) -> Option<f64> {
         let turned_rad = self.camera_turned.map(f64::to_radians);
         if self.camera_mirrored { Some(-turned_rad.unwrap_or(0.0)) } else { turned_rad }
+    }
+
+    /// Constants that cannot be tracked with.
+    pub fn unfit(&self, error: &TrackError) -> Failure {
+        input_fault(&self.constants, error.to_string(), "constants of a sensor")
     }
 
     /// Says so where an option is given that has no effect any more.

@@ -23,10 +23,6 @@ use times::FrameTimes;
 
 pub use arguments::TrackArguments;
 
-fn unfit(arguments: &TrackArguments, error: &domecast_runtime::track::TrackError) -> Failure {
-    input_fault(&arguments.constants, error.to_string(), "constants of a sensor")
-}
-
 /// What cures pictures that lie otherwise than the constants say.
 fn turned_hint(turn: CameraTurn) -> String {
     let deg = (turn.turned_rad.to_degrees() * 10.0).round() / 10.0;
@@ -71,7 +67,7 @@ fn forces_of(
     constants: &Constants,
 ) -> Result<Option<ForceDistribution>, Failure> {
     let forces = arguments.traction.then(|| ForceDistribution::new(constants, None));
-    forces.transpose().map_err(|e| unfit(arguments, &e))
+    forces.transpose().map_err(|e| arguments.unfit(&e))
 }
 
 fn frame_of(picture: &Result<decode::Picture, String>) -> Result<CameraFrame<'_>, String> {
@@ -84,7 +80,7 @@ fn frame_of(picture: &Result<decode::Picture, String>) -> Result<CameraFrame<'_>
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     arguments.note_what_is_gone(output);
     let constants = read_constants(&arguments.constants)?;
-    let mut tracker = Tracker::new(&constants, arguments.options()).map_err(|e| unfit(arguments, &e))?;
+    let mut tracker = Tracker::new(&constants, arguments.options()).map_err(|e| arguments.unfit(&e))?;
     let mut forces = forces_of(arguments, &constants)?;
     let inputs = inputs_of(arguments);
     let rules = output.rules(&inputs);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use super::arguments::TrackArguments;
-use super::{decode, unfit};
+use super::decode;
 use crate::commands::output::{Failure, Output};
 use domecast_files::{OutputRules, StagedFolder};
 use domecast_optics::SensorOptics;
@@ -35,7 +35,7 @@ impl Pictures {
         let folder = |path: &PathBuf| StagedFolder::new(path, "track", rules);
         let undistorted = match &arguments.undistorted {
             Some(path) => {
-                Some((folder(path)?, Undistorted::new(constants).map_err(|e| unfit(arguments, &e))?))
+                Some((folder(path)?, Undistorted::new(constants).map_err(|e| arguments.unfit(&e))?))
             }
             None => None,
         };

@@ -9,7 +9,7 @@ use super::arguments::{Format, TrackArguments};
 use super::pictures::Pictures;
 use super::shape::ShapeFiles;
 use crate::commands::output::{Failure, Output};
-use crate::track_report::TrackReport;
+use crate::track_report::{TrackReport, page};
 use domecast_files::{OutputRules, StagedFile};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{
@@ -154,7 +154,7 @@ impl Results {
             shape.end(output)?;
         }
         if let Some((mut file, report)) = self.page {
-            file.write(&report.to_html())?;
+            file.write(page(&report).as_str().as_bytes())?;
             output.kept(file.commit()?);
         }
         Ok(())

@@ -39,14 +39,17 @@ mod error;
 mod estimator;
 mod fill;
 mod fourier;
+mod grid;
 mod lattice;
 mod levels;
 mod light;
+mod look;
 mod map;
 mod marks;
 mod normals;
 mod npy;
 mod outline;
+mod reading;
 mod rest;
 mod system;
 

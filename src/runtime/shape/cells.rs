@@ -17,13 +17,15 @@ pub(super) struct Cells {
     pub width: usize,
     pub height: usize,
     /// Unit direction in the camera's frame that each looks along; NaN beyond the lens's field.
-    rays: Vec<DVec3>,
+    pub(super) rays: Vec<DVec3>,
 }
 
 /// What the cells look at: the undeformed dome at a pose of the platform, sensor frame.
 #[derive(Debug, Clone, Default)]
 pub(super) struct View {
-    pose: Option<Rigid>,
+    pub(super) pose: Option<Rigid>,
+    /// Every fourth cell's point on the dome and ray, where it has one.
+    pub(super) nodes: Vec<Option<[Vec3A; 2]>>,
     /// The dome, mm.
     pub surface_mm: Vec<Vec3A>,
     /// Unit direction in the silicone, away from the camera.
@@ -70,36 +72,5 @@ impl Cells {
 
     pub fn count(&self) -> usize {
         self.width * self.height
-    }
-
-    /// Follows every cell's ray to the dome, unless the platform is where it was.
-    /// Whether anything is new.
-    pub fn look(&self, optics: &SensorOptics, pose: &Rigid, view: &mut View) -> bool {
-        if view.pose.as_ref() == Some(pose) {
-            return false;
-        }
-        view.pose = Some(*pose);
-        let count = self.count();
-        for list in [&mut view.surface_mm, &mut view.ray, &mut view.normal, &mut view.place] {
-            list.resize(count, Vec3A::Z);
-        }
-        view.is_dome.resize(count, false);
-        let dome = *optics.dome();
-        let (center_mm, per_mm) = (dome.center_mm(), 1.0 / dome.radius_mm());
-        for (i, ray) in self.rays.iter().enumerate() {
-            let met = if ray.x.is_finite() { optics.follow_continued(*ray).ok() } else { None };
-            view.is_dome[i] = met.is_some_and(|(point, _)| point.z > 0.0);
-            let Some((point, inside)) = met.filter(|(point, _)| point.z > 0.0) else { continue };
-            view.surface_mm[i] = point.as_vec3a();
-            view.ray[i] = inside.as_vec3a();
-            view.normal[i] = dome.normal(point).as_vec3a();
-            view.place[i] = ((point - center_mm) * per_mm).as_vec3a();
-        }
-        view.spans.clear();
-        view.spans.extend(view.is_dome.chunks(self.width).map(|row| {
-            let first = row.iter().position(|is_dome| *is_dome).unwrap_or(0);
-            first..row.iter().rposition(|is_dome| *is_dome).map_or(first, |last| last + 1)
-        }));
-        true
     }
 }

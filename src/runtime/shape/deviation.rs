@@ -1,6 +1,7 @@
 //! How far a height may be off.
 
 use super::cells::{Cells, View};
+use super::reading::CellReading;
 
 /// Cells along the side of a block over which errors of colour go together: a block of a camera's JPEG, 8 px.
 const BLOCK: usize = 4;
@@ -24,23 +25,21 @@ pub(super) struct Deviations {
     /// Mean variance of the slopes in each block, rad^2, and size of a cell, mm.
     blocks: Vec<(f32, f32)>,
     columns: usize,
+    /// Sums of each block: variances, sizes, and how many of these and of those there are.
+    sums: Vec<(f32, f32, f32, f32)>,
     /// Cells without readings on the way from the rim, where the skin is bonded: on the shortest in these.
     away: Vec<f32>,
 }
 
 impl Deviations {
-    /// Takes a frame's variances of the tilt, rad^2, and which cells have readings.
-    pub fn measure(
-        &mut self,
-        cells: &Cells,
-        view: &View,
-        spread: &[[f32; 2]],
-        is_read: impl Fn(usize) -> bool,
-    ) {
+    /// Takes a frame's readings.
+    pub fn measure(&mut self, cells: &Cells, view: &View, readings: &[CellReading]) {
+        let is_read = |cell: usize| readings[cell].is_read;
         let w = cells.width;
         self.columns = w.div_ceil(BLOCK);
-        let mut sums =
-            vec![(0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32); self.columns * cells.height.div_ceil(BLOCK)];
+        let sums = &mut self.sums;
+        sums.clear();
+        sums.resize(self.columns * cells.height.div_ceil(BLOCK), (0.0, 0.0, 0.0, 0.0));
         self.away.clear();
         self.away.resize(cells.count(), f32::INFINITY);
         for (row, span) in view.spans.iter().enumerate() {
@@ -50,7 +49,7 @@ impl Deviations {
                 }
                 let sum = &mut sums[row / BLOCK * self.columns + (cell - row * w) / BLOCK];
                 if is_read(cell) {
-                    sum.0 += 0.5 * (spread[cell][0] + spread[cell][1]);
+                    sum.0 += 0.5 * (readings[cell].spread[0] + readings[cell].spread[1]);
                     sum.3 += 1.0;
                 }
                 if view.is_dome.get(cell + 1).copied().unwrap_or(false) {
@@ -59,12 +58,12 @@ impl Deviations {
                 }
             }
         }
-        let mean = |(variance, size, count, read): (f32, f32, f32, f32)| {
+        let mean = |&(variance, size, count, read): &(f32, f32, f32, f32)| {
             let variance = if read > 0.0 { variance / read } else { FILLED_SLOPE * FILLED_SLOPE };
             (variance, size / count.max(1.0))
         };
         self.blocks.clear();
-        self.blocks.extend(sums.into_iter().map(mean));
+        self.blocks.extend(self.sums.iter().map(mean));
         let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
         for cell in (0..cells.count()).filter(|cell| view.is_dome[*cell]) {
             let around = [cell + 1, cell + w, cell.wrapping_sub(1), cell.wrapping_sub(w)];

@@ -1,6 +1,7 @@
 //! The stages in their order, frame by frame.
 
 use glam::Vec3A;
+use rayon::prelude::*;
 
 use super::cells::{CELL_PX, Cells, View};
 use super::deviation::Deviations;
@@ -12,8 +13,9 @@ use super::light::ShapeLight;
 use super::map::ShapeMap;
 use super::marks::Marks;
 use super::normals;
+use super::reading::CellReading;
 use super::rest::RestMap;
-use super::system::{SolveStatus, System};
+use super::system::{END_MM, SolveStatus, System};
 use crate::constants::Constants;
 use crate::track::{CameraFrame, Tracked, Tracker};
 use domecast_optics::SensorOptics;
@@ -23,27 +25,18 @@ use domecast_optics::numeric::Rigid;
 const TURN_STEP_MM: f32 = 0.2;
 const TURN_PRECISION: f32 = 1e4;
 
-/// Tilt of a normal that was filled in from around, rad.
-const FILLED_SD_RAD: f32 = 0.09;
-
-/// Variance of a reading's tilt, rad^2, from which on there is no light to read by: the skin is taken to be as
-/// at rest there.
-const MAX_SPREAD: f32 = 0.03;
-
 /// How often normals are read and integrated again, and the largest motion, mm, after which once more changes nothing.
 const MAX_PASSES: usize = 3;
 const STILL_MM: f64 = 0.03;
 
-/// By how much a level may be off beside noise, of itself and of the brightest channel beside it: the constants' light, a part
-/// of a hundred, and what a camera's JPEG makes of colours.
-const LEVEL_ERROR: f32 = 0.005;
+/// Change of the way between two cells from which on their normal is read again, mm: some hundredths of a radian.
+const STILL_STEP_MM: f64 = 0.005;
+
+/// How closely the passes before the last are solved, mm.
+const PASS_END_MM: f64 = 3e-3;
 
 /// Most by which the skin moves, part of its height over the sheet: it is bonded at the rim.
 const MAX_STRAIN: f32 = 0.5;
-
-/// Squares of what is left over, in deviations, up to which a reading counts in full, and from which on not at all.
-const GOOD_MISFIT: f32 = 6.0;
-const BAD_MISFIT: f32 = 30.0;
 
 /// Settings of a [`ShapeFromColor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,10 +54,10 @@ impl Default for ShapeOptions {
 /// Reads the shape of the skin from the colours of frames.
 #[derive(Debug, Clone)]
 pub struct ShapeFromColor {
-    options: ShapeOptions,
-    light: ShapeLight,
+    pub(super) options: ShapeOptions,
+    pub(super) light: ShapeLight,
     marks: Marks,
-    cells: Cells,
+    pub(super) cells: Cells,
     rest_optics: SensorOptics,
     optics: SensorOptics,
     /// Constants without white markers are those of a rigid mount.
@@ -72,23 +65,23 @@ pub struct ShapeFromColor {
     rest: Option<RestMap>,
     /// As it stood in the frame at rest.
     rest_seen: SensorOptics,
-    view: View,
-    levels: Vec<Level>,
-    covered: Vec<bool>,
-    gain: Vec<Vec3A>,
+    pub(super) view: View,
+    pub(super) levels: Vec<Level>,
+    pub(super) covered: Vec<bool>,
+    pub(super) gain: Vec<Vec3A>,
     /// By how much a reading's normal turns where the point lies 1 mm further along its ray, for the same colours.
     turn_per_mm: Vec<Vec3A>,
-    /// Tilt of the normals away from the undeformed dome's, and its weight.
+    readings: Vec<CellReading>,
+    /// How far each cell had moved when it was read, mm, and whether it is to be read again.
+    read_mm: Vec<f64>,
+    is_stale: Vec<bool>,
+    /// The readings' tilts, filled in.
     tilt: Vec<Weighted>,
-    /// Variance of the tilt across and down, rad^2.
-    spread: Vec<[f32; 2]>,
-    /// Whether the cell's colours say a normal.
-    is_read: Vec<bool>,
     deviations: Deviations,
     pyramid: Pyramid,
     system: System,
     /// How far each cell's point has moved along its ray, mm.
-    moved_mm: Vec<f64>,
+    pub(super) moved_mm: Vec<f64>,
     last_mm: Vec<f64>,
     map: ShapeMap,
 }
@@ -123,8 +116,9 @@ impl ShapeFromColor {
             gain: Vec::new(),
             turn_per_mm: vec![Vec3A::ZERO; count],
             tilt: vec![(Vec3A::ZERO, 0.0); count],
-            spread: vec![[0.0; 2]; count],
-            is_read: vec![false; count],
+            readings: vec![CellReading::default(); count],
+            read_mm: vec![0.0; count],
+            is_stale: vec![true; count],
             deviations: Deviations::default(),
             pyramid: Pyramid::default(),
             system: System::new(cells.width, cells.height),
@@ -170,7 +164,6 @@ impl ShapeFromColor {
         let Some(pose) = tracked.pose.or_else(|| self.is_rigid.then(Rigid::identity)) else {
             return Ok(false);
         };
-        self.optics = self.rest_optics.clone();
         if self.optics.move_to(&pose).is_err() {
             return Ok(false);
         }
@@ -201,8 +194,11 @@ impl ShapeFromColor {
         }
         rest.at_pose(&self.cells, &self.view, &self.rest_seen, self.is_rigid, &mut self.gain);
         let mut status = SolveStatus::default();
-        for _ in 0..MAX_PASSES {
+        for pass in 0..MAX_PASSES {
+            self.choose(pass == 0);
             self.read_normals();
+            self.tilt.clear();
+            self.tilt.extend(self.readings.iter().map(|reading| reading.tilt));
             self.pyramid.fill(self.cells.width, &mut self.tilt);
             self.last_mm.clone_from(&self.moved_mm);
             status = self.integrate();
@@ -211,8 +207,9 @@ impl ShapeFromColor {
                 break;
             }
         }
-        let (width, is_read) = (self.cells.width, &self.is_read);
-        self.deviations.measure(&self.cells, &self.view, &self.spread, |cell| is_read[cell]);
+        status = self.system.go_on(&mut self.moved_mm, status, END_MM);
+        let width = self.cells.width;
+        self.deviations.measure(&self.cells, &self.view, &self.readings);
         let sd_mm = |cell: usize, height_mm: f32| self.deviations.of(cell, width, height_mm);
         self.map.draw(&self.cells, &self.view, &self.moved_mm, sd_mm, self.optics.dome(), status);
         Ok(&self.map)
@@ -237,71 +234,36 @@ impl ShapeFromColor {
         }
     }
 
-    /// Reads every cell's normal, one step from that of the skin as it is known.
-    fn read_normals(&mut self) {
-        let pixels = (CELL_PX * CELL_PX) as f32;
-        let noise = self.options.noise_levels as f32 / 255.0;
-        let variance = noise * noise / pixels;
+    /// Chooses the cells that are to be read: all, or those whose skin has moved or turned since.
+    fn choose(&mut self, is_first: bool) {
         let width = self.cells.width;
-        let view = &self.view;
-        let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
-        let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * self.moved_mm[cell] as f32;
-        for (row, span) in view.spans.iter().enumerate() {
+        for (row, span) in self.view.spans.iter().enumerate() {
             for cell in row * width + span.start..row * width + span.end {
-                self.tilt[cell] = (Vec3A::ZERO, 0.0);
-                self.is_read[cell] = false;
-                self.spread[cell] = [FILLED_SD_RAD * FILLED_SD_RAD; 2];
-                if !is_dome(cell) || self.covered[cell] {
-                    continue;
-                }
-                let at = point(cell);
-                let between = |before: usize, after: usize| match (is_dome(before), is_dome(after)) {
-                    (true, true) => Some(point(after) - point(before)),
-                    (false, true) => Some(point(after) - at),
-                    (true, false) => Some(at - point(before)),
-                    (false, false) => None,
-                };
-                let right = between(cell.wrapping_sub(1), cell + 1);
-                let below = between(cell.wrapping_sub(width), cell + width);
-                let (Some(right), Some(below)) = (right, below) else { continue };
-                let level = &self.levels[cell];
-                let gain = self.light.passed(view.ray[cell].z) * self.gain[cell];
-                let irradiance =
-                    (level.light - Vec3A::splat(self.light.stray)) / gain.max(Vec3A::splat(1e-12));
-                // Where noise would be cut off at black its mean is not the light.
-                let expected = gain * self.light.still(view.place[cell]);
-                let is_lit =
-                    Vec3A::select(expected.cmpgt(Vec3A::splat(2.0 * noise)), Vec3A::ONE, Vec3A::ZERO);
-                let off = (level.light + Vec3A::splat(level.light.max_element())) * LEVEL_ERROR;
-                let precision = gain * gain * level.is_known * is_lit / (off * off + variance);
-                let light = self.light.at(at);
-                let (out, ray) = (view.normal[cell], view.ray[cell]);
-                let guess = right.cross(below).normalize_or(out);
-                let guess = if guess.dot(ray) < 0.0 { -guess } else { guess };
-                let Some(reading) = normals::read(&light, irradiance, precision, guess, right) else {
-                    self.tilt[cell].1 = 1.0;
-                    continue;
-                };
-                let [xx, xy, yy] = reading.covariance;
-                if reading.misfit > BAD_MISFIT {
-                    continue;
-                }
-                if 0.5 * (xx + yy) > MAX_SPREAD {
-                    self.tilt[cell].1 = 1.0;
-                    continue;
-                }
-                let good = (GOOD_MISFIT / reading.misfit.max(GOOD_MISFIT)).min(1.0);
-                let [t1, t2] = normals::tangents(guess, right);
-                let turn = glam::Vec2::new(below.dot(t1), below.dot(t2)).normalize_or_zero();
-                let along = turn.x * turn.x * xx + 2.0 * turn.x * turn.y * xy + turn.y * turn.y * yy;
-                // What the reading and its surroundings say together.
-                let filled = FILLED_SD_RAD * FILLED_SD_RAD;
-                self.spread[cell] = [xx, along].map(|v| v * filled / (v + good * filled));
-                let weight = good * filled / (good * filled + 0.5 * (xx + yy));
-                self.tilt[cell] = (reading.normal - out, weight);
-                self.is_read[cell] = true;
+                let since = |i: usize| self.moved_mm[i] - self.read_mm[i];
+                let own = since(cell);
+                let is_turned =
+                    |next: usize| next < self.read_mm.len() && (since(next) - own).abs() > STILL_STEP_MM;
+                let has_moved = own.abs() > STILL_MM;
+                self.is_stale[cell] = is_first || has_moved || is_turned(cell + 1) || is_turned(cell + width);
             }
         }
+        let cells = self.read_mm.iter_mut().zip(&self.moved_mm).zip(&self.is_stale);
+        cells.filter(|(_, is_stale)| **is_stale).for_each(|((read_mm, moved_mm), _)| *read_mm = *moved_mm);
+    }
+
+    /// Reads the normals of the chosen cells.
+    fn read_normals(&mut self) {
+        let mut readings = std::mem::take(&mut self.readings);
+        let width = self.cells.width;
+        let rows = readings.par_chunks_mut(width).zip(&self.view.spans).enumerate();
+        rows.for_each(|(row, (line, span))| {
+            for column in span.clone() {
+                if self.is_stale[row * width + column] {
+                    line[column] = self.read_cell(row * width + column);
+                }
+            }
+        });
+        self.readings = readings;
     }
 
     /// Finds the skin that is perpendicular to the normals.
@@ -331,14 +293,17 @@ impl ShapeFromColor {
                     let between = at_rest + view.ray[next] * next_mm - ray * moved_mm;
                     let turns = [cell, next].map(|i| 0.5 * self.turn_per_mm[i].dot(between));
                     let side = usize::from(!is_right);
-                    let variance = 0.5 * (self.spread[cell][side] + self.spread[next][side]);
+                    let variance =
+                        0.5 * (self.readings[cell].spread[side] + self.readings[next].spread[side]);
                     let weight = 1.0 / (at_rest.length_squared() * variance).max(1e-12);
                     let along = [normal.dot(ray) - turns[0], normal.dot(view.ray[next]) + turns[1]];
-                    let offset = normal.dot(at_rest) - turns[0] * moved_mm - turns[1] * next_mm;
+                    // The normals are those of where they were read.
+                    let [read_mm, next_read_mm] = [cell, next].map(|i| self.read_mm[i] as f32);
+                    let offset = normal.dot(at_rest) - turns[0] * read_mm - turns[1] * next_read_mm;
                     self.system.join(cell, is_right, weight, along, offset);
                 }
             }
         }
-        self.system.solve(&mut self.moved_mm)
+        self.system.solve(&mut self.moved_mm, PASS_END_MM)
     }
 }

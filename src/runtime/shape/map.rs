@@ -1,6 +1,7 @@
 //! The shape on the raw image's grid.
 
 use glam::{Vec3, Vec3A};
+use rayon::prelude::*;
 
 use super::cells::{CELL_PX, Cells, View};
 use super::contact::{Chart, SkinContact};
@@ -184,38 +185,62 @@ impl ShapeMap {
 
     /// Linear between the cells; a pixel whose own cell sees no dome has nothing.
     fn spread(&mut self, cells: &Cells, view: &View) {
-        for y in 0..cells.height * CELL_PX {
+        let width = self.width;
+        let Self { cell_mm, cell_normal, cell_pressure, cell_sd_mm, .. } = self;
+        let at = Drawn { width: cells.width, cell_mm, cell_normal, cell_pressure, cell_sd_mm };
+        let heights = self.height_mm.par_chunks_mut(width).zip(self.height_sd_mm.par_chunks_mut(width));
+        let others = self.normal.par_chunks_mut(width).zip(self.is_touched.par_chunks_mut(width));
+        heights.zip(others).enumerate().for_each(|(y, ((heights, sds), (normals, touched)))| {
             let Some(span) = view.spans.get(y / CELL_PX) else { return };
             for x in span.start * CELL_PX..span.end * CELL_PX {
                 let own = y / CELL_PX * cells.width + x / CELL_PX;
-                if self.cell_mm[own].is_nan() {
+                if at.cell_mm[own].is_nan() {
                     continue;
                 }
-                let place = |v: usize, n: usize| {
-                    let at = (v as f32 - 0.5 * (CELL_PX as f32 - 1.0)) / CELL_PX as f32;
-                    let first = (at.floor().max(0.0) as usize).min(n.saturating_sub(2));
-                    (first, at - first as f32)
-                };
                 let ((i, px), (j, py)) = (place(x, cells.width), place(y, cells.height));
-                let corner = |i: usize, j: usize| {
-                    let cell = j * cells.width + i;
-                    if self.cell_mm[cell].is_nan() { own } else { cell }
-                };
-                let corners = [corner(i, j), corner(i + 1, j), corner(i, j + 1), corner(i + 1, j + 1)];
-                let parts = [(1.0 - px) * (1.0 - py), px * (1.0 - py), (1.0 - px) * py, px * py];
-                let (mut height, mut normal, mut sd, mut pressure) = (0.0, Vec3A::ZERO, 0.0, 0.0);
-                for (cell, part) in corners.into_iter().zip(parts) {
-                    sd += self.cell_sd_mm[cell] * part;
-                    pressure += self.cell_pressure[cell] * part;
-                    height += self.cell_mm[cell] * part;
-                    normal += self.cell_normal[cell] * part;
-                }
-                let pixel = y * self.width + x;
-                self.height_mm[pixel] = height;
-                self.height_sd_mm[pixel] = sd;
-                self.is_touched[pixel] = pressure > 1.0;
-                self.normal[pixel] = normal.normalize_or_zero().into();
+                let (height_mm, sd_mm, normal, pressure) = at.between(own, (i, px), (j, py));
+                (heights[x], sds[x]) = (height_mm, sd_mm);
+                (normals[x], touched[x]) = (normal.normalize_or_zero().into(), pressure > 1.0);
             }
+        });
+    }
+}
+
+/// The first of the two cells about a pixel, and how far it lies from that.
+#[inline]
+fn place(v: usize, n: usize) -> (usize, f32) {
+    let at = (v as f32 - 0.5 * (CELL_PX as f32 - 1.0)) / CELL_PX as f32;
+    // A cast cuts off towards 0, as a floor does of what is not negative.
+    let first = (at.max(0.0) as usize).min(n.saturating_sub(2));
+    (first, at - first as f32)
+}
+
+/// The cells' values.
+struct Drawn<'a> {
+    width: usize,
+    cell_mm: &'a [f32],
+    cell_normal: &'a [Vec3A],
+    cell_pressure: &'a [f32],
+    cell_sd_mm: &'a [f32],
+}
+
+impl Drawn<'_> {
+    /// Height, its deviation, normal and pressure between four cells; one beside the dome counts as `own`.
+    #[inline]
+    fn between(&self, own: usize, (i, px): (usize, f32), (j, py): (usize, f32)) -> (f32, f32, Vec3A, f32) {
+        let corner = |i: usize, j: usize| {
+            let cell = j * self.width + i;
+            if self.cell_mm[cell].is_nan() { own } else { cell }
+        };
+        let corners = [corner(i, j), corner(i + 1, j), corner(i, j + 1), corner(i + 1, j + 1)];
+        let parts = [(1.0 - px) * (1.0 - py), px * (1.0 - py), (1.0 - px) * py, px * py];
+        let (mut height, mut normal, mut sd, mut pressure) = (0.0, Vec3A::ZERO, 0.0, 0.0);
+        for (cell, part) in corners.into_iter().zip(parts) {
+            sd += self.cell_sd_mm[cell] * part;
+            pressure += self.cell_pressure[cell] * part;
+            height += self.cell_mm[cell] * part;
+            normal += self.cell_normal[cell] * part;
         }
+        (height, sd, normal, pressure)
     }
 }

@@ -39,13 +39,16 @@ mod error;
 mod estimator;
 mod fill;
 mod fourier;
+mod grid;
 mod lattice;
 mod levels;
 mod light;
+mod look;
 mod map;
 mod marks;
 mod normals;
 mod outline;
+mod reading;
 mod rest;
 mod system;
 

@@ -7,31 +7,19 @@
 
 use std::ops::Range;
 
+use super::grid::{Grid, precondition};
+
 /// Bound on the rounds.
 pub(super) const MAX_ROUNDS: usize = 60;
 
 /// Largest motion of a cell in the last round, mm. A residual says little here: what is smooth over the dome hardly shows in it.
-const END_MM: f64 = 1e-4;
+pub(super) const END_MM: f64 = 1e-4;
 
 /// The coarsest grid has no more cells.
 const COARSEST: usize = 64;
 
 /// Coupling of a coarser grid against the sum of the finer's.
 const COARSE_COUPLING: f32 = 0.5;
-
-/// One grid: what each cell weighs, and its coupling with the next to the right and below.
-#[derive(Debug, Clone, Default)]
-struct Grid {
-    width: usize,
-    own: Vec<f32>,
-    right: Vec<f32>,
-    below: Vec<f32>,
-    wanted: Vec<f32>,
-    found: Vec<f32>,
-    left: Vec<f32>,
-    /// The columns of each row that have equations.
-    spans: Vec<Range<usize>>,
-}
 
 /// How a solve ended.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -53,6 +41,9 @@ pub(super) struct System {
     residual: Vec<f64>,
     direction: Vec<f64>,
     product: Vec<f64>,
+    /// Size of the right side, and the last round's product of residual and step.
+    size: f64,
+    along: f64,
 }
 
 impl System {
@@ -64,6 +55,7 @@ impl System {
             grids.push(Grid {
                 width: w,
                 own: zeros.clone(),
+                per_own: zeros.clone(),
                 right: zeros.clone(),
                 below: zeros.clone(),
                 wanted: zeros.clone(),
@@ -77,23 +69,30 @@ impl System {
             (w, h) = (w.div_ceil(2), h.div_ceil(2));
         }
         let zeros = vec![0.0; width * height];
-        Self { grids, residual: zeros.clone(), direction: zeros.clone(), product: zeros }
+        Self {
+            grids,
+            residual: zeros.clone(),
+            direction: zeros.clone(),
+            product: zeros,
+            size: 0.0,
+            along: 0.0,
+        }
     }
 
     /// Empties the equations; those that come lie within these columns of each row.
     pub fn clear(&mut self, spans: &[Range<usize>]) {
-        let mut finer = spans.to_vec();
-        for grid in &mut self.grids {
+        for (k, grid) in self.grids.iter_mut().enumerate() {
             for list in [&mut grid.own, &mut grid.right, &mut grid.below] {
                 list.fill(0.0);
             }
-            let coarser = finer.chunks(2).map(|pair| {
-                let filled = || pair.iter().filter(|span| !span.is_empty());
-                let start = filled().map(|span| span.start).min().unwrap_or(0) / 2;
-                start..filled().map(|span| span.end).max().unwrap_or(0).div_ceil(2).max(start)
-            });
-            let coarser = coarser.collect();
-            grid.spans = std::mem::replace(&mut finer, coarser);
+            // Rows of the grid hold 2^k of the finest's.
+            let widest = |rows: &[Range<usize>]| {
+                let filled = || rows.iter().filter(|span| !span.is_empty());
+                let start = filled().map(|span| span.start).min().unwrap_or(0) >> k;
+                start..filled().map(|span| span.end).max().unwrap_or(0).div_ceil(1 << k).max(start)
+            };
+            grid.spans.clear();
+            grid.spans.extend(spans.chunks(1 << k).map(widest));
         }
         self.residual.fill(0.0);
     }
@@ -122,34 +121,50 @@ impl System {
         self.residual[next] -= f64::from(weight * q * offset);
     }
 
-    /// Solves from a first guess in `moved`; cells without equations stay 0.
-    pub fn solve(&mut self, moved: &mut [f64]) -> SolveStatus {
+    /// Solves from a first guess in `moved` until a round moves no cell by more than `end_mm`; cells without equations stay 0.
+    pub fn solve(&mut self, moved: &mut [f64], end_mm: f64) -> SolveStatus {
         self.coarsen();
-        let Self { grids, residual, direction, product } = self;
-        let size = dot(residual, residual).sqrt();
-        if !(size > 0.0 && size.is_finite()) {
+        let Self { grids, residual, direction, product, size, .. } = self;
+        *size = dot(residual, residual).sqrt();
+        if !(*size > 0.0 && size.is_finite()) {
             moved.fill(0.0);
-            return SolveStatus { is_converged: size == 0.0, ..SolveStatus::default() };
+            return SolveStatus { is_converged: *size == 0.0, ..SolveStatus::default() };
         }
         let Some(fine) = grids.first() else { return SolveStatus::default() };
         fine.times(moved, product);
         for (r, p) in residual.iter_mut().zip(&*product) {
             *r -= p;
         }
-        let mut status = SolveStatus::default();
         direction.fill(0.0);
-        let mut before = f64::INFINITY;
+        self.along = f64::INFINITY;
+        self.go_on(moved, SolveStatus::default(), end_mm)
+    }
+
+    /// Goes on where [`System::solve`] ended, to a closer end.
+    pub fn go_on(&mut self, moved: &mut [f64], so_far: SolveStatus, end_mm: f64) -> SolveStatus {
+        let Self { grids, residual, direction, product, size, along: before, .. } = self;
+        let mut status = so_far;
+        if !(*size > 0.0 && size.is_finite()) {
+            return status;
+        }
+        status.is_converged = status.rounds > 0 && status.last_step_mm <= end_mm;
         while !status.is_converged && status.rounds < MAX_ROUNDS {
             precondition(grids, residual);
             let Some(fine) = grids.first() else { break };
-            let along: f64 = fine.cells().map(|i| residual[i] * f64::from(fine.found[i])).sum();
-            let keep = along / before;
-            let mut longest = 0.0_f64;
-            for i in fine.cells() {
-                direction[i] = f64::from(fine.found[i]) + keep * direction[i];
-                longest = longest.max(direction[i].abs());
+            let mut along = 0.0;
+            for line in fine.lines() {
+                along += dot_of(&residual[line.clone()], &fine.found[line]);
             }
-            before = along;
+            let keep = along / *before;
+            let mut longest = 0.0_f64;
+            for line in fine.lines() {
+                for (direction, found) in direction[line.clone()].iter_mut().zip(&fine.found[line]) {
+                    *direction = f64::from(*found) + keep * *direction;
+                    let length = direction.abs();
+                    longest = if length > longest { length } else { longest };
+                }
+            }
+            *before = along;
             let curvature = fine.times(direction, product);
             if !(along > 0.0 && curvature > 0.0) {
                 // Nothing is left, or rounding is all that is.
@@ -157,19 +172,30 @@ impl System {
                 break;
             }
             let step = along / curvature;
-            for i in fine.cells() {
-                moved[i] += step * direction[i];
-                residual[i] -= step * product[i];
+            for line in fine.lines() {
+                let along = moved[line.clone()].iter_mut().zip(&direction[line.clone()]);
+                along.for_each(|(moved, direction)| *moved += step * direction);
+                let left = residual[line.clone()].iter_mut().zip(&product[line]);
+                left.for_each(|(residual, product)| *residual -= step * product);
             }
             status.rounds += 1;
             status.last_step_mm = step * longest;
-            status.is_converged = status.last_step_mm <= END_MM;
+            status.is_converged = status.last_step_mm <= end_mm;
         }
-        status.residual = dot(residual, residual).sqrt() / size;
+        status.residual = dot(residual, residual).sqrt() / *size;
         status
     }
 
     fn coarsen(&mut self) {
+        self.add_up();
+        for grid in &mut self.grids {
+            for (per_own, own) in grid.per_own.iter_mut().zip(&grid.own) {
+                *per_own = if *own > 0.0 { 1.0 / own } else { 0.0 };
+            }
+        }
+    }
+
+    fn add_up(&mut self) {
         for k in 1..self.grids.len() {
             let (finer, coarser) = self.grids.split_at_mut(k);
             let (Some(fine), Some(coarse)) = (finer.last(), coarser.first_mut()) else { return };
@@ -196,154 +222,12 @@ impl System {
     }
 }
 
-impl Grid {
-    /// The cells that may have equations, row by row.
-    fn cells(&self) -> impl Iterator<Item = usize> + '_ {
-        let rows = self.spans.iter().enumerate();
-        rows.flat_map(|(row, span)| row * self.width + span.start..row * self.width + span.end)
-    }
-
-    /// The matrix times a vector, and the product of both.
-    fn times(&self, vector: &[f64], out: &mut [f64]) -> f64 {
-        let (w, n) = (self.width, self.own.len());
-        let mut sum = 0.0;
-        for (row, span) in self.spans.iter().enumerate() {
-            for i in row * w + span.start..row * w + span.end {
-                let mut value = f64::from(self.own[i]) * vector[i];
-                if i + 1 < n {
-                    value += f64::from(self.right[i]) * vector[i + 1];
-                }
-                if i > 0 {
-                    value += f64::from(self.right[i - 1]) * vector[i - 1];
-                }
-                if i + w < n {
-                    value += f64::from(self.below[i]) * vector[i + w];
-                }
-                if i >= w {
-                    value += f64::from(self.below[i - w]) * vector[i - w];
-                }
-                out[i] = value;
-                sum += value * vector[i];
-            }
-        }
-        sum
-    }
-
-    /// What the rows above and below take of a row's right side is put into `left`.
-    fn lay_out(&mut self, row: usize) {
-        let (w, n) = (self.width, self.own.len());
-        let start = row * w;
-        let (Some(line), Some(wanted)) =
-            (self.left.get_mut(start..start + w), self.wanted.get(start..start + w))
-        else {
-            return;
-        };
-        line.copy_from_slice(wanted);
-        if row > 0 {
-            let (part, found) = (&self.below[start - w..start], &self.found[start - w..start]);
-            for ((line, part), found) in line.iter_mut().zip(part).zip(found) {
-                *line -= part * found;
-            }
-        }
-        if start + w < n {
-            let (part, found) = (&self.below[start..start + w], &self.found[start + w..start + 2 * w]);
-            for ((line, part), found) in line.iter_mut().zip(part).zip(found) {
-                *line -= part * found;
-            }
-        }
-    }
-
-    /// A pass of Gauss and Seidel, forwards or backwards.
-    fn relax(&mut self, is_forward: bool) {
-        let (w, rows) = (self.width, self.spans.len());
-        for k in 0..rows {
-            let row = if is_forward { k } else { rows - 1 - k };
-            let Range { start, end } = self.spans[row];
-            if start == end {
-                continue;
-            }
-            self.lay_out(row);
-            let all = row * w..(row + 1) * w;
-            let (own, right, left) =
-                (&self.own[all.clone()], &self.right[all.clone()], &self.left[all.clone()]);
-            let found = &mut self.found[all];
-            let mut one = |x: usize| {
-                if own[x] > 0.0 {
-                    let before = if x > 0 { right[x - 1] * found[x - 1] } else { 0.0 };
-                    let after = if x + 1 < w { right[x] * found[x + 1] } else { 0.0 };
-                    found[x] = (left[x] - before - after) / own[x];
-                }
-            };
-            if is_forward { (start..end).for_each(&mut one) } else { (start..end).rev().for_each(&mut one) }
-        }
-    }
-
-    /// What the found values leave over.
-    fn leave(&mut self) {
-        let w = self.width;
-        for row in 0..self.spans.len() {
-            let Range { start, end } = self.spans[row];
-            if start == end {
-                continue;
-            }
-            self.lay_out(row);
-            let all = row * w..(row + 1) * w;
-            let (own, right, found) =
-                (&self.own[all.clone()], &self.right[all.clone()], &self.found[all.clone()]);
-            let left = &mut self.left[all];
-            for x in start..end {
-                let before = if x > 0 { right[x - 1] * found[x - 1] } else { 0.0 };
-                let after = if x + 1 < w { right[x] * found[x + 1] } else { 0.0 };
-                left[x] -= own[x] * found[x] + before + after;
-            }
-        }
-    }
+fn dot_of(a: &[f64], b: &[f32]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * f64::from(*b)).sum()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// One V-cycle for the residual, into the finest grid's `found`. Symmetric: what goes down forwards comes up backwards.
-fn precondition(grids: &mut [Grid], residual: &[f64]) {
-    let Some(fine) = grids.first_mut() else { return };
-    for (wanted, r) in fine.wanted.iter_mut().zip(residual) {
-        *wanted = *r as f32;
-    }
-    let last = grids.len() - 1;
-    for k in 0..last {
-        let (finer, coarser) = grids.split_at_mut(k + 1);
-        let (Some(fine), Some(coarse)) = (finer.last_mut(), coarser.first_mut()) else { return };
-        fine.found.fill(0.0);
-        fine.relax(true);
-        fine.leave();
-        coarse.wanted.fill(0.0);
-        for (y, span) in fine.spans.iter().enumerate() {
-            for x in span.clone() {
-                coarse.wanted[y / 2 * coarse.width + x / 2] += fine.left[y * fine.width + x];
-            }
-        }
-    }
-    if let Some(coarsest) = grids.last_mut() {
-        coarsest.found.fill(0.0);
-        for _ in 0..8 {
-            coarsest.relax(true);
-            coarsest.relax(false);
-        }
-    }
-    for k in (0..last).rev() {
-        let (finer, coarser) = grids.split_at_mut(k + 1);
-        let (Some(fine), Some(coarse)) = (finer.last_mut(), coarser.first()) else { return };
-        for (y, span) in fine.spans.iter().enumerate() {
-            for x in span.clone() {
-                let i = y * fine.width + x;
-                if fine.own[i] > 0.0 {
-                    fine.found[i] += coarse.found[y / 2 * coarse.width + x / 2];
-                }
-            }
-        }
-        fine.relax(false);
-    }
 }
 
 #[cfg(test)]
@@ -373,7 +257,7 @@ mod tests {
             }
             // The truth is 0 at (0, 0) alone.
             system.hold(0, 1e4);
-            let status = system.solve(&mut moved);
+            let status = system.solve(&mut moved, END_MM);
             assert!(status.is_converged && status.residual < 1e-2, "{status:?}");
         }
         for y in 0..height {
@@ -389,7 +273,7 @@ mod tests {
         let mut system = System::new(20, 20);
         system.clear(&vec![3..17; 20]);
         let mut moved = vec![1.0; 400];
-        let status = system.solve(&mut moved);
+        let status = system.solve(&mut moved, END_MM);
         assert!(status.is_converged && moved.iter().all(|v| *v == 0.0));
     }
 }

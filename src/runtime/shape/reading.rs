@@ -1,0 +1,106 @@
+//! What the colours of a cell say of the skin there.
+
+use glam::Vec3A;
+
+use super::cells::CELL_PX;
+use super::estimator::ShapeFromColor;
+use super::fill::Weighted;
+use super::normals;
+
+/// Tilt of a normal that was filled in from around, rad.
+const FILLED_SD_RAD: f32 = 0.09;
+
+/// Variance of a reading's tilt, rad^2, from which on there is no light to read by: the skin is taken to be as
+/// at rest there.
+const MAX_SPREAD: f32 = 0.03;
+
+/// By how much a level may be off beside noise, of itself and of the brightest channel beside it: the constants' light, a part
+/// of a hundred, and what a camera's JPEG makes of colours.
+const LEVEL_ERROR: f32 = 0.005;
+
+/// Squares of what is left over, in deviations, up to which a reading counts in full, and from which on not at all.
+const GOOD_MISFIT: f32 = 6.0;
+const BAD_MISFIT: f32 = 30.0;
+
+/// What the colours of a cell say.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CellReading {
+    /// Tilt of the normal away from the undeformed dome's, and its weight.
+    pub tilt: Weighted,
+    /// Variance of the tilt across and down, rad^2.
+    pub spread: [f32; 2],
+    /// Whether the colours say a normal.
+    pub is_read: bool,
+}
+
+impl Default for CellReading {
+    fn default() -> Self {
+        Self { tilt: (Vec3A::ZERO, 0.0), spread: [FILLED_SD_RAD * FILLED_SD_RAD; 2], is_read: false }
+    }
+}
+
+impl ShapeFromColor {
+    /// Reads a cell's normal, one step from that of the skin as it is known.
+    #[inline]
+    pub(super) fn read_cell(&self, cell: usize) -> CellReading {
+        let nothing = CellReading::default();
+        let unlit = CellReading { tilt: (Vec3A::ZERO, 1.0), ..nothing };
+        let (view, width) = (&self.view, self.cells.width);
+        let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
+        if !is_dome(cell) || self.covered[cell] {
+            return nothing;
+        }
+        let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * self.moved_mm[cell] as f32;
+        let at = point(cell);
+        let between = |before: usize, after: usize| match (is_dome(before), is_dome(after)) {
+            (true, true) => Some(point(after) - point(before)),
+            (false, true) => Some(point(after) - at),
+            (true, false) => Some(at - point(before)),
+            (false, false) => None,
+        };
+        let right = between(cell.wrapping_sub(1), cell + 1);
+        let below = between(cell.wrapping_sub(width), cell + width);
+        let (Some(right), Some(below)) = (right, below) else { return nothing };
+        let (out, ray) = (view.normal[cell], view.ray[cell]);
+        let guess = right.cross(below).normalize_or(out);
+        let guess = if guess.dot(ray) < 0.0 { -guess } else { guess };
+        let (irradiance, precision) = self.irradiance(cell);
+        let Some(reading) = normals::read(&self.light.at(at), irradiance, precision, guess, right) else {
+            return unlit;
+        };
+        let [xx, xy, yy] = reading.covariance;
+        if reading.misfit > BAD_MISFIT {
+            return nothing;
+        }
+        if 0.5 * (xx + yy) > MAX_SPREAD {
+            return unlit;
+        }
+        let good = (GOOD_MISFIT / reading.misfit.max(GOOD_MISFIT)).min(1.0);
+        let [t1, t2] = normals::tangents(guess, right);
+        let turn = glam::Vec2::new(below.dot(t1), below.dot(t2)).normalize_or_zero();
+        let along = turn.x * turn.x * xx + 2.0 * turn.x * turn.y * xy + turn.y * turn.y * yy;
+        // What the reading and its surroundings say together.
+        let filled = FILLED_SD_RAD * FILLED_SD_RAD;
+        let weight = good * filled / (good * filled + 0.5 * (xx + yy));
+        CellReading {
+            tilt: (reading.normal - out, weight),
+            spread: [xx, along].map(|v| v * filled / (v + good * filled)),
+            is_read: true,
+        }
+    }
+
+    /// Irradiance of a cell by the picture, and one over its variance, by channel.
+    #[inline]
+    fn irradiance(&self, cell: usize) -> (Vec3A, Vec3A) {
+        let noise = self.options.noise_levels as f32 / 255.0;
+        let variance = noise * noise / (CELL_PX * CELL_PX) as f32;
+        let (view, level) = (&self.view, &self.levels[cell]);
+        let gain = self.light.passed(view.ray[cell].z) * self.gain[cell];
+        let irradiance = (level.light - Vec3A::splat(self.light.stray)) / gain.max(Vec3A::splat(1e-12));
+        // Where noise would be cut off at black its mean is not the light.
+        let expected = gain * self.light.still(view.place[cell]);
+        let is_lit = Vec3A::select(expected.cmpgt(Vec3A::splat(2.0 * noise)), Vec3A::ONE, Vec3A::ZERO);
+        let off = (level.light + Vec3A::splat(level.light.max_element())) * LEVEL_ERROR;
+        (irradiance, gain * gain * level.is_known * is_lit / (off * off + variance))
+    }
+}

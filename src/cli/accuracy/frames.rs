@@ -28,7 +28,7 @@ fn changed(scene: &Scene, factor: f64, frames: u32) -> Result<Scene, SimError> {
 }
 
 /// The scene with few frames over its whole time, and other tolerances.
-fn with_tolerance(scene: &Scene, px: f64, grey: f64, frames: u32) -> Result<Scene, SimError> {
+pub fn with_tolerance(scene: &Scene, px: f64, grey: f64, frames: u32) -> Result<Scene, SimError> {
     let mut file: SceneFile = scene.file().clone();
     let whole = file.frames.count.max(1);
     let count = frames.min(whole);

@@ -5,7 +5,9 @@ use super::clock::TimeLimit;
 use super::result::{Accuracy, AccuracyError, Machine, SettingRecord};
 use super::sweep::Sweep;
 use super::tracking;
-use super::{contact, frames, lens, light, meshes, monte_carlo, outline, placement, pose, supersampling};
+use super::{
+    contact, frames, lens, light, meshes, monte_carlo, outline, placement, pose, shape, supersampling,
+};
 use crate::touch_scene;
 use domecast_design::layout::report::LayoutReport;
 use domecast_design::layout::{Layout, LayoutError, LayoutSpec};
@@ -18,7 +20,7 @@ use domecast_runtime::constants::Constants;
 use domecast_sim::Scene;
 
 /// Steps of [`measure`], for a progress bar.
-pub const STEPS: u32 = 12;
+pub const STEPS: u32 = 13;
 
 /// What the sweeps are made on, and what they gave.
 struct Measurement<'a> {
@@ -68,7 +70,7 @@ pub fn measure(
     on.geometry()?;
     on.loads();
     on.simulator(scene);
-    (on.step)(11, "the error budgets");
+    (on.step)(12, "the error budgets");
     let Measurement { layout, constants, sweeps, left_out, .. } = on;
     let budgets: Vec<ErrorBudget> =
         [budget::of_dots(design, &layout, &judged, &sweeps), budget::of_force(design, &constants, &sweeps)]
@@ -179,7 +181,7 @@ impl Measurement<'_> {
             supersampling::sweep(&self.layout, size, grey, time_limit, quick),
             "edges of dots: the pattern has none",
         );
-        match scene.and_then(|scene| frames::sweep(scene, quick).map_err(|error| error.to_string())) {
+        match scene.clone().and_then(|scene| frames::sweep(scene, quick).map_err(|error| error.to_string())) {
             Ok((sweep, sequence)) => {
                 self.keep(Some(sweep), "");
                 (self.step)(10, "the runtime");
@@ -189,6 +191,15 @@ impl Measurement<'_> {
                 );
             }
             Err(error) => self.keep(None, &format!("frames and the runtime: {error}")),
+        }
+        (self.step)(11, "shape from colour");
+        let shaped = scene.and_then(|scene| {
+            let found = shape::sweep(self.design, &self.constants, scene, time_limit, quick);
+            found.map_err(|error| error.to_string())
+        });
+        match shaped {
+            Ok(sweep) => self.keep(sweep, "shape from colour: scene or constants have no light to read by"),
+            Err(error) => self.keep(None, &format!("shape from colour: {error}")),
         }
     }
 }

@@ -21,6 +21,7 @@ mod page;
 mod placement;
 mod pose;
 mod result;
+mod shape;
 mod supersampling;
 mod sweep;
 mod sweep_chart;

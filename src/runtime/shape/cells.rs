@@ -7,13 +7,11 @@ use glam::{DVec2, DVec3, Vec3A};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 
-/// Pixels along each side of a cell: half of the picture's resolution halves the noise, and colour comes no finer from a
-/// camera whose chroma is halved.
-pub(super) const CELL_PX: usize = 2;
-
 /// Cells of a picture.
 #[derive(Debug, Clone)]
 pub(super) struct Cells {
+    /// Pixels along each side of a cell.
+    pub px: usize,
     pub width: usize,
     pub height: usize,
     /// Unit direction in the camera's frame that each looks along; NaN beyond the lens's field.
@@ -41,26 +39,24 @@ pub(super) struct View {
 }
 
 impl Cells {
-    pub fn new(optics: &SensorOptics) -> Self {
-        let spec = optics.lens().spec();
-        let (width, height) = (spec.width as usize / CELL_PX, spec.height as usize / CELL_PX);
+    pub fn new(optics: &SensorOptics, px: usize) -> Self {
         let lens = optics.lens();
-        let ray = |i: usize| {
-            let at = Self::center_of(i % width, i / width);
-            lens.unproject(at).unwrap_or(DVec3::NAN)
-        };
-        Self { width, height, rays: (0..width * height).map(ray).collect() }
+        let (width, height) = (lens.spec().width as usize / px, lens.spec().height as usize / px);
+        let mut cells = Self { px, width, height, rays: Vec::new() };
+        let ray = |i: usize| lens.unproject(cells.center_of(i % width, i / width)).unwrap_or(DVec3::NAN);
+        cells.rays = (0..width * height).map(ray).collect();
+        cells
     }
 
     /// The pixel in the middle of a cell.
-    pub fn center_of(column: usize, row: usize) -> DVec2 {
-        let at = |i: usize| (i * CELL_PX) as f64 + 0.5 * (CELL_PX as f64 - 1.0);
+    pub fn center_of(&self, column: usize, row: usize) -> DVec2 {
+        let at = |i: usize| (i * self.px) as f64 + 0.5 * (self.px as f64 - 1.0);
         DVec2::new(at(column), at(row))
     }
 
     /// Cell coordinates of a pixel.
-    pub fn of_pixel(pixel: DVec2) -> DVec2 {
-        (pixel - 0.5 * (CELL_PX as f64 - 1.0)) / CELL_PX as f64
+    pub fn of_pixel(&self, pixel: DVec2) -> DVec2 {
+        (pixel - 0.5 * (self.px as f64 - 1.0)) / self.px as f64
     }
 
     /// Cosine of the field angle that a cell looks along; 1 beyond the lens's field.

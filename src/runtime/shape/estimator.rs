@@ -3,7 +3,7 @@
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use super::cells::{CELL_PX, Cells, View};
+use super::cells::{Cells, View};
 use super::deviation::Deviations;
 use super::error::ShapeError;
 use super::fill::{Pyramid, Weighted};
@@ -25,8 +25,7 @@ use domecast_optics::numeric::Rigid;
 const TURN_STEP_MM: f32 = 0.2;
 const TURN_PRECISION: f32 = 1e4;
 
-/// How often normals are read and integrated again, and the largest motion, mm, after which once more changes nothing.
-const MAX_PASSES: usize = 3;
+/// The largest motion, mm, after which a pass more changes nothing.
 const STILL_MM: f64 = 0.03;
 
 /// Change of the way between two cells from which on their normal is read again, mm: some hundredths of a radian.
@@ -43,11 +42,16 @@ const MAX_STRAIN: f32 = 0.5;
 pub struct ShapeOptions {
     /// Standard deviation of a pixel's value, levels of 255.
     pub noise_levels: f64,
+    /// Pixels along each side of a cell that is solved for, 1 to 16: half of the picture's resolution halves the noise, and colour
+    /// comes no finer from a camera whose chroma is halved.
+    pub cell_px: usize,
+    /// How often normals are read, integrated, and read again with the light at the moved skin, 1 to 16.
+    pub max_passes: usize,
 }
 
 impl Default for ShapeOptions {
     fn default() -> Self {
-        Self { noise_levels: 2.0 }
+        Self { noise_levels: 2.0, cell_px: 2, max_passes: 3 }
     }
 }
 
@@ -99,9 +103,14 @@ impl ShapeFromColor {
                 "give one above 0, below 255",
             ));
         }
+        for (name, value) in [("cell_px", options.cell_px), ("max_passes", options.max_passes)] {
+            if !(1..=16).contains(&value) {
+                return Err(ShapeError::new(name, format!("is {value}"), "give a number from 1 to 16"));
+            }
+        }
         let optics = tracker.optics().clone();
         let light = ShapeLight::new(constants, &optics)?;
-        let cells = Cells::new(&optics);
+        let cells = Cells::new(&optics, options.cell_px);
         let count = cells.count();
         Ok(Self {
             options,
@@ -141,7 +150,7 @@ impl ShapeFromColor {
             let problem = format!("has no pose: {}", tracked.status());
             return Err(ShapeError::new("rest", problem, "take a frame in which the white markers are seen"));
         }
-        let noise = self.options.noise_levels as f32 / 255.0 / CELL_PX as f32;
+        let noise = self.options.noise_levels as f32 / 255.0 / self.cells.px as f32;
         let (levels, covered) = (&self.levels, &self.covered);
         self.rest = Some(RestMap::measured(levels, covered, &self.cells, &self.view, &self.light, noise)?);
         self.rest_seen = self.optics.clone();
@@ -194,7 +203,7 @@ impl ShapeFromColor {
         }
         rest.at_pose(&self.cells, &self.view, &self.rest_seen, self.is_rigid, &mut self.gain);
         let mut status = SolveStatus::default();
-        for pass in 0..MAX_PASSES {
+        for pass in 0..self.options.max_passes {
             self.choose(pass == 0);
             self.read_normals();
             self.tilt.clear();

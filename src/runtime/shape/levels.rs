@@ -2,7 +2,7 @@
 
 use glam::Vec3A;
 
-use super::cells::{CELL_PX, Cells, View};
+use super::cells::{Cells, View};
 use crate::track::CameraFrame;
 
 /// From this code on a channel may have been cut off.
@@ -26,14 +26,14 @@ pub(super) fn read(
     out: &mut Vec<Level>,
 ) {
     out.resize(cells.count(), Level::default());
-    let (width, bytes) = (frame.width(), frame.bytes());
+    let (width, bytes, px) = (frame.width(), frame.bytes(), cells.px);
     let light = |code: u8| linear.get(code as usize).copied().unwrap_or(1.0);
     for ((row, line), span) in out.chunks_mut(cells.width).enumerate().zip(&view.spans) {
         for (column, level) in line.iter_mut().enumerate().take(span.end).skip(span.start) {
             let (mut sum, mut highest) = (Vec3A::ZERO, [0_u8; 3]);
-            for y in 0..CELL_PX {
-                let start = 3 * ((row * CELL_PX + y) * width + column * CELL_PX);
-                let Some(pixels) = bytes.get(start..start + 3 * CELL_PX) else { continue };
+            for y in 0..px {
+                let start = 3 * ((row * px + y) * width + column * px);
+                let Some(pixels) = bytes.get(start..start + 3 * px) else { continue };
                 for pixel in pixels.chunks_exact(3) {
                     let &[r, g, b] = pixel else { continue };
                     sum += Vec3A::new(light(r), light(g), light(b));
@@ -41,7 +41,7 @@ pub(super) fn read(
                 }
             }
             let known = highest.map(|code| if code < SATURATED { 1.0 } else { 0.0 });
-            *level = Level { light: sum / (CELL_PX * CELL_PX) as f32, is_known: Vec3A::from_array(known) };
+            *level = Level { light: sum / (px * px) as f32, is_known: Vec3A::from_array(known) };
         }
     }
 }

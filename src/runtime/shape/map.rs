@@ -3,7 +3,7 @@
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
-use super::cells::{CELL_PX, Cells, View};
+use super::cells::{Cells, View};
 use super::contact::{Chart, SkinContact};
 use super::outline::outline;
 use super::system::SolveStatus;
@@ -166,7 +166,7 @@ impl ShapeMap {
             let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
             is_inside && self.is_touched[(y * width + x) as usize]
         };
-        let own = |k: usize| (k * CELL_PX) as i64;
+        let own = |k: usize| (k * cells.px) as i64;
         let from = (own(cell % cells.width), own(cell / cells.width));
         contact.outline_px = outline(is_in, from, (width, height));
     }
@@ -185,20 +185,20 @@ impl ShapeMap {
 
     /// Linear between the cells; a pixel whose own cell sees no dome has nothing.
     fn spread(&mut self, cells: &Cells, view: &View) {
-        let width = self.width;
+        let (width, px) = (self.width, cells.px);
         let Self { cell_mm, cell_normal, cell_pressure, cell_sd_mm, .. } = self;
         let at = Drawn { width: cells.width, cell_mm, cell_normal, cell_pressure, cell_sd_mm };
         let heights = self.height_mm.par_chunks_mut(width).zip(self.height_sd_mm.par_chunks_mut(width));
         let others = self.normal.par_chunks_mut(width).zip(self.is_touched.par_chunks_mut(width));
         heights.zip(others).enumerate().for_each(|(y, ((heights, sds), (normals, touched)))| {
-            let Some(span) = view.spans.get(y / CELL_PX) else { return };
-            for x in span.start * CELL_PX..span.end * CELL_PX {
-                let own = y / CELL_PX * cells.width + x / CELL_PX;
+            let Some(span) = view.spans.get(y / px) else { return };
+            for x in span.start * px..span.end * px {
+                let own = y / px * cells.width + x / px;
                 if at.cell_mm[own].is_nan() {
                     continue;
                 }
-                let ((i, px), (j, py)) = (place(x, cells.width), place(y, cells.height));
-                let (height_mm, sd_mm, normal, pressure) = at.between(own, (i, px), (j, py));
+                let ((i, part_x), (j, part_y)) = (place(x, px, cells.width), place(y, px, cells.height));
+                let (height_mm, sd_mm, normal, pressure) = at.between(own, (i, part_x), (j, part_y));
                 (heights[x], sds[x]) = (height_mm, sd_mm);
                 (normals[x], touched[x]) = (normal.normalize_or_zero().into(), pressure > 1.0);
             }
@@ -208,8 +208,8 @@ impl ShapeMap {
 
 /// The first of the two cells about a pixel, and how far it lies from that.
 #[inline]
-fn place(v: usize, n: usize) -> (usize, f32) {
-    let at = (v as f32 - 0.5 * (CELL_PX as f32 - 1.0)) / CELL_PX as f32;
+fn place(v: usize, px: usize, n: usize) -> (usize, f32) {
+    let at = (v as f32 - 0.5 * (px as f32 - 1.0)) / px as f32;
     // A cast cuts off towards 0, as a floor does of what is not negative.
     let first = (at.max(0.0) as usize).min(n.saturating_sub(2));
     (first, at - first as f32)

@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
-use super::cells::{CELL_PX, Cells};
+use super::cells::Cells;
 use crate::constants::Constants;
 use crate::track::{MarkState, Tracked};
 use domecast_optics::SensorOptics;
@@ -81,7 +81,7 @@ impl Marks {
 impl Ellipse {
     fn cover(&self, at_px: DVec2, margin_px: f64, cells: &Cells, covered: &mut [bool]) {
         // The margin, and half of a cell's diagonal.
-        let more = margin_px + 0.5 * std::f64::consts::SQRT_2 * CELL_PX as f64;
+        let more = margin_px + 0.5 * std::f64::consts::SQRT_2 * cells.px as f64;
         let [a, b] = self.radii_px.map(|radius| radius * (1.0 + more / radius.length().max(1e-3)));
         let matrix = DMat2::from_cols(a, b);
         let is_ellipse = matrix.determinant().abs() > 1e-6;
@@ -90,12 +90,12 @@ impl Ellipse {
         }
         let unit_from_px = matrix.inverse();
         let reach = DVec2::new(a.x.abs() + b.x.abs(), a.y.abs() + b.y.abs());
-        let low = Cells::of_pixel(at_px - reach).max(DVec2::ZERO);
-        let high = Cells::of_pixel(at_px + reach);
+        let low = cells.of_pixel(at_px - reach).max(DVec2::ZERO);
+        let high = cells.of_pixel(at_px + reach);
         let (right, bottom) = (cells.width as f64 - 1.0, cells.height as f64 - 1.0);
         for row in low.y.ceil() as usize..=high.y.min(bottom).max(-1.0) as usize {
             for column in low.x.ceil() as usize..=high.x.min(right).max(-1.0) as usize {
-                let away = unit_from_px * (Cells::center_of(column, row) - at_px);
+                let away = unit_from_px * (cells.center_of(column, row) - at_px);
                 if away.length_squared() <= 1.0
                     && let Some(covered) = covered.get_mut(row * cells.width + column)
                 {

@@ -2,7 +2,6 @@
 
 use glam::Vec3A;
 
-use super::cells::CELL_PX;
 use super::estimator::ShapeFromColor;
 use super::fill::Weighted;
 use super::normals;
@@ -93,7 +92,7 @@ impl ShapeFromColor {
     #[inline]
     fn irradiance(&self, cell: usize) -> (Vec3A, Vec3A) {
         let noise = self.options.noise_levels as f32 / 255.0;
-        let variance = noise * noise / (CELL_PX * CELL_PX) as f32;
+        let variance = noise * noise / (self.cells.px * self.cells.px) as f32;
         let (view, level) = (&self.view, &self.levels[cell]);
         let gain = self.light.passed(view.ray[cell].z) * self.gain[cell];
         let irradiance = (level.light - Vec3A::splat(self.light.stray)) / gain.max(Vec3A::splat(1e-12));

@@ -148,7 +148,7 @@ impl RestMap {
             Lattice::new(cells, view, |cell| {
                 let pixel = rest.project(view.surface_mm[cell].as_dvec3()).ok()?;
                 let own = DVec2::new((cell % cells.width) as f64, (cell / cells.width) as f64);
-                Some((Cells::of_pixel(pixel) - own).extend(0.0).as_vec3a())
+                Some((cells.of_pixel(pixel) - own).extend(0.0).as_vec3a())
             })
         });
         for (row, span) in view.spans.iter().enumerate() {

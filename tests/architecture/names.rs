@@ -62,7 +62,7 @@ const PROSE: &[(&str, &str)] = &[
 ];
 
 /// Each of these opens with an example that the doc tests run: the public modules of the library.
-const PUBLIC_MODULES: [&str; 21] = [
+const PUBLIC_MODULES: [&str; 22] = [
     "contact/lib.rs",
     "design/layout/mod.rs",
     "design/lib.rs",
@@ -81,6 +81,7 @@ const PUBLIC_MODULES: [&str; 21] = [
     "runtime/calibrate/mod.rs",
     "runtime/constants/mod.rs",
     "runtime/frames/mod.rs",
+    "runtime/overlay/mod.rs",
     "runtime/track/mod.rs",
     "sim/lib.rs",
     "springs/lib.rs",

@@ -2,6 +2,14 @@
 //! force, and the skin's depth as colours.
 //!
 //! Of the feature `overlay`: for people who look, not for robots.
+//!
+//! ```
+//! use domecast_runtime::overlay::{VIRIDIS, depth_range_mm, viridis};
+//!
+//! let range_mm = depth_range_mm(0.43);
+//! assert_eq!(range_mm, 0.5);
+//! assert_eq!(viridis(0.25 / range_mm), VIRIDIS[2]);
+//! ```
 
 mod canvas;
 mod color_map;

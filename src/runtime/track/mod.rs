@@ -88,7 +88,7 @@ pub use report::{OverlayError, overlay_png};
 pub use tracker::Tracker;
 #[cfg(feature = "traction")]
 pub use traction::{
-    ContactEstimate, DotTraction, ForceDistribution, HeightSample, LocalForces, TractionStatus,
+    ContactEstimate, DotTraction, ForceDistribution, HeightSample, LocalForces, PressureMap, TractionStatus,
     write_json_forces,
 };
 pub use wrench::Springs;

@@ -222,11 +222,16 @@ fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
     named.map(PathBuf::as_path).collect()
 }
 
+/// Over how far pressures are taken to be alike where the skin's heights are measured, mm.
+const SHAPE_CORRELATION_MM: f64 = 1.0;
+
 fn forces_of(
     arguments: &TrackArguments,
     constants: &Constants,
 ) -> Result<Option<ForceDistribution>, Failure> {
-    let forces = arguments.traction.then(|| ForceDistribution::new(constants, None));
+    // Heights tell pressures apart that dots do not.
+    let correlation_mm = arguments.shape.is_some().then_some(SHAPE_CORRELATION_MM);
+    let forces = arguments.traction.then(|| ForceDistribution::new(constants, correlation_mm));
     forces.transpose().map_err(|e| unfit(arguments, &e))
 }
 
@@ -278,7 +283,10 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             shape.measure(frame, tracked)?;
         }
         if let Some(forces) = &mut forces {
-            forces.update(tracked, &[]);
+            match &shape {
+                Some(shape) if picture.is_ok() => forces.update_with_shape(tracked, shape.map()),
+                _ => forces.update(tracked, &[]),
+            };
         }
         if picture.is_ok() {
             tally.times.push(began.elapsed());
@@ -289,7 +297,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         write_line(&mut line, arguments, tracked, at_mm, forces.as_ref())?;
         if let (Ok(_), Some(shape)) = (&picture, &mut shape) {
             let line = (arguments.format == Format::Jsonl).then_some(&mut line);
-            shape.write(next.number, line, forces.is_some())?;
+            shape.write(next.number, line, forces.as_mut())?;
         }
         sink.put(&line)?;
         if let Ok(frame) = &picture {

@@ -5,6 +5,8 @@
 - The contact's point, normal and area against the truth's; what nothing touches has no contact.
 - The standard deviations at the dots: how often the truth lies within one, two and three of them, where something touches.
 - Two balls in contact at once.
+- With `--shape` beside it: sum, peak pressure, contact point and area of single balls, and two balls whose touches lie 2 mm apart, from
+  frames with noise (2 levels) and without.
 
 What must hold fails the script; what only is so is printed.
 
@@ -16,10 +18,14 @@ import subprocess
 import sys
 import tempfile
 
+import cv2
 import numpy as np
 from scipy.ndimage import map_coordinates
 
 DESIGNS = pathlib.Path(__file__).resolve().parent.parent / "designs"
+ELEMENT_MM = 0.5
+# Peak pressure against the truth's, and how far the contact point may be off along the skin, with heights and dots together.
+MIN_PEAK, MAX_PEAK, POINT_MM = 0.9, 1.1, 0.2
 
 
 def simulate(program, folder, name, design, objects, count):
@@ -100,6 +106,91 @@ def judge(design, tracked, truth, out, has_springs):
     return np.array(zs), np.array(rows)
 
 
+def lit(program, folder, design, name, objects, count):
+    """Frames of a lit scene."""
+    light = json.loads((DESIGNS / "scenes/lit.json").read_text())["light"]
+    light["leds"]["level_per_mw_mm2"] = json.loads((folder / design / "report/light.json").read_text())["level_per_mw_mm2"]
+    scene = {"version": 1, "name": name, "design": str(DESIGNS / f"{design}.json"), "frames": {"count": count, "rate_hz": 10},
+             "tolerance": {"px": 0.02, "grey": 0.5}, "light": light}
+    if objects:
+        scene |= {"objects": objects, "contact": {"level": "linear", "element_mm": ELEMENT_MM}}
+    path = folder / f"{name}.json"
+    path.write_text(json.dumps(scene))
+    subprocess.run([program, "simulate", path, "--depth", "--out", folder / name, "--quiet"], check=True)
+    return folder / name
+
+
+def seen(folder, noise_levels):
+    """The frames as a camera with this noise has them, for `track`."""
+    out = folder.parent / f"{folder.name}-noise{noise_levels}"
+    out.mkdir()
+    for number, path in enumerate(sorted(folder.glob("frame_????.png"))):
+        picture = cv2.imread(str(path)).astype(float)
+        picture += noise_levels * np.random.default_rng(number).standard_normal(picture.shape)
+        cv2.imwrite(str(out / path.name), np.clip(np.rint(picture), 0, 255).astype(np.uint8))
+    return out
+
+
+def track_shape(program, folder, design, frames, rest):
+    shape, lines = folder / f"{frames.name}-shape", folder / f"{frames.name}.jsonl"
+    subprocess.run([program, "track", frames, "--constants", folder / design / "constants/constants.json", "--traction", "--shape",
+                    shape, "--rest", rest / "frame_0000.png", "--out", lines, "--quiet"], check=True)
+    return [json.loads(line) for line in lines.read_text().splitlines()], shape
+
+
+def judge_shape(program, folder, noise_levels):
+    """Balls on thumb24 with heights and dots together."""
+    constants = json.loads((folder / "thumb24/constants/constants.json").read_text())
+    rest, singles, pair = folder / "lit-rest", folder / "lit-balls", folder / "lit-pair"
+    if not rest.exists():
+        lit(program, folder, "thumb24", "lit-rest", None, 1)
+        places = [at(constants, 5, polar, 40 + 130 * k, depth)
+                  for k, polar in enumerate((0, 15, 30, 45)) for depth in (-0.3, 0.4, 0.7)]
+        lit(program, folder, "thumb24", "lit-balls", [ball("ball", 5, places)], len(places))
+        r = 1.0
+        beside = lambda x: [(x, 0, np.sqrt((10 + r - depth) ** 2 - x * x)) for depth in (-0.3, 0.15)]
+        lit(program, folder, "thumb24", "lit-pair", [ball("a", r, beside(1.1)), ball("b", r, beside(-1.1))], 2)
+    rest = seen(rest, noise_levels)
+    lines, shape = track_shape(program, folder, "thumb24", seen(singles, noise_levels), rest)
+    truth = [json.loads(line) for line in (singles / "truth.jsonl").read_text().splitlines()]
+    rows = []
+    for number, (line, true) in enumerate(zip(lines, truth)):
+        pressure, sd = (np.load(shape / f"frame_{number:04}.{kind}.npy") for kind in ("pressure", "pressure_sd"))
+        height = np.load(shape / f"frame_{number:04}.height.npy")
+        assert pressure.shape == height.shape and (np.isfinite(pressure) == np.isfinite(height)).all()
+        assert not (pressure < 0).any() and not (sd < 0).any()
+        if true["contact"]["force_n"] is None:
+            continue
+        contact, real = line["contact"], true["contact"]
+        wrench = np.array(line["pose"])[:3, :3].T @ np.array(line["wrench"][:3])
+        off = np.linalg.norm(np.array(contact["force_n"]) - wrench)
+        assert off < max(0.03 * np.linalg.norm(wrench), 0.02), (number, contact["force_n"], wrench)
+        apart = np.array(contact["point_mm"]) - real["point_mm"]
+        normal = np.array(real["normal"])
+        true_pressure = np.load(singles / f"frame_{number:04}.pressure.npy")
+        known = np.isfinite(pressure) & np.isfinite(true_pressure) & ((true_pressure > 0.01) | (pressure > 0.01))
+        rows.append((off / np.linalg.norm(wrench), np.nanmax(pressure) / np.nanmax(true_pressure),
+                     np.linalg.norm(apart - apart @ normal * normal), contact["area_mm2"] / real["area_mm2"],
+                     np.mean(np.abs(pressure - true_pressure)[known] <= 3 * sd[known])))
+    rows = np.array(rows)
+    print(f"shape and dots, noise of {noise_levels} levels: sum off by {100 * rows[:, 0].max():.1f} % at most; peak pressure {rows[:, 1].min():.2f} to "
+          f"{rows[:, 1].max():.2f} (mean {rows[:, 1].mean():.2f}) of the truth's; point off along the skin by "
+          f"{np.sqrt((rows[:, 2] ** 2).mean()):.3f} mm rms, {rows[:, 2].max():.3f} at most; area {rows[:, 3].min():.2f} to {rows[:, 3].max():.2f}; "
+          f"within 3 sd {100 * rows[:, 4].mean():.0f} %")
+    assert MIN_PEAK <= rows[:, 1].min() and rows[:, 1].max() <= MAX_PEAK, rows[:, 1]
+    assert rows[:, 2].max() < POINT_MM, rows[:, 2]
+    _, shape = track_shape(program, folder, "thumb24", seen(pair, noise_levels), rest)
+    for kind, where in (("truth", pair), ("found", shape)):
+        pressure = np.load(where / "frame_0001.pressure.npy")
+        surface = np.load(pair / "frame_0001.surface.npy")
+        x = np.where(np.abs(surface[..., 1]) < 0.3, surface[..., 0], np.nan)
+        largest = lambda inside: np.nanmax(np.where(inside, pressure, np.nan))
+        left, right = largest((x < -0.4) & (x > -2)), largest((x > 0.4) & (x < 2))
+        middle = largest(np.abs(x) < 0.1)
+        print(f"two balls 2 mm apart, {kind}: {left:.3f} and {right:.3f} N/mm2, {middle:.3f} between them")
+        assert middle < 0.5 * min(left, right), kind
+
+
 def main():
     program = pathlib.Path(sys.argv[1]).resolve()
     all_zs = []
@@ -135,6 +226,8 @@ def main():
         sides = [max(t for x, t in dots if sign * x > 1.0) for sign in (-1, 1)]
         print(f"two balls 6 mm apart: largest tractions left and right {sides[0]:.3f} {sides[1]:.3f}, between them {middle:.3f} N/mm2")
         assert middle < 0.5 * min(sides)
+        for noise_levels in (0, 2):
+            judge_shape(program, folder, noise_levels)
 
 
 main()

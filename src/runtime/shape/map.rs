@@ -106,12 +106,53 @@ impl ShapeMap {
         surface
     }
 
+    /// Where each cell's skin is, sensor frame, mm; NaN where nothing is known.
+    #[cfg(feature = "traction")]
+    pub(crate) fn cell_points(&self) -> Vec<Vec3A> {
+        let known = self.cell_mm.iter().zip(&self.cell_point);
+        known.map(|(height, at)| if height.is_nan() { Vec3A::NAN } else { *at }).collect()
+    }
+
+    /// What the skin's own shape says of the pressure on a cell, over that at the edge of the touch; 0 where nothing touches.
+    #[cfg(feature = "traction")]
+    pub(crate) fn own_pressure(&self, cell: usize) -> f32 {
+        self.cell_pressure.get(cell).copied().filter(|pressure| *pressure > 1.0).unwrap_or(0.0)
+    }
+
+    /// Area of the skin that a cell shows, mm^2; 0 at the dome's outline.
+    #[cfg(feature = "traction")]
+    pub(crate) fn cell_area_mm2(&self, cell: usize, points: &[Vec3A]) -> f64 {
+        let beside = |step: usize| points.get(cell + step).copied().unwrap_or(Vec3A::NAN) - points[cell];
+        let area_mm2 = beside(1).cross(beside(self.cells_across)).length();
+        if area_mm2.is_finite() { f64::from(area_mm2) } else { 0.0 }
+    }
+
+    /// Draws values of cells, linear between them, where the map has a height.
+    #[cfg(feature = "traction")]
+    pub(crate) fn draw_cells(&self, values: &[f32], out: &mut [f32]) {
+        let px = self.width / self.cells_across.max(1);
+        let (columns, rows) = (self.cells_across, self.cell_mm.len() / self.cells_across);
+        let known = self.height_mm.iter().zip(out).enumerate().filter(|(_, (height, _))| height.is_finite());
+        for (pixel, (_, out)) in known {
+            let (x, y) = (pixel % self.width, pixel / self.width);
+            let own = y / px * columns + x / px;
+            let ((i, part_x), (j, part_y)) = (place(x, px, columns), place(y, px, rows));
+            let corner = |i: usize, j: usize| {
+                let value = values.get(j * columns + i).copied().unwrap_or(f32::NAN);
+                if value.is_nan() { values.get(own).copied().unwrap_or(f32::NAN) } else { value }
+            };
+            let line = |j: usize| corner(i, j) * (1.0 - part_x) + corner(i + 1, j) * part_x;
+            *out = line(j) * (1.0 - part_y) + line(j + 1) * part_y;
+        }
+    }
+
     /// Nothing is known.
     pub(super) fn forget(&mut self) {
         self.height_mm.fill(f32::NAN);
         self.height_sd_mm.fill(f32::NAN);
         self.normal.fill(Vec3::NAN);
         self.is_touched.fill(false);
+        self.cell_mm.fill(f32::NAN);
         self.contact = None;
         self.status = None;
     }
@@ -131,7 +172,6 @@ impl ShapeMap {
         let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * moved_mm[cell] as f32;
         let w = cells.width;
         let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
-        self.cell_mm.fill(f32::NAN);
         for (row, span) in view.spans.iter().enumerate() {
             for cell in row * w + span.start..row * w + span.end {
                 if !is_dome(cell) {

@@ -86,7 +86,7 @@ pub use report::{
 pub use tracker::Tracker;
 #[cfg(feature = "traction")]
 pub use traction::{
-    ContactEstimate, DotTraction, ForceDistribution, HeightSample, LocalForces, TractionStatus,
+    ContactEstimate, DotTraction, ForceDistribution, HeightSample, LocalForces, PressureMap, TractionStatus,
     write_json_forces,
 };
 pub use wrench::Springs;

@@ -62,11 +62,16 @@ fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
     named.map(PathBuf::as_path).collect()
 }
 
+/// Over how far pressures are taken to be alike where the skin's heights are measured, mm.
+const SHAPE_CORRELATION_MM: f64 = 1.0;
+
 fn forces_of(
     arguments: &TrackArguments,
     constants: &Constants,
 ) -> Result<Option<ForceDistribution>, Failure> {
-    let forces = arguments.traction.then(|| ForceDistribution::new(constants, None));
+    // Heights tell pressures apart that dots do not.
+    let correlation_mm = arguments.shape.is_some().then_some(SHAPE_CORRELATION_MM);
+    let forces = arguments.traction.then(|| ForceDistribution::new(constants, correlation_mm));
     forces.transpose().map_err(|e| arguments.unfit(&e))
 }
 
@@ -114,14 +119,17 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             results.measure(frame, tracked)?;
         }
         if let Some(forces) = &mut forces {
-            forces.update(tracked, &[]);
+            match results.skin() {
+                Some(skin) if picture.is_ok() => forces.update_with_shape(tracked, skin),
+                _ => forces.update(tracked, &[]),
+            };
         }
         if picture.is_ok() {
             tally.times.push(began.elapsed());
         }
         turn = tracked.camera_turn.or(turn);
         *tally.counts.entry(tracked.status()).or_default() += 1;
-        results.write(output, arguments, picture.as_ref().ok(), tracked, forces.as_ref())?;
+        results.write(output, arguments, picture.as_ref().ok(), tracked, forces.as_mut())?;
         source.reuse(next.picture);
     }
     output.steps_done();

@@ -12,6 +12,7 @@ use crate::commands::output::{Failure, Output};
 use crate::track_report::{TrackReport, page};
 use domecast_files::{OutputRules, StagedFile};
 use domecast_runtime::constants::Constants;
+use domecast_runtime::shape::ShapeMap;
 use domecast_runtime::track::{
     CSV_HEADER, CameraFrame, DOTS_CSV_HEADER, ForceDistribution, Springs, Tracked, Tracker, write_csv,
     write_dots_csv, write_json_fields, write_json_forces, write_record,
@@ -117,6 +118,11 @@ impl Results {
         self.shape.as_mut().map_or(Ok(()), |shape| shape.measure(frame, tracked))
     }
 
+    /// The last frame's shape, where it is asked for.
+    pub fn skin(&self) -> Option<&ShapeMap> {
+        self.shape.as_ref().map(ShapeFiles::map)
+    }
+
     /// Writes all of a frame; there is none where it could not be read.
     pub fn write(
         &mut self,
@@ -124,19 +130,19 @@ impl Results {
         arguments: &TrackArguments,
         frame: Option<&CameraFrame<'_>>,
         tracked: &Tracked,
-        forces: Option<&ForceDistribution>,
+        mut forces: Option<&mut ForceDistribution>,
     ) -> Result<(), Failure> {
         let number = tracked.frame;
         self.line.clear();
-        write_line(&mut self.line, arguments, tracked, self.at_mm, forces)?;
+        write_line(&mut self.line, arguments, tracked, self.at_mm, forces.as_deref())?;
         if let (Some(_), Some(shape)) = (frame, &mut self.shape) {
             let line = (arguments.format == Format::Jsonl).then_some(&mut self.line);
-            shape.write(number, line, forces.is_some())?;
+            shape.write(number, line, forces.as_deref_mut())?;
         }
         self.sink.put(&self.line)?;
         let skin = frame.and(self.shape.as_ref()).map(ShapeFiles::map);
         if let Some(frame) = frame {
-            let dots = forces.map_or(&[][..], |forces| &forces.result().dots);
+            let dots = forces.as_deref().map_or(&[][..], |forces| &forces.result().dots);
             let tractions: Vec<_> = dots.iter().map(|dot| (dot.surface_mm, dot.traction_n_mm2)).collect();
             self.pictures.write(output, number, frame, tracked, &tractions, skin)?;
         }

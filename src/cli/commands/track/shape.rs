@@ -11,12 +11,13 @@ use crate::commands::output::{Failure, Output};
 use domecast_files::{OutputRules, StagedFolder, npy_f32, npy_u8, ply, png_u16};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeMap, ShapeOptions};
-use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
+use domecast_runtime::track::{CameraFrame, ForceDistribution, PressureMap, Tracked, Tracker};
 
 /// What reads the shape, and the folder for its maps.
 pub struct ShapeFiles {
     shape: ShapeFromColor,
     folder: StagedFolder,
+    pressure: PressureMap,
 }
 
 impl ShapeFiles {
@@ -43,7 +44,8 @@ impl ShapeFiles {
             let tracked = at_rest.track(0, &frame).clone();
             shape.set_rest(&frame, &tracked).map_err(|error| unfit(rest, &error))?;
         }
-        Ok(Some(Self { shape, folder: StagedFolder::new(path, "track", rules)? }))
+        let folder = StagedFolder::new(path, "track", rules)?;
+        Ok(Some(Self { shape, folder, pressure: PressureMap::default() }))
     }
 
     /// Measures a frame.
@@ -63,11 +65,20 @@ impl ShapeFiles {
         &mut self,
         number: u64,
         line: Option<&mut Vec<u8>>,
-        has_forces: bool,
+        forces: Option<&mut ForceDistribution>,
     ) -> Result<(), Failure> {
         let map = self.shape.map();
         for (name, bytes) in files(map).map_err(|error| Failure::Internal(error.to_string()))? {
             self.folder.write(&format!("frame_{number:04}.{name}"), &bytes)?;
+        }
+        let has_forces = forces.is_some();
+        if let Some(forces) = forces {
+            forces.draw_pressure(map, &mut self.pressure);
+            let PressureMap { width, height, pressure_n_mm2, pressure_sd_n_mm2 } = &self.pressure;
+            for (name, values) in [("pressure", pressure_n_mm2), ("pressure_sd", pressure_sd_n_mm2)] {
+                let bytes = npy_f32(&[*height, *width], values.iter().copied());
+                self.folder.write(&format!("frame_{number:04}.{name}.npy"), &bytes)?;
+            }
         }
         let Some(line) = line else { return Ok(()) };
         while line.last().is_some_and(|byte| matches!(byte, b'\n' | b'}')) {

@@ -85,6 +85,8 @@ pub(super) struct ActiveSet {
     found: Vec<f64>,
     residual: Vec<f64>,
     went: Vec<bool>,
+    /// Nodes that may bear a pressure.
+    pub allowed: Vec<bool>,
     /// One over the deviation that each pressure alone would have.
     per_sd: Vec<f64>,
 }
@@ -100,6 +102,7 @@ impl ActiveSet {
             found: Vec::with_capacity(WIDTH),
             residual: Vec::with_capacity(max_rows),
             went: vec![false; nodes],
+            allowed: vec![true; nodes],
             per_sd: vec![0.0; nodes],
         }
     }
@@ -111,7 +114,16 @@ impl ActiveSet {
 
     /// Solves a frame from the nodes of the last one.
     pub fn solve(&mut self, rows: &Rows<'_>) -> Ended {
-        self.went.fill(false);
+        for (went, is_allowed) in self.went.iter_mut().zip(&self.allowed) {
+            *went = !is_allowed;
+        }
+        let Self { active, tractions, allowed, .. } = self;
+        active.retain(|&node| {
+            if !allowed[node] {
+                (0..AXES).for_each(|axis| tractions[axis * rows.nodes + node] = 0.0);
+            }
+            allowed[node]
+        });
         for (node, per_sd) in self.per_sd.iter_mut().enumerate() {
             *per_sd = 1.0 / (rows.product((0, node), (0, node)) + rows.prior(0, node, node)).sqrt();
         }

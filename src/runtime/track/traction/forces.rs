@@ -3,10 +3,12 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::active_set::{ActiveSet, Ended, Rows};
+use super::heights::Heights;
 use super::model::{AXES, ElasticModel};
 use super::posterior::{Posterior, USUAL_DOT_SD_PX};
 use super::result::{DotTraction, HeightSample, LocalForces, TractionStatus};
 use crate::constants::Constants;
+use crate::shape::ShapeMap;
 use crate::track::error::TrackError;
 use crate::track::report::Tracked;
 use domecast_optics::SensorOptics;
@@ -42,7 +44,7 @@ pub struct ForceDistribution {
     pub(super) set: ActiveSet,
     pub(super) posterior: Posterior,
     dots: Vec<Dot>,
-    optics: SensorOptics,
+    pub(super) optics: SensorOptics,
     reference_mm: Option<DVec3>,
     pub(super) radius_mm: f64,
     /// By axis, node and dot: what a traction moves the dot's image by at rest, px.
@@ -54,6 +56,8 @@ pub struct ForceDistribution {
     pub(super) nodes_moved_mm: Vec<DVec3>,
     pub(super) turned: Vec<DMat3>,
     pub(super) stretch: Vec<f64>,
+    /// Deviation of each node's pressure, N/mm2.
+    pub(super) node_sd_n_mm2: Vec<f64>,
     /// Height of each node and one over its deviation, and the nodes that have one.
     pub(super) heights: Vec<(f64, f64)>,
     pub(super) measured: Vec<usize>,
@@ -114,6 +118,7 @@ impl ForceDistribution {
             nodes_moved_mm: vec![DVec3::ZERO; n],
             turned: model.nodes.iter().map(|node| node.axes).collect(),
             stretch: vec![1.0; n],
+            node_sd_n_mm2: vec![0.0; n],
             heights: vec![(0.0, 0.0); n],
             measured: Vec::with_capacity(n),
             softness: 1.0,
@@ -132,6 +137,16 @@ impl ForceDistribution {
 
     /// The forces in a frame; `heights` are measured places of the skin, if any are.
     pub fn update(&mut self, tracked: &Tracked, heights: &[HeightSample]) -> &LocalForces {
+        self.find(tracked, &Heights::Samples(heights))
+    }
+
+    /// The forces in a frame whose skin is measured: they press where it is touched, and as deep as it is. `map` is the same
+    /// frame's ([`ShapeFromColor`](crate::shape::ShapeFromColor)).
+    pub fn update_with_shape(&mut self, tracked: &Tracked, map: &ShapeMap) -> &LocalForces {
+        self.find(tracked, &Heights::Map(map))
+    }
+
+    fn find(&mut self, tracked: &Tracked, heights: &Heights<'_>) -> &LocalForces {
         self.result.dots.clear();
         self.result.contact = None;
         (self.result.rms_px, self.result.compliance_factor) = (0.0, 1.0);
@@ -141,16 +156,18 @@ impl ForceDistribution {
             self.result.status = TractionStatus::NoMotion;
             return &self.result;
         };
-        self.take_heights(heights);
         let mut ended = Ended::Solved;
         self.softness = 1.0;
         self.move_skin();
+        self.allow(heights);
+        self.take_heights(heights);
         let is_touched = self.is_moved || !self.measured.is_empty();
         if !is_touched {
             self.set.clear();
             self.move_skin();
         }
         for _ in 0..if is_touched { TURNS } else { 0 } {
+            self.take_heights(heights);
             self.fill(tracked, &pose);
             let rows = Rows {
                 columns: &self.columns,

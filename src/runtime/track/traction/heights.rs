@@ -1,16 +1,103 @@
 //! Heights of the skin as rows of the least squares.
 
+use glam::DVec3;
+
 use super::forces::ForceDistribution;
 use super::result::HeightSample;
+use crate::shape::ShapeMap;
 
 /// A height counts for a node when it is measured nearer to it than this part of the nodes' distance.
 const HEIGHT_REACH: f64 = 0.15;
 /// Least deviation of a height, mm.
 const MIN_HEIGHT_SD_MM: f64 = 0.002;
 
+/// What the elastic model may be off, as a part of a height: coarse elements and small strain.
+const HEIGHT_MODEL_PART: f64 = 0.03;
+/// Part of a node's surroundings that must be touched for it to bear a pressure.
+const MIN_TOUCHED: f64 = 0.04;
+/// Places in each direction about a node at which is looked whether the skin is touched, and their distance over the nodes'.
+const LOOKS: i32 = 3;
+const LOOK_STEP: f64 = 0.25;
+
+/// Where heights of the skin come from.
+pub(super) enum Heights<'a> {
+    Samples(&'a [HeightSample]),
+    Map(&'a ShapeMap),
+}
+
 impl ForceDistribution {
+    /// Takes the heights of the nodes where they are now.
+    pub(super) fn take_heights(&mut self, heights: &Heights<'_>) {
+        match heights {
+            Heights::Samples(samples) => self.take_samples(samples),
+            Heights::Map(map) => self.take_map(map),
+        }
+    }
+
+    /// The pixel that shows a place of the skin that has moved, if the map has one.
+    fn pixel(&self, map: &ShapeMap, at_mm: DVec3) -> Option<usize> {
+        let px = self.optics.project_deformed(at_mm).ok()?.round();
+        let is_within = px.x >= 0.0 && px.y >= 0.0 && px.x < map.width as f64 && px.y < map.height as f64;
+        let pixel = is_within.then(|| px.y as usize * map.width + px.x as usize)?;
+        map.height_mm.get(pixel).is_some_and(|height| height.is_finite()).then_some(pixel)
+    }
+
+    /// The nodes about which the skin is touched may bear a pressure; all may where no touch is seen.
+    pub(super) fn allow(&mut self, heights: &Heights<'_>) {
+        let Heights::Map(map) = heights else { return self.set.allowed.fill(true) };
+        if map.contact.is_none() {
+            return self.set.allowed.fill(true);
+        }
+        let step_mm = LOOK_STEP * self.model.compliance.grid.spacing_mm();
+        for node in 0..self.model.nodes.len() {
+            let own = &self.model.nodes[node];
+            let at_mm = own.at_mm + self.nodes_moved_mm[node];
+            let (mut touched, mut all) = (0.0, 0.0);
+            for i in -LOOKS..=LOOKS {
+                for j in -LOOKS..=LOOKS {
+                    let [x, y] = [i, j].map(|k| f64::from(k) * step_mm);
+                    let Some(pixel) = self.pixel(map, at_mm + own.axes.y_axis * x + own.axes.z_axis * y)
+                    else {
+                        continue;
+                    };
+                    // As much as the node's own pressure is there.
+                    let hat = [i, j].map(|k| 1.0 - LOOK_STEP * f64::from(k.abs()));
+                    all += hat[0] * hat[1];
+                    touched += if map.is_touched[pixel] { hat[0] * hat[1] } else { 0.0 };
+                }
+            }
+            self.set.allowed[node] = touched > MIN_TOUCHED * all;
+        }
+        // A touch smaller than the nodes' distance bears on those about it.
+        if let Some(contact) = &map.contact {
+            for (node, _) in self.model.about(contact.deepest_mm) {
+                self.set.allowed[node] = true;
+            }
+        }
+    }
+
+    fn take_map(&mut self, map: &ShapeMap) {
+        self.measured.clear();
+        for node in 0..self.model.nodes.len() {
+            let moved_mm = self.nodes_moved_mm[node];
+            let own = &self.model.nodes[node];
+            let Some(pixel) = self.pixel(map, own.at_mm + moved_mm) else { continue };
+            let height_mm = f64::from(map.height_mm[pixel]);
+            let sd_mm = f64::from(map.height_sd_mm[pixel]).hypot(HEIGHT_MODEL_PART * height_mm);
+            if !sd_mm.is_finite() {
+                continue;
+            }
+            // A place that went aside on the sphere is higher than its motion along the normal says.
+            let inward = own.axes.x_axis;
+            let aside_mm = moved_mm - inward * moved_mm.dot(inward);
+            let higher_mm = 0.5 * aside_mm.length_squared() / self.radius_mm;
+            self.heights[node] = (height_mm - higher_mm, 1.0 / sd_mm.max(MIN_HEIGHT_SD_MM));
+            self.measured.push(node);
+        }
+    }
+
     /// Means of the heights that lie about each node, with their deviations.
-    pub(super) fn take_heights(&mut self, samples: &[HeightSample]) {
+    fn take_samples(&mut self, samples: &[HeightSample]) {
         self.measured.clear();
         if samples.is_empty() {
             return;

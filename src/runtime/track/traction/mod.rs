@@ -5,7 +5,8 @@
 //! | `model` | what a traction on each node moves, and which pressures are likely |
 //! | `active_set` | least squares with pressures that are not negative |
 //! | `forces` | rows of a frame: dots, wrench, heights; the turns that make it consistent with the moved skin |
-//! | `heights` | a height map as heights of nodes |
+//! | `heights` | a height map as heights of nodes, and which of them are touched |
+//! | `pressure` | pressures on a height map's grid |
 //! | `posterior` | what is left open |
 //! | `contact` | area, point, normal, force |
 
@@ -16,9 +17,11 @@ mod forces;
 mod heights;
 mod model;
 mod posterior;
+mod pressure;
 mod result;
 mod write;
 
 pub use forces::ForceDistribution;
+pub use pressure::PressureMap;
 pub use result::{ContactEstimate, DotTraction, HeightSample, LocalForces, TractionStatus};
 pub use write::write_json_forces;

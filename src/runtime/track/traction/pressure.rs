@@ -1,0 +1,95 @@
+//! The pressure at every pixel of a height map.
+
+use glam::{DVec3, Vec3A};
+
+use super::forces::ForceDistribution;
+use crate::shape::ShapeMap;
+
+/// Pressure on the skin over the raw image, row by row; NaN where a height map has nothing, or nothing is known of the forces.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PressureMap {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Normal force on the skin over its area as it is now, N/mm2; not negative.
+    pub pressure_n_mm2: Vec<f32>,
+    /// Its standard deviation, N/mm2: what dots, wrench and heights leave open. What nodes are too coarse to tell is not in it.
+    pub pressure_sd_n_mm2: Vec<f32>,
+}
+
+/// What the skin's own shape may be off between nodes, as a part of the pressure.
+const SHAPE_PART: f64 = 0.2;
+
+/// A cell of the height map, with the nodes that bear on it and their shares.
+struct Borne {
+    cell: usize,
+    area_mm2: f64,
+    nodes: [(usize, f64); 4],
+    /// What the skin's own shape says of the pressure, of no unit.
+    own: f64,
+}
+
+impl ForceDistribution {
+    /// Draws the last frame's pressures onto the grid of its height map. Where the skin is seen to be touched, the forces of the
+    /// nodes are shared out as its own shape says (`|k|` times its depth in the Fourier plane, as for a half-space), which is
+    /// finer than the nodes; elsewhere as the nodes have them.
+    pub fn draw_pressure(&mut self, map: &ShapeMap, out: &mut PressureMap) {
+        (out.width, out.height) = (map.width, map.height);
+        for list in [&mut out.pressure_n_mm2, &mut out.pressure_sd_n_mm2] {
+            list.clear();
+            list.resize(map.width * map.height, f32::NAN);
+        }
+        if self.result().dots.is_empty() {
+            return;
+        }
+        let count = self.model.nodes.len();
+        for node in 0..count {
+            let alone = self.model.pressure_sd_n_mm2;
+            let sd = self.posterior.sd_of(std::iter::once((node, 1.0))).unwrap_or(alone);
+            self.node_sd_n_mm2[node] = if self.set.allowed[node] { sd } else { 0.0 };
+        }
+        let points = map.cell_points();
+        let borne = self.borne(map, &points);
+        let (mut touched, mut own_sum) = (vec![0.0; count], 0.0);
+        for one in &borne {
+            own_sum += one.own * one.area_mm2;
+            one.nodes.iter().for_each(|(node, hat)| touched[*node] += hat * one.own);
+        }
+        let pooled = (0..count).filter(|node| touched[*node] > 0.0);
+        let pooled_n: f64 =
+            pooled.map(|node| self.set.tractions[node] * self.model.nodes[node].area_mm2).sum();
+        let scale = if own_sum > 0.0 { pooled_n / own_sum } else { 0.0 };
+        let mut values = [vec![f32::NAN; points.len()], vec![f32::NAN; points.len()]];
+        for one in &borne {
+            let (mut pressure, mut sd) = (one.own * scale, 0.0);
+            for (node, hat) in one.nodes {
+                let hat = hat / self.stretch[node];
+                pressure += if touched[node] > 0.0 { 0.0 } else { hat * self.set.tractions[node] };
+                sd += hat * self.node_sd_n_mm2[node];
+            }
+            values[0][one.cell] = pressure as f32;
+            values[1][one.cell] = sd.hypot(SHAPE_PART * pressure) as f32;
+        }
+        map.draw_cells(&values[0], &mut out.pressure_n_mm2);
+        map.draw_cells(&values[1], &mut out.pressure_sd_n_mm2);
+    }
+
+    /// The cells that show the skin, with the nodes that bear on them.
+    fn borne(&self, map: &ShapeMap, points: &[Vec3A]) -> Vec<Borne> {
+        let dome = *self.optics.dome();
+        let shown = points.iter().enumerate().filter(|(_, point)| point.is_finite());
+        let borne = shown.map(|(cell, point)| {
+            let at_mm = dome.nearest_mm(point.as_dvec3());
+            let is_loaded = self.model.about(at_mm).any(|(node, _)| self.set.tractions[node] > 0.0);
+            // What is there now came from beside.
+            let moved = self.model.about(at_mm).map(|(node, hat)| self.nodes_moved_mm[node] * hat);
+            let own_mm = if is_loaded { at_mm - moved.sum::<DVec3>() } else { at_mm };
+            let mut nodes = [(0, 0.0); 4];
+            nodes.iter_mut().zip(self.model.about(own_mm)).for_each(|(to, from)| *to = from);
+            let area_mm2 = map.cell_area_mm2(cell, points);
+            Borne { cell, area_mm2, nodes, own: f64::from(map.own_pressure(cell)) }
+        });
+        borne.collect()
+    }
+}

@@ -21,6 +21,7 @@ const WEIGHTS: [[f32; 4]; STEP] = [
 ];
 
 /// What the nodes about a block of cells see.
+#[expect(clippy::large_enum_variant, reason = "one at a time, on the stack")]
 enum Around {
     /// The dome alone: a smooth piece of it.
     Smooth([[[Vec3A; 2]; 4]; 4]),

@@ -235,6 +235,14 @@ fn forces_of(
     forces.transpose().map_err(|e| unfit(arguments, &e))
 }
 
+/// Finds the forces of a frame, with its heights where they are measured.
+fn press(forces: &mut ForceDistribution, tracked: &Tracked, shape: Option<&ShapeFiles>) {
+    match shape {
+        Some(shape) => forces.update_with_shape(tracked, shape.map()),
+        None => forces.update(tracked, &[]),
+    };
+}
+
 fn frame_of(picture: &Result<decode::Picture, String>) -> Result<CameraFrame<'_>, String> {
     let picture = picture.as_ref().map_err(String::clone)?;
     let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
@@ -283,10 +291,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             shape.measure(frame, tracked)?;
         }
         if let Some(forces) = &mut forces {
-            match &shape {
-                Some(shape) if picture.is_ok() => forces.update_with_shape(tracked, shape.map()),
-                _ => forces.update(tracked, &[]),
-            };
+            press(forces, tracked, shape.as_ref().filter(|_| picture.is_ok()));
         }
         if picture.is_ok() {
             tally.times.push(began.elapsed());

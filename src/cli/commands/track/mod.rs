@@ -15,6 +15,7 @@ use std::time::Instant;
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
 use domecast_runtime::constants::Constants;
+use domecast_runtime::shape::ShapeMap;
 use domecast_runtime::track::{CameraFrame, CameraTurn, ForceDistribution, Tracked, Tracker};
 use results::Results;
 use source::FrameSource;
@@ -75,6 +76,14 @@ fn forces_of(
     forces.transpose().map_err(|e| arguments.unfit(&e))
 }
 
+/// Finds the forces of a frame, with its heights where they are measured.
+fn press(forces: &mut ForceDistribution, tracked: &Tracked, skin: Option<&ShapeMap>) {
+    match skin {
+        Some(skin) => forces.update_with_shape(tracked, skin),
+        None => forces.update(tracked, &[]),
+    };
+}
+
 fn frame_of(picture: &Result<decode::Picture, String>) -> Result<CameraFrame<'_>, String> {
     let picture = picture.as_ref().map_err(String::clone)?;
     let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
@@ -119,10 +128,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             results.measure(frame, tracked)?;
         }
         if let Some(forces) = &mut forces {
-            match results.skin() {
-                Some(skin) if picture.is_ok() => forces.update_with_shape(tracked, skin),
-                _ => forces.update(tracked, &[]),
-            };
+            press(forces, tracked, results.skin().filter(|_| picture.is_ok()));
         }
         if picture.is_ok() {
             tally.times.push(began.elapsed());

@@ -56,7 +56,7 @@ pub use domecast_fab::{artwork, build, compare, light, report};
 pub use domecast_mesh as mesh;
 pub use domecast_optics as optics;
 pub use domecast_optics::{camera, numeric, pose};
-pub use domecast_runtime::{calibrate, frames, overlay, shape, track};
+pub use domecast_runtime::{calibrate, frames, overlay, shape, track, traction};
 pub use domecast_sim as sim;
 pub use domecast_springs as springs;
 

@@ -7,3 +7,5 @@ pub mod frames;
 pub mod overlay;
 pub mod shape;
 pub mod track;
+#[cfg(feature = "traction")]
+pub mod traction;

@@ -1,6 +1,7 @@
 //! Forces on the skin: what the constants must say, and that nothing is allocated once it runs.
 
-use domecast::track::{ForceDistribution, TrackOptions, TractionStatus};
+use domecast::track::TrackOptions;
+use domecast::traction::{ForceDistribution, TractionStatus};
 use glam::DVec3;
 
 use super::render::{Picture, still};

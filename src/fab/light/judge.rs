@@ -147,6 +147,18 @@ fn on_edges(edges: ShadowEdges) -> Option<String> {
     ))
 }
 
+/// What platforms that let light through mean: neither the lit platform nor what the lens sees of the lights is simulated.
+fn shows_lights(design: &Design) -> Option<String> {
+    let leds = &design.sections().leds;
+    (leds.through_platform > 0.0 && !leds.list.is_empty()).then(|| {
+        format!(
+            "the platforms let {} of the light through: the lens sees the lights through them, as spots that are not in \
+             report/light-frame.png; paint them black, or judge a frame of the real sensor",
+            percent(leds.through_platform)
+        )
+    })
+}
+
 /// What its maker should know.
 pub(super) fn warnings(design: &Design, report: &LightReport) -> Vec<(String, String)> {
     let dome = &report.dome;
@@ -162,17 +174,8 @@ pub(super) fn warnings(design: &Design, report: &LightReport) -> Vec<(String, St
             ),
         );
     }
-    let through = design.sections().leds.through_platform;
-    if through > 0.0 && !design.sections().leds.list.is_empty() {
-        // Neither the lit platform nor what the lens sees of the lights through it is simulated.
-        warn(
-            "leds.through_platform",
-            format!(
-                "the platforms let {} of the light through: the lens sees the lights through them, as spots that are not \
-                 in report/light-frame.png; paint them black, or judge a frame of the real sensor",
-                percent(through)
-            ),
-        );
+    if let Some(message) = shows_lights(design) {
+        warn("leds.through_platform", message);
     }
     if dome.percentile_5_level < MIN_DOME_LEVEL {
         warn(

@@ -1,7 +1,7 @@
 //! How far a height may be off.
 
 use super::cells::{Cells, View};
-use super::reading::CellReading;
+use super::normals::CellReading;
 
 /// Cells along the side of a block over which errors of colour go together: a block of a camera's JPEG, 8 px.
 const BLOCK: usize = 4;

@@ -2,7 +2,11 @@
 
 use glam::{Vec2, Vec3A};
 
+use super::fill::Weighted;
 use super::light::PointLight;
+
+/// Tilt of a normal that was filled in from around, rad.
+pub(super) const FILLED_SD_RAD: f32 = 0.09;
 
 /// How well the brightness of the membrane is known beside the frame at rest, a part: what a touch changes of the light that the
 /// dome gives itself (a third of all) and what JPEG leaves of brightness.
@@ -17,6 +21,23 @@ pub(super) struct Reading {
     pub covariance: [f32; 3],
     /// Sum of squares of what is left over, in standard deviations: one degree of freedom.
     pub misfit: f32,
+}
+
+/// What the colours of a cell say.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CellReading {
+    /// Tilt of the normal away from the undeformed dome's, and its weight.
+    pub tilt: Weighted,
+    /// Variance of the tilt across and down, rad^2.
+    pub spread: [f32; 2],
+    /// Whether the colours say a normal.
+    pub is_read: bool,
+}
+
+impl Default for CellReading {
+    fn default() -> Self {
+        Self { tilt: (Vec3A::ZERO, 0.0), spread: [FILLED_SD_RAD * FILLED_SD_RAD; 2], is_read: false }
+    }
 }
 
 /// Two unit tangents at a normal; the first as near to `along` as may be.

@@ -3,11 +3,7 @@
 use glam::Vec3A;
 
 use super::estimator::ShapeFromColor;
-use super::fill::Weighted;
-use super::normals;
-
-/// Tilt of a normal that was filled in from around, rad.
-const FILLED_SD_RAD: f32 = 0.09;
+use super::normals::{self, CellReading, FILLED_SD_RAD};
 
 /// Variance of a reading's tilt, rad^2, from which on there is no light to read by: the skin is taken to be as
 /// at rest there.
@@ -20,23 +16,6 @@ const LEVEL_ERROR: f32 = 0.005;
 /// Squares of what is left over, in deviations, up to which a reading counts in full, and from which on not at all.
 const GOOD_MISFIT: f32 = 6.0;
 const BAD_MISFIT: f32 = 30.0;
-
-/// What the colours of a cell say.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct CellReading {
-    /// Tilt of the normal away from the undeformed dome's, and its weight.
-    pub tilt: Weighted,
-    /// Variance of the tilt across and down, rad^2.
-    pub spread: [f32; 2],
-    /// Whether the colours say a normal.
-    pub is_read: bool,
-}
-
-impl Default for CellReading {
-    fn default() -> Self {
-        Self { tilt: (Vec3A::ZERO, 0.0), spread: [FILLED_SD_RAD * FILLED_SD_RAD; 2], is_read: false }
-    }
-}
 
 impl ShapeFromColor {
     /// Reads a cell's normal, one step from that of the skin as it is known.

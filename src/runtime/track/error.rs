@@ -10,7 +10,7 @@ pub struct TrackError {
 }
 
 impl TrackError {
-    pub(super) fn at(field: impl Into<String>, problem: impl Into<String>) -> Self {
+    pub(crate) fn at(field: impl Into<String>, problem: impl Into<String>) -> Self {
         Self { field: field.into(), problem: problem.into() }
     }
 }

@@ -68,8 +68,6 @@ mod options;
 mod pose;
 mod report;
 mod tracker;
-#[cfg(feature = "traction")]
-mod traction;
 mod wrench;
 
 pub use error::TrackError;
@@ -84,9 +82,4 @@ pub use report::{
     write_csv, write_dots_csv, write_json, write_json_fields, write_record,
 };
 pub use tracker::Tracker;
-#[cfg(feature = "traction")]
-pub use traction::{
-    ContactEstimate, DotTraction, ForceDistribution, HeightSample, LocalForces, PressureMap, TractionStatus,
-    write_json_forces,
-};
 pub use wrench::Springs;

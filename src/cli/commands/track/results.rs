@@ -14,9 +14,10 @@ use domecast_files::{OutputRules, StagedFile};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::ShapeMap;
 use domecast_runtime::track::{
-    CSV_HEADER, CameraFrame, DOTS_CSV_HEADER, ForceDistribution, Springs, Tracked, Tracker, write_csv,
-    write_dots_csv, write_json_fields, write_json_forces, write_record,
+    CSV_HEADER, CameraFrame, DOTS_CSV_HEADER, Springs, Tracked, Tracker, write_csv, write_dots_csv,
+    write_json_fields, write_record,
 };
+use domecast_runtime::traction::{ForceDistribution, write_json_forces};
 
 /// Where the lines go: a file that is there whole or not at all, or standard output, frame by frame.
 enum Sink {

@@ -11,7 +11,8 @@ use crate::commands::output::{Failure, Output};
 use domecast_files::{OutputRules, StagedFolder, npy_f32, npy_u8, ply, png_u16};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeMap, ShapeOptions};
-use domecast_runtime::track::{CameraFrame, ForceDistribution, PressureMap, Tracked, Tracker};
+use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
+use domecast_runtime::traction::{ForceDistribution, PressureMap};
 
 /// What reads the shape, and the folder for its maps.
 pub struct ShapeFiles {

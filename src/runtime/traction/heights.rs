@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::forces::ForceDistribution;
-use super::result::HeightSample;
+use super::result::{HeightSample, Heights};
 use crate::shape::ShapeMap;
 
 /// A height counts for a node when it is measured nearer to it than this part of the nodes' distance.
@@ -18,12 +18,6 @@ const MIN_TOUCHED: f64 = 0.04;
 /// Places in each direction about a node at which is looked whether the skin is touched, and their distance over the nodes'.
 const LOOKS: i32 = 3;
 const LOOK_STEP: f64 = 0.25;
-
-/// Where heights of the skin come from.
-pub(super) enum Heights<'a> {
-    Samples(&'a [HeightSample]),
-    Map(&'a ShapeMap),
-}
 
 impl ForceDistribution {
     /// Takes the heights of the nodes where they are now.

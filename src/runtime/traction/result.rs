@@ -2,6 +2,14 @@
 
 use glam::DVec3;
 
+use crate::shape::ShapeMap;
+
+/// Where heights of the skin come from.
+pub(super) enum Heights<'a> {
+    Samples(&'a [HeightSample]),
+    Map(&'a ShapeMap),
+}
+
 /// How the search for the forces on the skin ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TractionStatus {

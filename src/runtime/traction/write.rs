@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use glam::DVec3;
 
 use super::result::LocalForces;
-use crate::track::report::{Field, Tracked, write_json_fields};
+use crate::track::{Field, Tracked, write_json_fields};
 
 /// Room for a line before its forces.
 const LINE: usize = 1 << 16;

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 
 use crate::constants::Constants;
-use crate::track::error::TrackError;
+use crate::track::TrackError;
 use domecast_elastic::{Compliance, ElasticDome, SurfaceField};
 
 /// Elements along the meridian: nodes a sixteenth of it apart, 1 mm on a dome of 10 mm radius.

@@ -1,5 +1,24 @@
 //! Forces on the skin from the dots' motion: pressure and shear by the elastic model of the bonded dome.
 //!
+//! [`ForceDistribution`] stands beside [`Tracker`](crate::track::Tracker) and, where heights are measured,
+//! [`ShapeFromColor`](crate::shape::ShapeFromColor).
+//!
+//! ```no_run
+//! use domecast_runtime::constants::Constants;
+//! use domecast_runtime::track::{CameraFrame, TrackOptions, Tracker};
+//! use domecast_runtime::traction::ForceDistribution;
+//!
+//! let constants = Constants::load("constants.json".as_ref())?;
+//! let mut tracker = Tracker::new(&constants, TrackOptions::default())?;
+//! let mut forces = ForceDistribution::new(&constants, None)?;
+//! let bytes = std::fs::read("frame.rgb")?;
+//! let tracked = tracker.track(0, &CameraFrame::new(640, 480, 3, &bytes)?);
+//! for dot in &forces.update(tracked, &[]).dots {
+//!     println!("{} N/mm2 at {}", dot.traction_n_mm2, dot.surface_mm);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! | file | what |
 //! |---|---|
 //! | `model` | what a traction on each node moves, and which pressures are likely |

@@ -3,14 +3,13 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::active_set::{ActiveSet, Ended, Rows};
-use super::heights::Heights;
 use super::model::{AXES, ElasticModel};
 use super::posterior::{Posterior, USUAL_DOT_SD_PX};
-use super::result::{DotTraction, HeightSample, LocalForces, TractionStatus};
+use super::result::{DotTraction, HeightSample, Heights, LocalForces, TractionStatus};
 use crate::constants::Constants;
 use crate::shape::ShapeMap;
-use crate::track::error::TrackError;
-use crate::track::report::Tracked;
+use crate::track::TrackError;
+use crate::track::Tracked;
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 

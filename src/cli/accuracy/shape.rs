@@ -21,7 +21,7 @@ const SETTINGS: [(&str, usize, usize); 6] = [
     ("two passes", 2, 2),
     ("default", 2, 3),
 ];
-/// The camera's noise, levels of 255, the deviation that the readings reckon with; its seed.
+/// The camera's noise, levels of 255, which the readings take as well; its seed.
 const NOISE_LEVELS: f64 = 2.0;
 const SEED: u64 = 27;
 /// What is drawn is this exact, px and grey levels, far below the noise.

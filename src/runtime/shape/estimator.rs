@@ -1,7 +1,6 @@
 //! The stages in their order, frame by frame.
 
 use glam::Vec3A;
-use rayon::prelude::*;
 
 use super::cells::{Cells, View};
 use super::deviation::Deviations;
@@ -263,7 +262,7 @@ impl ShapeFromColor {
     fn read_normals(&mut self) {
         let mut readings = std::mem::take(&mut self.readings);
         let width = self.cells.width;
-        let rows = readings.par_chunks_mut(width).zip(&self.view.spans).enumerate();
+        let rows = readings.chunks_mut(width).zip(&self.view.spans).enumerate();
         rows.for_each(|(row, (line, span))| {
             for column in span.clone() {
                 if self.is_stale[row * width + column] {

@@ -1,7 +1,6 @@
 //! The shape on the raw image's grid.
 
 use glam::{Vec3, Vec3A};
-use rayon::prelude::*;
 
 use super::cells::{Cells, View};
 use super::contact::{Chart, SkinContact};
@@ -228,8 +227,8 @@ impl ShapeMap {
         let (width, px) = (self.width, cells.px);
         let Self { cell_mm, cell_normal, cell_pressure, cell_sd_mm, .. } = self;
         let at = Drawn { width: cells.width, cell_mm, cell_normal, cell_pressure, cell_sd_mm };
-        let heights = self.height_mm.par_chunks_mut(width).zip(self.height_sd_mm.par_chunks_mut(width));
-        let others = self.normal.par_chunks_mut(width).zip(self.is_touched.par_chunks_mut(width));
+        let heights = self.height_mm.chunks_mut(width).zip(self.height_sd_mm.chunks_mut(width));
+        let others = self.normal.chunks_mut(width).zip(self.is_touched.chunks_mut(width));
         heights.zip(others).enumerate().for_each(|(y, ((heights, sds), (normals, touched)))| {
             let Some(span) = view.spans.get(y / px) else { return };
             for x in span.start * px..span.end * px {

@@ -14,7 +14,7 @@
 
 The number is `illuminate`'s: degrees that a normal is off for a grey level, at the 95th percentile to 60 degrees from the pole,
 exposed for the brightest place; here without what the dome throws at itself, the same for all. Counts of the black platforms
-must agree with the same number from `illuminate`'s own field of light to 5 %. For lights in the silicone it also says from which polar
+must agree with the same number from `illuminate`'s own field of light to 8 %. For lights in the silicone it also says from which polar
 angle on their wall hides the dome from the lens.
 """
 
@@ -32,7 +32,8 @@ from check_light_by_photons import BEFORE, BATCH, COLORS, Sensor, about, emitted
 RINGS, AZIMUTHS = 16, 24
 WHITE, BOUNCES, THROWS = 0.85, 12, 24
 FULL = 255.0
-AGREES = 0.05
+# most of what they differ by is the count's own noise, which makes the 95th percentile larger
+AGREES = 0.08
 # a wall before a light in the silicone, as thin as resin prints, and the light's body behind it, mm
 WALL_MM, BODY_MM, BODY_HEIGHT_MM = 0.6, 1.4, 1.4
 KINDS = ("black", "white", "clear", "edge", "silicone")

@@ -26,6 +26,8 @@ import trimesh
 BATCH = 500_000
 RINGS, AZIMUTHS = 12, 24
 SHARE, BOUND, SIGMAS = 0.1, 0.01, 4.0
+# a photon is followed through the sheet so often
+THROWS = 24
 # a photon's way ends this far before the sheet, whose seat is in the plane of its underside, mm
 BEFORE = 1e-4
 COLORS = {"red": 0, "green": 1, "blue": 2}
@@ -142,42 +144,52 @@ def through_air(sensor, points, ways):
     return ends[free, :2], ways[free]
 
 
+def in_sheet(generator, sensor, color, at, aside, cos, is_s, goes_up):
+    """Follows photons inside the sheet from the face they left; at each rise gives points and ways of those that enter the silicone."""
+    acrylic, silicone = (index_of(layer, color) for layer in sensor.layers)
+    for _ in range(THROWS):
+        at = moved(at, aside, cos, sensor.sheet_mm)
+        stays = (np.abs(at) <= sensor.half_sheet).all(axis=1)
+        at, aside, cos, is_s = at[stays], aside[stays], cos[stays], is_s[stays]
+        if not len(at):
+            return
+        in_foot = np.hypot(at[:, 0], at[:, 1]) <= sensor.rim
+        back, behind = face(generator, is_s, acrylic, np.where(in_foot & goes_up, silicone, 1.0), cos)
+        if goes_up:
+            into = ~back & in_foot
+            rise = behind[into]
+            way = np.column_stack([aside[into] * np.sqrt(np.maximum(1 - rise * rise, 0))[:, None], rise])
+            yield np.column_stack([at[into], np.full(into.sum(), -sensor.center_z)]), way
+        at, aside, cos, is_s = at[back], aside[back], cos[back], is_s[back]
+        goes_up = not goes_up
+
+
+def on_dome(sensor, start, way):
+    """Where ways from points about the dome's centre meet it, and how far up it that is, from rim to pole 0 to 1: rings of equal height
+    on a sphere have equal areas (Archimedes)."""
+    along = (start * way).sum(axis=1)
+    end = start + (-along + np.sqrt(np.maximum(along**2 - (start**2).sum(axis=1) + sensor.radius**2, 0)))[:, None] * way
+    low = -sensor.center_z / sensor.radius
+    return end, (end[:, 2] / sensor.radius - low) / (1 - low)
+
+
 def counted(generator, sensor, led, color, count):
     """Photons of a light that meet each bin of the dome: straight, and after being thrown back in the sheet."""
-    acrylic, silicone = (index_of(layer, color) for layer in sensor.layers)
+    acrylic = index_of(sensor.layers[0], color)
     points, ways, share = emitted(generator, sensor, led, count)
     at, ways = through_air(sensor, points, ways)
     is_s = generator.uniform(size=len(at)) < 0.5
     cos = ways[:, 2]
     aside = ways[:, :2] / np.maximum(np.linalg.norm(ways[:, :2], axis=1), 1e-300)[:, None]
     back, inside = face(generator, is_s, 1.0, acrylic, cos)
-    at, aside, cos, is_s = at[~back], aside[~back], inside[~back], is_s[~back]
-    hits, goes_up = [], True
-    for _ in range(24):
-        at = moved(at, aside, cos, sensor.sheet_mm)
-        stays = (np.abs(at) <= sensor.half_sheet).all(axis=1)
-        at, aside, cos, is_s = at[stays], aside[stays], cos[stays], is_s[stays]
-        if not len(at):
-            break
-        in_foot = np.hypot(at[:, 0], at[:, 1]) <= sensor.rim
-        back, behind = face(generator, is_s, acrylic, np.where(in_foot & goes_up, silicone, 1.0), cos)
-        if goes_up:
-            into = ~back & in_foot
-            hits.append(meet(sensor, at[into], aside[into], behind[into]))
-        at, aside, cos, is_s = at[back], aside[back], cos[back], is_s[back]
-        goes_up = not goes_up
+    at, aside, is_s = at[~back], aside[~back], is_s[~back]
+    hits = [binned(sensor, *into) for into in in_sheet(generator, sensor, color, at, aside, inside[~back], is_s, True)]
     nothing = np.zeros((RINGS, AZIMUTHS))
     return share * hits[0] if hits else nothing, share * sum(hits[1:], start=nothing)
 
 
-def meet(sensor, at, aside, cos):
-    way = np.column_stack([aside * np.sqrt(np.maximum(1 - cos * cos, 0))[:, None], cos])
-    start = np.column_stack([at, np.full(len(at), -sensor.center_z)])
-    along = (start * way).sum(axis=1)
-    end = start + (-along + np.sqrt(np.maximum(along**2 - (start**2).sum(axis=1) + sensor.radius**2, 0)))[:, None] * way
-    # rings of equal height on a sphere have equal areas (Archimedes)
-    low = -sensor.center_z / sensor.radius
-    level = (end[:, 2] / sensor.radius - low) / (1 - low)
+def binned(sensor, start, way):
+    end, level = on_dome(sensor, start, way)
     azimuth = np.degrees(np.arctan2(end[:, 1], end[:, 0])) % 360
     bins = [np.linspace(0, 1, RINGS + 1), np.linspace(0, 360, AZIMUTHS + 1)]
     return np.histogram2d(level, azimuth, bins=bins)[0]

@@ -72,24 +72,6 @@ CHANGES = [
     {"name": "off-b", "flux": {"r": 0.8, "g": 1.1, "b": 0.9}, "radius_mm": -0.1, "z_mm": 0.1, "tilt_deg": 2.0,
      "azimuth_deg": [-1.0, 1.0, 1.3, 0.3, -0.6, -1.2], "lambert": 0.15, "width": 0.85, "membrane": 0.9},
 ]
-def simulate(domecast, folder, file, level, objects):
-    if (folder / "truth.jsonl").exists():
-        return folder
-    light = json.loads((judge.ROOT / "designs/scenes/lit.json").read_text())["light"]
-    light["leds"]["level_per_mw_mm2"] = level
-    scene = {"version": 1, "name": folder.name, "design": str(file), "frames": {"count": 1, "rate_hz": 30},
-             "tolerance": {"px": 0.02, "grey": 0.5}, "light": light}
-    if objects:
-        scene["objects"] = objects
-        scene["contact"] = {"level": "linear", "element_mm": 0.5}
-    path = folder.with_suffix(".json")
-    path.write_text(json.dumps(scene))
-    judge.run(domecast, "simulate", path, "--out", folder, "--depth", "--quiet")
-    return folder
-
-
-def drawn(folder):
-    return cv2.imread(str(folder / "frame_0000.png"), cv2.IMREAD_COLOR).astype(float)
 
 
 def main():
@@ -119,15 +101,15 @@ def one(domecast, work, design, constants, change):
     dome = {"radius": optics["dome_radius_mm"], "center_z": optics.get("dome_center_z_mm", 0.0)}
     scale = dome["radius"] / 10
     label = f"{design}, {change['name']}"
-    rest = drawn(simulate(domecast, work / f"{file.stem}-rest", file, level, None))
+    rest = judge.drawn(judge.draw(domecast, work / f"{file.stem}-rest", file, level, None))
     still = work / f"{file.stem}-camera-rest.png"
     cv2.imwrite(str(still), judge.photograph(rest, 2))
     presses = {"ball": judge.ball(5 * scale, 18, 70, 0.45 * scale, dome), "small ball": judge.ball(2 * scale, 38, 250, 0.3 * scale, dome),
                "edge": judge.edge(0.3 * scale, dome), "nut": judge.nut(0.3 * scale, dome)}
     for name, objects in presses.items():
-        truth = simulate(domecast, work / f"{file.stem}-{name.replace(' ', '-')}", file, level, objects)
+        truth = judge.draw(domecast, work / f"{file.stem}-{name.replace(' ', '-')}", file, level, objects)
         frame = truth / "camera_frame.png"
-        cv2.imwrite(str(frame), judge.photograph(drawn(truth), 1))
+        cv2.imwrite(str(frame), judge.photograph(judge.drawn(truth), 1))
         rms = {}
         for kind, path in {"true": true, "design's": constants}.items():
             out = truth / f"shape-{kind[0]}"

@@ -80,21 +80,30 @@ def run(*words):
 
 
 def simulate(domecast, folder, design, objects):
+    """Frames of a press on a shipped design, or of rest, at the exposure of its own report."""
+    level = json.loads((folder.parent / design / "report/light.json").read_text())["level_per_mw_mm2"]
+    return draw(domecast, folder, ROOT / f"designs/{design}.json", level, objects, 0.5 if design != "picam-r20" else 1.0)
+
+
+def draw(domecast, folder, design, level, objects, element_mm=0.5):
     """Frames of a press, or of rest, without noise; made once."""
     if (folder / "truth.jsonl").exists():
         return folder
     light = json.loads((ROOT / "designs/scenes/lit.json").read_text())["light"]
-    report = folder.parent / design / "report/light.json"
-    light["leds"]["level_per_mw_mm2"] = json.loads(report.read_text())["level_per_mw_mm2"]
-    scene = {"version": 1, "name": folder.name, "design": str(ROOT / f"designs/{design}.json"),
+    light["leds"]["level_per_mw_mm2"] = level
+    scene = {"version": 1, "name": folder.name, "design": str(design),
              "frames": {"count": 1, "rate_hz": 30}, "tolerance": {"px": 0.02, "grey": 0.5}, "light": light}
     if objects:
         scene["objects"] = objects
-        scene["contact"] = {"level": "linear", "element_mm": 0.5 if design != "picam-r20" else 1.0}
+        scene["contact"] = {"level": "linear", "element_mm": element_mm}
     file = folder.with_suffix(".json")
     file.write_text(json.dumps(scene))
     run(domecast, "simulate", file, "--out", folder, "--depth", "--quiet")
     return folder
+
+
+def drawn(folder):
+    return cv2.imread(str(folder / "frame_0000.png"), cv2.IMREAD_COLOR).astype(float)
 
 
 def photograph(picture, seed, jpeg=True, noise=NOISE_LEVELS):
@@ -131,10 +140,9 @@ def judge(domecast, work, design, name, objects, dome, constants):
     folder = work / f"{design}-{name.replace(' ', '-')}"
     truth = simulate(domecast, folder, design, objects)
     rest = simulate(domecast, work / f"{design}-rest", design, None)
-    read = lambda where: cv2.imread(str(where / "frame_0000.png"), cv2.IMREAD_COLOR).astype(float)
     frame, still = folder / "camera_frame.png", folder / "camera_rest.png"
-    cv2.imwrite(str(frame), photograph(read(truth), 1))
-    cv2.imwrite(str(still), photograph(read(rest), 2))
+    cv2.imwrite(str(frame), photograph(drawn(truth), 1))
+    cv2.imwrite(str(still), photograph(drawn(rest), 2))
     shape = folder / "shape"
     line = track(domecast, frame, still, constants, shape)
     e = errors(truth, shape, dome)
@@ -159,9 +167,9 @@ def judge(domecast, work, design, name, objects, dome, constants):
     pressure = np.load(truth / "frame_0000.pressure.npy")
     there, found = pressure > 0.02 * np.nanmax(pressure), np.load(shape / "frame_0000.contact.npy") > 0
     overlap = (there & found).sum() / max(1, (there | found).sum())
-    drawn = json.loads((truth / "truth.jsonl").read_text().splitlines()[0])["contact"]
-    away = np.linalg.norm(np.subtract(line["contact"]["point_mm"], drawn["point_mm"]))
-    detail = f"{away:.3f} mm; IoU {overlap:.2f}, {line['contact']['area_mm2']:.2f} of {drawn['area_mm2']:.2f} mm2"
+    contact = json.loads((truth / "truth.jsonl").read_text().splitlines()[0])["contact"]
+    away = np.linalg.norm(np.subtract(line["contact"]["point_mm"], contact["point_mm"]))
+    detail = f"{away:.3f} mm; IoU {overlap:.2f}, {line['contact']['area_mm2']:.2f} of {contact['area_mm2']:.2f} mm2"
     check(f"{label}: centre of the touch", away <= 0.1 or "ball" not in name, detail)
     outline = np.array(line["contact"]["outline_px"], np.float32)
     check(f"{label}: outline", cv2.contourArea(outline) > 0 and line["shape"]["status"] == "ok",

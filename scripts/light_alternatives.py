@@ -27,10 +27,10 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from check_light_by_photons import BEFORE, BATCH, COLORS, Sensor, about, emitted, face, index_of, moved
+from check_light_by_photons import BEFORE, BATCH, COLORS, Sensor, about, emitted, face, in_sheet, index_of, on_dome
 
 RINGS, AZIMUTHS = 16, 24
-WHITE, BOUNCES, THROWS = 0.85, 12, 24
+WHITE, BOUNCES = 0.85, 12
 FULL = 255.0
 # most of what they differ by is the count's own noise, which makes the 95th percentile larger
 AGREES = 0.08
@@ -52,43 +52,19 @@ class Count:
     """Vector irradiance of bins of equal area of the dome: the sum of flux times way over cosine."""
 
     def __init__(self, sensor):
-        self.sensor, self.low = sensor, -sensor.center_z / sensor.radius
+        self.sensor = sensor
         self.area = 2 * math.pi * sensor.radius * (sensor.radius + sensor.center_z) / (RINGS * AZIMUTHS)
         self.sum = np.zeros((RINGS * AZIMUTHS, 3))
 
     def add(self, start, way):
         """Photons from points in the silicone (about the dome's centre) that meet the dome on ways that rise or fall."""
-        along, radius = (start * way).sum(axis=1), self.sensor.radius
-        end = start + (-along + np.sqrt(np.maximum(along**2 - (start**2).sum(axis=1) + radius**2, 0)))[:, None] * way
-        level = (end[:, 2] / radius - self.low) / (1 - self.low)
+        end, level = on_dome(self.sensor, start, way)
         on = (level > 0) & (level < 1)
-        end, way, level = end[on] / radius, way[on], level[on]
+        end, way, level = end[on] / self.sensor.radius, way[on], level[on]
         cosine = np.maximum((end * way).sum(axis=1), 0.02)
         ring = (level * RINGS).astype(int)
         turn = (np.degrees(np.arctan2(end[:, 1], end[:, 0])) % 360 / 360 * AZIMUTHS).astype(int) % AZIMUTHS
         np.add.at(self.sum, ring * AZIMUTHS + turn, way / cosine[:, None])
-
-
-def in_sheet(generator, count, color, at, aside, cos, goes_up):
-    """Follows photons inside the sheet until they leave it; what enters the silicone is counted. Points are on the face they left."""
-    sensor = count.sensor
-    acrylic, silicone = (index_of(layer, color) for layer in sensor.layers)
-    is_s = generator.uniform(size=len(at)) < 0.5
-    for _ in range(THROWS):
-        at = moved(at, aside, cos, sensor.sheet_mm)
-        stays = (np.abs(at) <= sensor.half_sheet).all(axis=1)
-        at, aside, cos, is_s = at[stays], aside[stays], cos[stays], is_s[stays]
-        if not len(at):
-            return
-        in_foot = np.hypot(at[:, 0], at[:, 1]) <= sensor.rim
-        back, behind = face(generator, is_s, acrylic, np.where(in_foot & goes_up, silicone, 1.0), cos)
-        if goes_up:
-            into = ~back & in_foot
-            sine = np.sqrt(np.maximum(1 - behind[into] ** 2, 0))
-            way = np.column_stack([aside[into] * sine[:, None], behind[into]])
-            count.add(np.column_stack([at[into], np.full(into.sum(), -sensor.center_z)]), way)
-        at, aside, cos, is_s = at[back], aside[back], cos[back], is_s[back]
-        goes_up = not goes_up
 
 
 def below(generator, count, led, color, kind):
@@ -115,7 +91,9 @@ def below(generator, count, led, color, kind):
         aside = ways[free, :2] / np.maximum(np.linalg.norm(ways[free, :2], axis=1), 1e-300)[:, None]
         is_s = generator.uniform(size=len(cos)) < 0.5
         back, inside = face(generator, is_s, 1.0, acrylic, cos)
-        in_sheet(generator, count, color, ends[free][~back, :2], aside[~back], inside[~back], True)
+        entered = in_sheet(generator, sensor, color, ends[free][~back, :2], aside[~back], inside[~back], is_s[~back], True)
+        for into in entered:
+            count.add(*into)
         if kind != "white":
             break
         mirrored = ways[free][back] * [1, 1, -1]
@@ -158,7 +136,10 @@ def at_edge(generator, count, led, color):
         # as if it came from the face behind, at the same slope
         travelled = height[some] if goes_up else sensor.sheet_mm - height[some]
         start = at[some] - aside * (travelled * np.sqrt(1 - cos * cos) / cos)[:, None]
-        in_sheet(generator, count, color, start, aside, cos, goes_up)
+        # the edge's face and the sheet's lie across each other: polarised anew
+        is_s = generator.uniform(size=len(start)) < 0.5
+        for entered in in_sheet(generator, sensor, color, start, aside, cos, is_s, goes_up):
+            count.add(*entered)
     return share
 
 

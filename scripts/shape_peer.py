@@ -134,15 +134,14 @@ def main():
         optics = json.loads(constants.read_text())["optics"]
         dome = {"radius": optics["dome_radius_mm"], "center_z": optics.get("dome_center_z_mm", 0.0)}
         still = judge.simulate(domecast, work / f"{design}-rest", design, None)
-        read = lambda where: cv2.imread(str(where / "frame_0000.png"), cv2.IMREAD_COLOR).astype(float)
-        rest = np.mean([judge.photograph(read(still), seed).astype(float) for seed in range(20, 28)], axis=0)
+        rest = np.mean([judge.photograph(judge.drawn(still), seed).astype(float) for seed in range(20, 28)], axis=0)
         tables = {"ball": Table(rest, False), "all": Table(rest, True)}
         for index, (radius, depth, polar, azimuth) in enumerate(BALLS):
             scale = dome["radius"] / 10
             press = judge.ball(radius * scale, polar, azimuth, depth * scale, dome)
             truth = judge.simulate(domecast, work / f"{design}-table-{index}", design, press)
             for table in tables.values():
-                table.learn(judge.photograph(read(truth), 100 + index).astype(float), truth, dome)
+                table.learn(judge.photograph(judge.drawn(truth), 100 + index).astype(float), truth, dome)
         for table in tables.values():
             table.finish()
         ratios = {}
@@ -151,7 +150,7 @@ def main():
             truth = work / f"{design}-{name.replace(' ', '-')}"
             ours = judge.errors(truth, truth / "shape", dome)
             for kind, table in tables.items():
-                off = table.read(judge.photograph(read(truth), 1).astype(float), truth, dome) - heights(truth, dome)
+                off = table.read(judge.photograph(judge.drawn(truth), 1).astype(float), truth, dome) - heights(truth, dome)
                 for limit in (45, 60):
                     here = ours["known"] & (ours["polar"] <= limit)
                     peer, own = [np.sqrt(np.mean(e[here] ** 2)) for e in (off, ours["off"])]

@@ -1,7 +1,8 @@
 //! Forces on the skin: what the constants must say, and that nothing is allocated once it runs.
 
+use domecast::shape::ShapeMap;
 use domecast::track::TrackOptions;
-use domecast::traction::{ForceDistribution, TractionStatus};
+use domecast::traction::{ForceDistribution, PressureMap, TractionStatus};
 use glam::DVec3;
 
 use super::render::{Picture, still};
@@ -53,4 +54,8 @@ fn forces_are_finite_whatever_is_seen_and_allocate_nothing_once_they_run() {
     run(0..6);
     let counted = allocation_counter::measure(|| run(6..15));
     assert_eq!(counted.count_total, 0);
+    // a map of no frame has no pixels to draw
+    let mut pressure = PressureMap::default();
+    forces.draw_pressure(&ShapeMap::default(), &mut pressure);
+    assert!(pressure.pressure_n_mm2.is_empty());
 }

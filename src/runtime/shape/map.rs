@@ -44,7 +44,10 @@ pub struct ShapeMap {
     pub status: Option<SolveStatus>,
     /// The same for each cell, before it is drawn.
     cell_mm: Vec<f32>,
+    /// Pixels along a cell, cells across and down.
+    cell_px: usize,
     cells_across: usize,
+    cells_down: usize,
     cell_normal: Vec<Vec3A>,
     cell_point: Vec<Vec3A>,
     /// Pressure over that at the edge of the touch.
@@ -67,7 +70,9 @@ impl ShapeMap {
             contact: None,
             status: None,
             cell_mm: vec![f32::NAN; cells.count()],
+            cell_px: cells.px,
             cells_across: cells.width,
+            cells_down: cells.height,
             cell_normal: vec![Vec3A::NAN; cells.count()],
             cell_point: vec![Vec3A::NAN; cells.count()],
             cell_pressure: vec![0.0; cells.count()],
@@ -129,8 +134,7 @@ impl ShapeMap {
     /// Draws values of cells, linear between them, where the map has a height.
     #[cfg(feature = "traction")]
     pub(crate) fn draw_cells(&self, values: &[f32], out: &mut [f32]) {
-        let px = self.width / self.cells_across.max(1);
-        let (columns, rows) = (self.cells_across, self.cell_mm.len() / self.cells_across);
+        let (px, columns, rows) = (self.cell_px, self.cells_across, self.cells_down);
         let known = self.height_mm.iter().zip(out).enumerate().filter(|(_, (height, _))| height.is_finite());
         for (pixel, (_, out)) in known {
             let (x, y) = (pixel % self.width, pixel / self.width);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Which mark is which, in frames that domecast did not draw: named scenarios, each with what may be said of it.
 
-    python3 scripts/check_identities.py target/release/domecast output/thumb24 [output/digit-rigid ...] [--only NAME]
+    python3 scripts/check_identities.py target/release/domecast output/thumb24 [output/digit-rigid ...] [--only NAME] [--random N] [--seed S]
 
 For each build frames are drawn by scripts/draw_frames.py (its own projector and its own skin), `domecast track` reads them
 with the build's constants, and every frame is held to the truth:
@@ -43,6 +43,12 @@ def shear(sensor, way):
     """The skin pulled sideways, the rim held."""
     height = sensor.radius + sensor.center[2]
     return lambda points: points + np.asarray(way) * np.clip(points[..., 2:] / height, 0, 1)
+
+
+def pull(sensor, center, way, width):
+    """A patch of the skin pulled along the dome, the more the nearer to its middle."""
+    center = np.asarray(center, float)
+    return lambda points: points + np.asarray(way) * np.exp(-((points - center)**2).sum(-1) / (2 * width**2))[..., None]
 
 
 def slip(sensor, axis, angle):
@@ -222,13 +228,59 @@ def scenarios(build):
             yield f"9 px of motion blur in frame {at}", blurred(at, way)
 
 
+def random_skin(build, random):
+    """A skin that is at rest, pressed in, pulled at a patch, sheared, or two of these at once."""
+    sensor, r = build.sensor, build.sensor.radius
+    pitch = r * build.pitch_rad()
+
+    def one():
+        place = build.at(random.uniform(0, 50), random.uniform(0, 360))
+        kind = random.integers(4)
+        if kind <= 1:
+            return dent(sensor, place, r * random.uniform(0.05, 0.22), r * random.uniform(0.15, 0.4))
+        along = np.cross(place - sensor.center, random.normal(size=3))
+        way = along / np.linalg.norm(along) * pitch * random.uniform(0.3, 1.5)
+        return pull(sensor, place, way, r * random.uniform(0.12, 0.4)) if kind == 2 else shear(sensor, way * [1, 1, 0])
+
+    skins = [one() for _ in range(random.choice([0, 1, 1, 2]))]
+
+    def skin(points):
+        for change in skins:
+            points = change(points)
+        return points
+    return skin
+
+
+def random_touches(build, count, seed):
+    """Frames that have nothing to do with each other but their sensor: whatever may jump, jumps."""
+    global failed
+    random = np.random.default_rng(seed)
+    drawn = [build.sensor.draw(seed=i, skin=random_skin(build, random)) for i in range(count)]
+    lines, _ = build.track([frame for frame, _ in drawn])
+    wrong, named, seen = [], 0, 0
+    for i, (line, (_, truth)) in enumerate(zip(lines, drawn)):
+        for index, dot in enumerate(line["black_dots"]):
+            if dot["state"] != "ok":
+                named += 1
+                continue
+            seen += 1
+            off = np.hypot(*(np.array(dot["centroid_px"]) - truth[index]))
+            if off > 0.4 * build.spacing[index]:
+                wrong.append((i, index, round(float(off), 1)))
+    failed += bool(wrong) or len(lines) != count
+    print(f"{'FAIL' if wrong else 'ok  '} {count} random touches, seed {seed}: {len(wrong)} swapped of {seen}, {named} withheld "
+          f"{wrong[:12]}", flush=True)
+
+
 def main(program, *builds):
-    only = None
+    given = {"--only": None, "--random": 0, "--seed": 1}
     builds = list(builds)
-    if "--only" in builds:
-        at = builds.index("--only")
-        only = builds[at + 1]
-        del builds[at:at + 2]
+    for option in given:
+        if option in builds:
+            at = builds.index(option)
+            given[option] = type(given[option] or "")(builds[at + 1])
+            del builds[at:at + 2]
+    only, count, seed = given["--only"], int(given["--random"]), int(given["--seed"])
     for folder in builds:
         print(folder)
         build = Build(program, folder)
@@ -240,6 +292,8 @@ def main(program, *builds):
         for name, run in scenarios(build):
             if only is None or only in name:
                 run()
+        if count:
+            random_touches(build, count, seed)
     print("every mark is itself, or named" if failed == 0 else f"{failed} faults")
     return 1 if failed else 0
 

@@ -201,9 +201,9 @@ fn long_a_measurement_goes_into_the_report() {
     .expect("JSON");
     let chapter = page.split("<section id=\"accuracy\">").nth(1).expect("a chapter");
     let chapter = chapter.split("</section>").next().expect("its end");
-    let ladders = measured["ladders"].as_array().expect("a list").len();
-    assert!(ladders >= 9, "{ladders}");
-    assert_eq!(chapter.matches("<img ").count(), ladders);
+    let sweeps = measured["sweeps"].as_array().expect("a list").len();
+    assert!(sweeps >= 9, "{sweeps}");
+    assert_eq!(chapter.matches("<img ").count(), sweeps);
     assert!(page.contains("href=\"#accuracy\"") && page.len() < 5_000_000, "{} bytes", page.len());
 
     let refused = |arguments: &[&str], part: &str| {

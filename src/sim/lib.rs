@@ -45,7 +45,7 @@ pub use raster::edges;
 pub use raster::frame::{Frame, Image8};
 pub use raster::sensor_state::SensorState;
 pub use scene::Scene;
-pub use work::Work;
+pub use work::{FollowedRays, Work};
 
 #[cfg(test)]
 mod tests;

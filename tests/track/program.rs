@@ -157,7 +157,6 @@ fn bad_calls_are_told_with_their_exit_codes() {
         (&["-", "--constants", "constants.json"], 1, "no frame"),
         (&["a.png"], 2, "constants"),
         (&["-", "--raw", "640", "--constants", "constants.json"], 2, "WIDTHxHEIGHT"),
-        (&["a.png", "--thresholds", "200,60", "--constants", "constants.json"], 2, "levels"),
     ] {
         let output = run(folder.path(), arguments, b"");
         let told = String::from_utf8_lossy(&output.stderr).into_owned();

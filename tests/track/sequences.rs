@@ -1,7 +1,7 @@
 //! Many frames: missing, hidden and false dots, fast motion, long runs.
 
 use domecast::numeric::rotation_from_vector;
-use domecast::track::{MarkState, Reference, Steps, Thresholds, TrackOptions};
+use domecast::track::{MarkState, Reference, TrackOptions};
 use glam::{DVec2, DVec3};
 
 use super::render::{Picture, still};
@@ -156,25 +156,6 @@ fn a_platform_that_jumps_by_half_a_pitch_is_followed() {
         let s = score(tracked, &drawn);
         assert_eq!((s.ok, names(tracked)), (s.wanted, vec![]), "frame {number}");
         assert!(s.worst_px < 0.15 && s.markers_px < 0.1);
-    }
-}
-
-#[test]
-fn the_papers_steps_serve_too() {
-    let papers = TrackOptions {
-        thresholds: Thresholds::Fixed { black: 90, white: 200 },
-        steps: Steps { blur: true, sharpen: true, open: true },
-        search_every: 1,
-        ..TrackOptions::default()
-    };
-    let mut tracker = tracker(papers);
-    for number in 0..4_u64 {
-        let drawn =
-            drawn(&Picture { seed: number, ..still(pose([0.0, 0.0, -0.3 * number as f64], [0.0; 3])) });
-        let tracked = tracker.track(number, &frame(&drawn.bytes));
-        let s = score(tracked, &drawn);
-        assert_eq!((s.ok, names(tracked), tracked.searched), (s.wanted, vec![], true), "frame {number}");
-        assert!(tracked.false_dots.is_empty() && s.worst_px < 0.15);
     }
 }
 

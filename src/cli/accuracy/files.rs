@@ -29,7 +29,7 @@ pub fn accuracy_files(accuracy: &Accuracy) -> Vec<(String, Vec<u8>)> {
 /// A row for each sample.
 pub fn csv(accuracy: &Accuracy) -> String {
     let mut text = String::from(
-        "ladder,rung,way,label,dial,max_error,rms_error,unit,median_s,lower_quartile_s,upper_quartile_s,runs,\
+        "sweep,sample,method,label,setting,max_error,rms_error,unit,median_s,lower_quartile_s,upper_quartile_s,runs,\
          per_item_s,item,dominated,in_use,meets\n",
     );
     for sweep in &accuracy.sweeps {

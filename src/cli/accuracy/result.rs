@@ -60,7 +60,6 @@ pub struct Accuracy {
     /// The settings in use.
     pub settings: Vec<SettingRecord>,
     /// The sweeps.
-    #[serde(rename = "ladders")]
     pub sweeps: Vec<Sweep>,
     /// What the errors come to.
     pub budgets: Vec<ErrorBudget>,

@@ -8,12 +8,10 @@ use super::clock::RunTime;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SweepSample {
     /// The method, where a sweep compares several: `newton`; empty where there is one.
-    #[serde(rename = "way")]
     pub method: &'static str,
     /// What this sample is, in a few words.
     pub label: String,
     /// The setting's value: a tolerance, a number of steps, a count.
-    #[serde(rename = "dial")]
     pub setting: f64,
     /// Largest error over the work of the design.
     pub max_error: f64,
@@ -82,7 +80,6 @@ pub struct Sweep {
     /// What is computed.
     pub title: String,
     /// The setting, with its unit.
-    #[serde(rename = "dial")]
     pub setting: &'static str,
     /// What the error is.
     pub error: &'static str,
@@ -101,7 +98,6 @@ pub struct Sweep {
     /// The measured exponent or order, median over neighbouring samples above the floor.
     pub observed: Option<f64>,
     /// The samples, from crude to exact, method by method.
-    #[serde(rename = "rungs")]
     pub samples: Vec<SweepSample>,
     /// The sample that builds of this design use.
     pub in_use: Option<usize>,
@@ -110,7 +106,6 @@ pub struct Sweep {
     /// The cheapest sample that gives what is asked.
     pub meets: Option<usize>,
     /// The conclusion, in a sentence.
-    #[serde(rename = "says")]
     pub conclusion: String,
 }
 

@@ -4,22 +4,12 @@ use super::clock::{TimeLimit, time_again};
 use super::frames::Sequence;
 use super::sweep::{Law, Sweep, SweepSample, sizes};
 use domecast_runtime::constants::Constants;
-use domecast_runtime::track::{CameraFrame, Channel, MarkState, Steps, Thresholds, TrackOptions, Tracker};
+use domecast_runtime::track::{CameraFrame, Channel, MarkState, TrackOptions, Tracker};
 
 /// The sweep of options; `None` where the frames have no pictures or the constants fit no tracker.
 pub fn sweep(constants: &Constants, frames: &Sequence, time_limit: TimeLimit) -> Option<Sweep> {
     let plain = TrackOptions::default();
-    let options: [(&str, TrackOptions); 5] = [
-        (
-            "the paper's filters and levels on every frame as a whole",
-            TrackOptions {
-                channel: Channel::Luma,
-                thresholds: Thresholds::Fixed { black: 60, white: 200 },
-                steps: Steps { blur: true, sharpen: true, open: true },
-                search_every: 1,
-                ..plain
-            },
-        ),
+    let options: [(&str, TrackOptions); 4] = [
         ("every frame searched as a whole", TrackOptions { search_every: 1, ..plain }),
         ("green alone", TrackOptions { channel: Channel::Green, ..plain }),
         ("points only, searched where one is lost", TrackOptions { search_every: 0, ..plain }),
@@ -61,7 +51,7 @@ pub fn sweep(constants: &Constants, frames: &Sequence, time_limit: TimeLimit) ->
             }
         });
         samples.push(SweepSample {
-            method: ["paper", "whole", "green", "points", "default"][index],
+            method: ["whole", "green", "points", "default"][index],
             label: label.to_owned(),
             setting: index as f64 + 1.0,
             max_error,

@@ -291,10 +291,10 @@ fn ratios(known: &Known, level: Level) -> Option<[f64; 2]> {
         100.0 * (state.wrench.force_n.length() / known.force_n.length() - 1.0),
         off_mm / known.elastomer.dome_radius_mm
     );
-    let told = state.deviation;
+    let stated = state.deviation;
     Some([
-        told.force_n / off_n.max(0.01 * known.force_n.length()),
-        told.displacement_mm / off_mm.max(0.01 * whole_mm),
+        stated.force_n / off_n.max(0.01 * known.force_n.length()),
+        stated.displacement_mm / off_mm.max(0.01 * whole_mm),
     ])
 }
 

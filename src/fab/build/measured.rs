@@ -8,6 +8,11 @@ use crate::hash::sha256_hex;
 use crate::report::MEASURED;
 use domecast_design::{Design, DesignError};
 
+/// Whether a measurement has what the report shows of it.
+fn has_sweeps(json: &[u8]) -> bool {
+    serde_json::from_slice::<serde_json::Value>(json).is_ok_and(|all| all["sweeps"].is_array())
+}
+
 /// The files of one measurement, whole and of the design that is built.
 #[derive(Debug, Clone)]
 pub struct Measured {
@@ -47,6 +52,9 @@ impl Measured {
             let bytes = fs::read(dir.join(&file.path)).map_err(|error| bad(error.to_string()))?;
             if !file.is_of(&bytes) {
                 return Err(bad("changed since it was measured (its hash differs)".into()));
+            }
+            if file.path == "accuracy.json" && !has_sweeps(&bytes) {
+                return Err(bad("has no list `sweeps`: another version of domecast wrote it".into()));
             }
             files.push((format!("{MEASURED}/{}", file.path), bytes));
         }

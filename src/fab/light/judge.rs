@@ -41,7 +41,7 @@ pub(super) fn require(design: &Design, report: &LightReport) -> Result<(), Desig
             field,
             if follows { json!(leds.center_z_mm) } else { json!(leds.radiant_flux_mw) },
             format!(
-                "the dome is dark: its median is {} of 255 with the camera's exposure, and dots on it cannot be told from it",
+                "the dome is dark: its median is {} of 255 with the camera's exposure, and dots on it cannot be distinguished from it",
                 typeset(dome.median_level)
             ),
             format!("a median of at least {}", typeset(MIN_DOME_LEVEL)),
@@ -181,7 +181,7 @@ pub(super) fn warnings(design: &Design, report: &LightReport) -> Vec<(String, St
         warn(
             "leds",
             format!(
-                "one place in twenty of the dome in view is darker than {} of 255: dots there cannot be told from it",
+                "one place in twenty of the dome in view is darker than {} of 255: dots there cannot be distinguished from it",
                 typeset(dome.percentile_5_level)
             ),
         );

@@ -19,7 +19,7 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Option<Html> {
     let all: Value = serde_json::from_slice(bytes).ok()?;
     let machine = &all["machine"];
     let (mut rows, mut pictures) = (Vec::new(), Html::default());
-    for sweep in all["ladders"].as_array()? {
+    for sweep in all["sweeps"].as_array()? {
         rows.push(row(sweep));
         let (name, title) = (word(&sweep["name"]), word(&sweep["title"]));
         let shown = subject.drawn(&format!("{MEASURED}/{name}.svg"), &format!("{title}: error over time"));
@@ -53,7 +53,7 @@ pub(super) fn chapter(subject: &ReportSubject<'_>) -> Option<Html> {
 }
 
 fn row(sweep: &Value) -> Vec<Html> {
-    let sample = |which: &str| sweep["rungs"].get(usize::try_from(sweep[which].as_u64()?).ok()?);
+    let sample = |which: &str| sweep["samples"].get(usize::try_from(sweep[which].as_u64()?).ok()?);
     let or_none = |text: Option<String>| Html::from(text.unwrap_or_else(|| "–".into()));
     let label = |sample: Option<&Value>| or_none(sample.map(|sample| word(&sample["label"]).to_owned()));
     let amount = |value: &Value| Some(format!("{} {}", significant(value.as_f64()?), word(&sweep["unit"])));

@@ -56,6 +56,7 @@ mod start;
 pub use disc::{DiscImage, Marker, outline_centroid_offset};
 pub use error::PoseError;
 pub use estimate::{PoseEstimate, PoseOptions, Sighting, displacement_from_motion};
+pub use refine::refine_pose;
 pub use solver::{MAX_MARKERS, PoseSolver};
 
 #[cfg(test)]

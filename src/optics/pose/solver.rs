@@ -189,7 +189,10 @@ impl PoseSolver {
             let start = self.start_pose(start);
             let fit = match &mut tangent_residuals {
                 Some(residuals) => refine(residuals, start, far, known),
-                None => refine(&mut PixelResiduals { optics: &self.optics, seen }, start, far, known),
+                None => {
+                    let (optics, seen) = (&mut self.optics.clone(), seen.iter().copied());
+                    refine(&mut PixelResiduals { optics, seen }, start, far, known)
+                }
             };
             fit.map_err(|error| limit = limit.or(Some(error))).ok()
         };

@@ -41,18 +41,17 @@
 //! # The steps, and what each buys
 //!
 //! The paper (arXiv 2303.03093) undistorts, blurs, masks, sharpens and greys every frame as a whole, thresholds it
-//! twice, follows the black markers by optical flow and solves PnP on the white ones. The same steps are here, each
-//! where it pays:
+//! twice, follows the black markers by optical flow and solves PnP on the white ones. Its steps are here where they pay:
 //!
 //! | paper | here | why |
 //! |---|---|---|
 //! | undistort the frame | lens and layers on *points* (`optics`); the frame only if asked for ([`Undistorted`]) | a remapped frame is interpolated, which costs time for every pixel and blurs; points are exact |
 //! | Gaussian blur | only before the search of the whole frame | a centroid over a hundred grey pixels is the better filter, and a blur moves none |
 //! | circular mask | its pixels found once, as row spans of the raw frame | the same pixels, without touching a frame |
-//! | sharpen | on request ([`Steps::sharpen`]) | it lifts thresholded edges, but white noise five times (the root of 29); half-height levels need none |
+//! | sharpen | none | it lifts thresholded edges, but white noise five times (the root of 29); half-height levels need none |
 //! | grey | luma unless asked otherwise ([`Channel`]) | colour filters and JPEG blur single channels: with everything on, dots are 0.025 px off in luma, 0.061 px in green. Green alone is free of dispersion, which shifts luma by 0.006 px on average |
-//! | low / high threshold | half way between local ground and mark ([`Thresholds`]); the paper's fixed ones on request | an edge at half height is where the outline is, whatever the light |
-//! | morphology | on request; else blobs are judged by area and fullness | opening eats at the edge of dots that are seven pixels wide |
+//! | low / high threshold | half way between local ground and mark | an edge at half height is where the outline is, whatever the light |
+//! | morphology | none: blobs are judged by area and fullness | opening eats at the edge of dots that are seven pixels wide |
 //! | components, centroids | the same in the search; then grey-weighted centroids against the local ground | a binary centroid has whole pixels to count; a grey one of a 7 px dot is good to 0.02 px |
 //! | pyramidal Lucas-Kanade | where the pose and the last frame put each dot, then its centroid | flow drifts, centroids do not; the platform's part of the motion is known exactly from the white markers. Flow doubled the time of a frame and found one dot of 20,000 more |
 //! | solvePnP | least squares on raw pixels through lens, layers and disc | plain PnP is biased by millimetres behind a sheet |
@@ -76,7 +75,7 @@ pub use identities::{CameraTurn, MAX_FALSE_DOTS};
 pub use marks::MarkState;
 pub(crate) use marks::marker_in_still;
 pub use meter::{MarkerCentroid, MeasuredWrench, WrenchMeter};
-pub use options::{Channel, MIN_MARKER_RISE_LEVELS, Reference, Steps, Thresholds, TrackOptions};
+pub use options::{Channel, MIN_MARKER_RISE_LEVELS, Reference, TrackOptions};
 pub use report::{
     CSV_HEADER, DOTS_CSV_HEADER, DotResult, Field, MarkerResult, Problem, Problems, RECORD_BYTES, Tracked,
     write_csv, write_dots_csv, write_json, write_json_fields, write_record,

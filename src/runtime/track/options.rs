@@ -19,21 +19,6 @@ pub enum Channel {
     Luma,
 }
 
-/// How marks are separated from the ground when the whole frame is searched.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Thresholds {
-    /// Half way between the ground and the marks of each neighbourhood.
-    #[default]
-    Adaptive,
-    /// The paper's: black below one level, white above another, the same all over the frame.
-    Fixed {
-        /// A pixel below is black.
-        black: u8,
-        /// A pixel above is white.
-        white: u8,
-    },
-}
-
 /// Where displacements and wrenches are counted from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Reference {
@@ -44,32 +29,11 @@ pub enum Reference {
     Frames(u32),
 }
 
-/// Steps of the paper on the frame that is searched as a whole.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Steps {
-    /// Binomial blur (3 x 3): noise of single pixels makes no blobs then.
-    pub blur: bool,
-    /// Sharpening (3 x 3) after it.
-    pub sharpen: bool,
-    /// Opening (3 x 3) of the thresholded frame.
-    pub open: bool,
-}
-
-impl Default for Steps {
-    fn default() -> Self {
-        Self { blur: true, sharpen: false, open: false }
-    }
-}
-
 /// Settings of a tracker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackOptions {
     /// The channel that marks are measured in.
     pub channel: Channel,
-    /// How marks are separated from the ground when the whole frame is searched.
-    pub thresholds: Thresholds,
-    /// Steps of that search.
-    pub steps: Steps,
     /// Where displacements and wrenches are counted from.
     pub reference: Reference,
     /// Largest rms of the white markers' residuals that is still a pose, px. Above what the constants' own tolerances
@@ -91,8 +55,6 @@ impl Default for TrackOptions {
     fn default() -> Self {
         Self {
             channel: Channel::Luma,
-            thresholds: Thresholds::Adaptive,
-            steps: Steps::default(),
             reference: Reference::Constants,
             max_residual_px: 2.0,
             max_misplaced: 0.5,

@@ -7,7 +7,7 @@ use super::error::TrackError;
 use super::frame::{CameraFrame, ExposureMeter, Plane, sharpness};
 use super::identities::{DotFrame, DotIdentities, MarkerFrame, MarkerIdentities};
 use super::model::SensorModel;
-use super::options::{Thresholds, TrackOptions};
+use super::options::TrackOptions;
 use super::pose::PoseFinder;
 use super::report::{FrameFindings, Problem, Reporter, Tracked};
 use super::wrench::{DotDisplacements, Springs, WrenchEstimator};
@@ -141,10 +141,6 @@ impl Tracker {
         let marker_frame = MarkerFrame {
             plane: &plane,
             models: &model.markers,
-            white: match self.options.thresholds {
-                Thresholds::Adaptive => None,
-                Thresholds::Fixed { white, .. } => Some(white),
-            },
             reach_px: model.dots.first().map_or(MARKER_REACH_PX, |d| MARKER_REACH * d.spacing_px),
         };
         self.pose.find(&marker_frame, model, &mut self.markers);

@@ -130,7 +130,7 @@ impl ActiveSet {
         for slot in 0..self.active.len() {
             self.enter(rows, slot);
         }
-        let mut ended = self.settle(rows);
+        let mut ended = self.solve_active(rows);
         for _ in 0..MAX_STEPS {
             let best = self.best(rows);
             if best[0].is_none() {
@@ -143,7 +143,7 @@ impl ActiveSet {
                 self.active.push(node);
                 self.enter(rows, self.active.len() - 1);
             }
-            ended = self.settle(rows);
+            ended = self.solve_active(rows);
         }
         Ended::Bound
     }
@@ -189,7 +189,7 @@ impl ActiveSet {
     }
 
     /// Solves for the active nodes; those whose pressure would be negative go, until none is.
-    fn settle(&mut self, rows: &Rows<'_>) -> Ended {
+    fn solve_active(&mut self, rows: &Rows<'_>) -> Ended {
         let n = rows.nodes;
         // Each turn takes a node out or is the last.
         for _ in 0..=MAX_ACTIVE {

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use serde::Serialize;
 
+use crate::work::FollowedRays;
 use domecast_contact::{ContactState, Pressed, PressedObject, PressedTogether, Status, TouchedNode};
 
 /// How far a frame's contact may be from that of a dome at large strain, as measured against the finite-strain level.
@@ -47,6 +48,10 @@ pub struct ContactTruth {
     pub normal: Option<[f64; 3]>,
     /// Force that the objects put on the dome, sensor frame, N.
     pub force_n: Option<[f64; 3]>,
+    /// Rays of the picture, and those that ended beside the membrane, where it is too steep for the search; only where there
+    /// are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rays_beside: Option<FollowedRays>,
     /// Each object's own part, where a scene has several; their wrenches add to the frame's.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<ObjectTruth>,
@@ -87,6 +92,7 @@ impl ContactTruth {
             point_mm: None,
             normal: None,
             force_n: None,
+            rays_beside: None,
             objects: Vec::new(),
         }
     }
@@ -143,6 +149,7 @@ impl ContactTruth {
             point_mm: touches(mean(&|node| node.place_mm)),
             normal: touches(-mean(&|node| node.inward).normalize_or_zero()),
             force_n: touches(state.wrench.force_n),
+            rays_beside: None,
             objects: Vec::new(),
         }
     }

@@ -9,14 +9,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::contact::between::Between;
-use crate::contact::displacement_map::DisplacementMap;
+use crate::contact::displacement_map::{DisplacementMap, MAX_OFF_RAY_MM};
 use crate::raster::sensor_state::SensorState;
 use domecast_contact::ContactState;
 use domecast_files::{npy_f32, png_u16};
 use domecast_optics::SensorOptics;
-
-/// A point that is found further off its ray than this is none, mm.
-const MAX_OFF_RAY_MM: f64 = 2e-3;
 
 /// The depth picture's steps, mm: the finest at which 16 bits hold the farthest point.
 const STEPS_MM: [f64; 3] = [0.001, 0.01, 0.1];
@@ -201,5 +198,5 @@ fn see(optics: &SensorOptics, map: Option<&DisplacementMap>, pixel: DVec2) -> Op
         normal: displaced.normal.as_dvec3().normalize_or_zero(),
         area_ratio: f64::from(map.area_ratio(material_mm)),
     };
-    (off_mm <= MAX_OFF_RAY_MM).then_some(seen)
+    (off_mm <= f64::from(MAX_OFF_RAY_MM)).then_some(seen)
 }

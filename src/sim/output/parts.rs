@@ -10,7 +10,7 @@ use crate::error::SimError;
 use crate::output::coded::CodedFrame;
 use crate::output::truth::FrameTruth;
 use crate::scene::file::ToleranceSection;
-use crate::work::Work;
+use crate::work::{FollowedRays, Work};
 
 /// Names of the files beside the frames.
 pub const TRUTH_NAME: &str = "truth.jsonl";
@@ -65,10 +65,23 @@ impl Summary {
         if let Some(note) = truth.note {
             self.notes.push((truth.frame, format!("{}: {note}", truth.status)));
         }
-        let Some(ContactTruth { status, note: Some(note), .. }) = truth.contact else { return };
+        let Some(ContactTruth { status, note, rays_beside, .. }) = truth.contact else { return };
+        if let Some(FollowedRays { followed, beside }) = rays_beside {
+            let rays = format!(
+                "{beside} of {followed} rays end beside the membrane, which is too steep there: they show the nearest place found"
+            );
+            self.fault(RAYS_BESIDE, truth.frame, rays);
+        }
+        if let Some(note) = note {
+            self.fault(status, truth.frame, note);
+        }
+    }
+
+    /// A frame whose contact is not as asked.
+    fn fault(&mut self, status: &'static str, frame: u32, note: String) {
         match self.contact.iter_mut().find(|fault| fault.status == status) {
             Some(fault) => fault.frames += 1,
-            None => self.contact.push(ContactFault { status, frames: 1, first: truth.frame, note }),
+            None => self.contact.push(ContactFault { status, frames: 1, first: frame, note }),
         }
     }
 }
@@ -85,15 +98,7 @@ impl Summary {
         if over <= 1.0 {
             return;
         }
-        match self.contact.iter_mut().find(|fault| fault.status == BEYOND) {
-            Some(fault) => fault.frames += 1,
-            None => self.contact.push(ContactFault {
-                status: BEYOND,
-                frames: 1,
-                first: truth.frame,
-                note: String::new(),
-            }),
-        }
+        self.fault(BEYOND, truth.frame, String::new());
         let Some(worst) = self.worst_contact else { return };
         if let Some(fault) = self.contact.iter_mut().find(|fault| fault.status == BEYOND) {
             fault.note = format!(
@@ -107,6 +112,9 @@ impl Summary {
         }
     }
 }
+
+/// The status of a contact at whose creases rays of the picture ended beside the membrane.
+const RAYS_BESIDE: &str = "rays_beside";
 
 /// The status of a contact whose level may be off by more than the scene's tolerance.
 const BEYOND: &str = "beyond_tolerance";

@@ -216,7 +216,10 @@ impl<'a> Renderer<'a> {
             work.add(owner, values as u64 * METER_UNITS);
             Meter::of(frame)
         });
-        let truth = self.truth(number, &now, &spots, &parts, around);
+        let mut truth = self.truth(number, &now, &spots, &parts, around);
+        if let Some(contact) = truth.contact.as_mut() {
+            contact.rays_beside = Some(work.rays()).filter(|rays| rays.beside > 0);
+        }
         let contact = around.and_then(|around| around.now.contact.clone());
         let depth = self.depth(&now, around);
         Ok(Exposed { frame, meter, truth, contact, depth, work })
@@ -273,7 +276,7 @@ impl<'a> Renderer<'a> {
             let shapes = around.and_then(|around| {
                 Shapes::new(around, &self.points.on_dome_mm(), dome, self.map_step_mm(), &mut extra)
             });
-            work.add(self.owner_of_time(), extra.total());
+            work.add_all(self.owner_of_time(), &extra);
             let mut part =
                 scratch.part.take().filter(fits).unwrap_or_else(|| Frame::new(width, height, planes));
             frame.planes.iter_mut().for_each(|plane| plane.fill(0.0));
@@ -293,7 +296,7 @@ impl<'a> Renderer<'a> {
                 scratch.painter.draw(parts, &slices, &spots, &mut part, spent);
                 self.run_passes(&mut part, &context, spent, |stage| stage <= Stage::Focus);
                 // What the first picture does not do, the exposure does.
-                work.add(EffectName::MotionBlur, extra.total());
+                work.add_all(EffectName::MotionBlur, &extra);
                 add(&mut frame, &part, 1.0 / exposure_s.len() as f32);
                 parts_seen.push(spots);
             }
@@ -331,7 +334,7 @@ impl<'a> Renderer<'a> {
             states.push(self.instant_of(number, now_s + after_s + row_s, shape, &mut one)?);
             match slice {
                 0 => work.merge(&one),
-                _ => work.add(EffectName::RollingShutter, one.total()),
+                _ => work.add_all(EffectName::RollingShutter, &one),
             }
         }
         Ok(states)

@@ -97,7 +97,7 @@ impl Painter {
                 None => self.flat(parts, slices, frame, together, spent),
                 Some(shading) => self.shaded(parts, slices, shading, frame, together, spent),
             }
-            work.add(EffectName::Dispersion, extra.total());
+            work.add_all(EffectName::Dispersion, &extra);
         }
     }
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, Vec3A, Vec4};
 
-use crate::contact::displacement_map::DisplacementMap;
+use crate::contact::displacement_map::{DisplacementMap, MAX_OFF_RAY_MM};
 use crate::effect_name::EffectName;
 use crate::light::shading::{Shading, SurfaceSample};
 use crate::raster::lens_field::LensRays;
@@ -54,6 +54,8 @@ pub struct Traced {
     near_mm: Vec3A,
     still: u64,
     moved: u64,
+    /// Of these, rays that end beside the membrane.
+    beside: u64,
 }
 
 impl Traced {
@@ -67,6 +69,7 @@ impl Traced {
         work.add_base((self.still + self.moved) * RAY_UNITS);
         work.add(EffectName::Contact, self.moved * DISPLACED_UNITS);
         shading.count(self.still, self.moved, work);
+        work.add_rays(self.still + self.moved, self.beside);
         *self = Self::default();
     }
 }
@@ -105,6 +108,7 @@ impl<'a> ShadedSurface<'a> {
                 sample.material_mm = undeformed_mm;
                 sample.normal = deformed.normal;
                 sample.is_moved = true;
+                traced.beside += u64::from(deformed.off_ray_mm > MAX_OFF_RAY_MM);
             }
         }
         if sample.is_moved {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::source::RawSize;
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
-use domecast_runtime::track::{Channel, Field, Reference, Steps, Thresholds, TrackError, TrackOptions};
+use domecast_runtime::track::{Channel, Field, Reference, TrackError, TrackOptions};
 
 /// What is written for each frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -84,22 +84,18 @@ pub struct TrackArguments {
     /// free of dispersion.
     #[arg(long, value_enum, default_value = "luma")]
     channel: ChannelName,
-    /// The paper's fixed levels, BLACK,WHITE (0 to 255), instead of adaptive ones.
-    #[arg(long, value_parser = levels)]
-    thresholds: Option<[u8; 2]>,
     // taken for one version more, without effect
     #[arg(long, hide = true)]
     flow: bool,
     #[arg(long, hide = true)]
     pyramid_levels: Option<u32>,
-    /// Sharpen before the whole frame is searched.
-    #[arg(long)]
+    #[arg(long, hide = true)]
+    thresholds: Option<String>,
+    #[arg(long, hide = true)]
     sharpen: bool,
-    /// Do not blur before it.
-    #[arg(long)]
+    #[arg(long, hide = true)]
     no_blur: bool,
-    /// Open (3 x 3) the thresholded frame.
-    #[arg(long)]
+    #[arg(long, hide = true)]
     open: bool,
     /// Count from the mean of the first so many good frames, which are without load, not from the constants' rest.
     #[arg(long)]
@@ -136,14 +132,6 @@ fn degrees(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "a number of degrees from -360 to 360".into())
 }
 
-fn levels(text: &str) -> Result<[u8; 2], String> {
-    let parts: Vec<u8> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
-    match parts.as_slice() {
-        [black, white] if black < white => Ok([*black, *white]),
-        _ => Err("two levels from 0 to 255, the black one first: 60,200".into()),
-    }
-}
-
 impl TrackArguments {
     /// A picture that is mirrored and then turned is, mirrored back, turned the other way.
     fn camera_turned_rad(&self) -> Option<f64> {
@@ -158,11 +146,18 @@ impl TrackArguments {
 
     /// Says so where an option is given that has no effect any more.
     pub fn note_what_is_gone(&self, output: &Output) {
-        if self.flow || self.pyramid_levels.is_some() {
-            output.warn(
-                "--flow and --pyramid-levels have no effect any more: dots are found where the pose puts them; the next version does \
-                 not take them",
-            );
+        let gone = [
+            (self.flow, "--flow"),
+            (self.pyramid_levels.is_some(), "--pyramid-levels"),
+            (self.thresholds.is_some(), "--thresholds"),
+            (self.sharpen, "--sharpen"),
+            (self.no_blur, "--no-blur"),
+            (self.open, "--open"),
+        ];
+        for (_, option) in gone.iter().filter(|(is_given, _)| *is_given) {
+            output.warn(&format!(
+                "{option} has no effect any more: dots are found where the pose puts them; the next version does not take it"
+            ));
         }
     }
 
@@ -175,10 +170,6 @@ impl TrackArguments {
                 ChannelName::Blue => Channel::Blue,
                 ChannelName::Luma => Channel::Luma,
             },
-            thresholds: self
-                .thresholds
-                .map_or(Thresholds::Adaptive, |[black, white]| Thresholds::Fixed { black, white }),
-            steps: Steps { blur: !self.no_blur, sharpen: self.sharpen, open: self.open },
             reference: self.reference.map_or(Reference::Constants, Reference::Frames),
             search_every: self.search_every,
             max_residual_px: self.max_residual_px,

@@ -8,6 +8,7 @@ use glam::DVec2;
 
 use super::buckets::Buckets;
 use super::dot_track::DotTrack;
+use super::groups::Groups;
 use super::skin;
 use crate::track::marks::DarkBlob;
 use crate::track::model::DotModel;
@@ -51,8 +52,7 @@ pub(super) struct BlobMatcher {
     pairs: Vec<(f64, usize, usize)>,
     /// Where each dot is looked from.
     base: Vec<Option<DVec2>>,
-    component: Vec<u32>,
-    stack: Vec<usize>,
+    groups: Groups,
     buckets: Buckets,
 }
 
@@ -64,8 +64,7 @@ impl BlobMatcher {
             taken: Vec::with_capacity(blobs),
             pairs: Vec::with_capacity(dots),
             base: Vec::with_capacity(dots),
-            component: Vec::with_capacity(dots),
-            stack: Vec::with_capacity(dots),
+            groups: Groups::new(dots),
             buckets: Buckets::new(blobs),
         }
     }
@@ -131,41 +130,24 @@ impl BlobMatcher {
 
     /// Of the dots in place, only the largest group in which each is beside its place as its neighbours are.
     fn keep_largest_group(&mut self, blobs: &[DarkBlob], models: &[DotModel]) {
-        self.component.clear();
-        self.component.resize(models.len(), 0);
-        let (mut best, mut best_size, mut last) = (0, 0, 0);
-        for start in 0..models.len() {
-            if self.component[start] != 0 || self.blob_of[start].is_none() {
-                continue;
-            }
-            last += 1;
-            let mut size = 0;
-            self.component[start] = last;
-            self.stack.push(start);
-            while let Some(index) = self.stack.pop() {
-                size += 1;
-                let Some(own) = self.moved(blobs, index) else { continue };
-                for other in &models[index].neighbors {
-                    let alike = self
-                        .moved(blobs, *other)
-                        .is_some_and(|moved| moved.distance(own) < ALIKE * models[index].spacing_px);
-                    if alike && self.component[*other] == 0 {
-                        self.component[*other] = last;
-                        self.stack.push(*other);
-                    }
-                }
-            }
-            if size > best_size {
-                (best, best_size) = (last, size);
-            }
-        }
+        let mut groups = std::mem::take(&mut self.groups);
+        let moved = |index: usize| self.moved(blobs, index);
+        groups.find(
+            models,
+            |index| self.blob_of[index].is_some(),
+            |one, other| {
+                let apart = moved(one).zip(moved(other)).map(|(one, other)| one.distance(other));
+                apart.is_some_and(|apart| apart < ALIKE * models[one].spacing_px)
+            },
+        );
         for index in 0..models.len() {
-            if self.component[index] != best
+            if !groups.is_in_largest(index)
                 && let Some(blob) = self.blob_of[index].take()
             {
                 self.taken[blob] = false;
             }
         }
+        self.groups = groups;
     }
 
     /// By how much a dot's blob is beside its place.

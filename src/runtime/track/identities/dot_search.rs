@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::dot_track::DotTrack;
+use super::groups::Groups;
 use super::skin;
 use crate::track::frame::Plane;
 use crate::track::marks::{DarkSpot, MarkState, SpotFault, SpotMeter};
@@ -34,6 +35,7 @@ pub(super) struct DotSearch<'a, 'b> {
     pub models: &'a [DotModel],
     pub tracks: &'a mut [DotTrack],
     pub order: &'a mut Vec<usize>,
+    pub groups: &'a mut Groups,
 }
 
 impl DotSearch<'_, '_> {
@@ -139,7 +141,6 @@ impl DotSearch<'_, '_> {
     /// Two dots in one place are neither; a dot that moved unlike all its neighbours, or where the skin could not have it,
     /// is another one's blob. Returns how many were so.
     pub fn check(&mut self) -> usize {
-        let mut torn_dots = 0;
         self.order.clear();
         self.order.extend((0..self.tracks.len()).filter(|i| self.tracks[*i].spot.is_some()));
         let x = |track: &DotTrack| track.now_px().map_or(0.0, |p| p.x);
@@ -160,6 +161,24 @@ impl DotSearch<'_, '_> {
                 }
             }
         }
+        let mut torn_dots = 0;
+        // What a lost dot spoke for is judged again without it.
+        for _ in 0..MAX_ROUNDS {
+            let lost = self.lose_torn();
+            torn_dots += lost;
+            if lost == 0 {
+                break;
+            }
+        }
+        if torn_dots > 0 {
+            torn_dots += self.lose_islands();
+        }
+        torn_dots
+    }
+
+    /// Loses the dots that moved unlike their neighbours, or that the skin around them could not have there; how many.
+    fn lose_torn(&mut self) -> usize {
+        let mut lost = 0;
         for index in 0..self.tracks.len() {
             let track = self.tracks[index];
             let (Some(now), Some(start)) = (track.now_px(), track.start_px) else { continue };
@@ -172,13 +191,37 @@ impl DotSearch<'_, '_> {
             let rough = own.distance(displaced) > SURELY_SMOOTH * spacing;
             let torn = rough && skin::is_torn(index, self.models, at, by);
             if count >= 2 && (unlike || torn) {
-                torn_dots += 1;
+                lost += 1;
                 let track = &mut self.tracks[index];
                 track.lose(if torn { MarkState::IdentityUnsure } else { track.absent() });
                 // Where it was is not where it is to be looked for.
                 track.displaced_px = None;
             }
         }
-        torn_dots
+        lost
+    }
+
+    /// Where the skin is torn, only the most of it that hangs together is sure: a patch may lie a whole step of the pattern
+    /// beside its place, and fit its neighbours' blobs. Loses the others; how many.
+    fn lose_islands(&mut self) -> usize {
+        let tracks = &*self.tracks;
+        let by = |index: usize| Some(tracks[index].now_px()? - tracks[index].expected_px?);
+        self.groups.find(
+            self.models,
+            |index| by(index).is_some(),
+            |one, other| {
+                let apart = by(one).zip(by(other)).map(|(one, other)| one.distance(other));
+                apart.is_some_and(|apart| apart < MAX_UNLIKE * self.models[one].spacing_px)
+            },
+        );
+        let mut lost = 0;
+        for (index, track) in self.tracks.iter_mut().enumerate() {
+            if track.spot.is_some() && !self.groups.is_in_largest(index) {
+                lost += 1;
+                track.lose(MarkState::IdentityUnsure);
+                track.displaced_px = None;
+            }
+        }
+        lost
     }
 }

@@ -8,19 +8,18 @@ use super::dot_faults::DotFaults;
 use super::dot_prediction::DotPrediction;
 use super::dot_search::DotSearch;
 use super::dot_track::DotTrack;
+use super::groups::Groups;
 use super::false_dots::{MAX_FALSE_DOTS, find_false_dots};
 use super::key_check::{KeyCheck, KeyFrame, Orientation};
 use crate::track::frame::{Mask, Plane};
-use crate::track::marks::{BlobScan, DarkBlob, ScanSettings, SpotMeter};
+use crate::track::marks::{BlobScan, DarkBlob, SpotMeter};
 use crate::track::model::{DotModel, SensorModel};
-use crate::track::options::{Thresholds, TrackOptions};
+use crate::track::options::TrackOptions;
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 
 /// Under load a dot's image grows and shrinks by some tenths: radii over that at rest.
 const RADIUS_RATIO: [f64; 2] = [0.6, 1.6];
-/// Least contrast of a dot to the ground in the search of the whole frame.
-const MIN_BLOB_CONTRAST: f32 = 0.12;
 /// Blobs that the search of the whole frame can hold.
 const MAX_BLOBS: usize = 1 << 15;
 /// One in so many dots lost between two frames calls for a search of the whole frame.
@@ -59,11 +58,13 @@ struct Dots {
     meter: SpotMeter,
     tracks: Vec<DotTrack>,
     order: Vec<usize>,
+    groups: Groups,
 }
 
 impl Dots {
     fn search<'a, 'b>(&'a mut self, plane: &'a Plane<'b>, models: &'a [DotModel]) -> DotSearch<'a, 'b> {
-        DotSearch { plane, meter: &mut self.meter, models, tracks: &mut self.tracks, order: &mut self.order }
+        let Self { meter, tracks, order, groups } = self;
+        DotSearch { plane, meter, models, tracks, order, groups }
     }
 
     fn found(&self) -> usize {
@@ -101,7 +102,6 @@ pub(in crate::track) struct DotIdentities {
     dots: Dots,
     prediction: DotPrediction,
     scan: BlobScan,
-    scan_settings: ScanSettings,
     matcher: BlobMatcher,
     choice: IdentityChoice,
     search_every: u32,
@@ -130,21 +130,15 @@ impl DotIdentities {
         }
         let count = models.len();
         let widest_px = models.iter().map(|model| model.outline.radius_px).fold(0.0, f64::max);
-        let steps = options.steps;
         Self {
-            dots: Dots { meter, tracks: vec![DotTrack::default(); count], order: Vec::with_capacity(count) },
+            dots: Dots {
+                meter,
+                tracks: vec![DotTrack::default(); count],
+                order: Vec::with_capacity(count),
+                groups: Groups::new(count),
+            },
             prediction: DotPrediction::default(),
             scan: BlobScan::new(width, height, widest_px),
-            scan_settings: ScanSettings {
-                blur: steps.blur,
-                sharpen: steps.sharpen,
-                open: steps.open,
-                level: match options.thresholds {
-                    Thresholds::Adaptive => None,
-                    Thresholds::Fixed { black, .. } => Some(black),
-                },
-                min_contrast: MIN_BLOB_CONTRAST,
-            },
             matcher: BlobMatcher::new(count, MAX_BLOBS),
             choice: IdentityChoice::new(count),
             search_every: options.search_every,
@@ -176,7 +170,7 @@ impl DotIdentities {
             let Dots { meter, tracks, .. } = &mut self.dots;
             self.key.test(&mut KeyFrame { plane, meter, key, models, tracks, optics });
             if self.key.wants_search() {
-                let blobs = self.scan.dark_blobs(plane, |y| mask.span(y), &self.scan_settings);
+                let blobs = self.scan.dark_blobs(plane, |y| mask.span(y));
                 self.key.search(blobs.unwrap_or_default(), key, models, model.optics.lens().spec());
             }
         }
@@ -223,7 +217,7 @@ impl DotIdentities {
     fn search_frame(&mut self, frame: &DotFrame<'_, '_>, identify: bool, is_filled: bool) {
         let &DotFrame { plane, mask, model, optics, .. } = frame;
         let models = &model.dots;
-        let blobs = self.scan.dark_blobs(plane, |y| mask.span(y), &self.scan_settings);
+        let blobs = self.scan.dark_blobs(plane, |y| mask.span(y));
         // More blobs than dots could make are noise. Nothing is known of false dots then.
         let Some(blobs) = blobs else { return };
         self.since_search = 0;

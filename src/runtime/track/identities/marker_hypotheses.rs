@@ -7,7 +7,7 @@ use crate::track::marks::{Candidate, FIT_REACH_PX, FittedDisc, MarkerView};
 use crate::track::model::MarkerModels;
 
 /// Discs kept for each marker.
-const DISCS: usize = 4;
+pub(in crate::track) const DISCS: usize = 4;
 /// Places that are tried for them: most are no discs.
 const PLACES: usize = 12;
 /// Combinations that are tried.
@@ -26,22 +26,22 @@ pub(in crate::track) struct MarkerHypotheses {
 }
 
 impl MarkerHypotheses {
-    /// The discs within reach of each marker's place at rest. The second of the views says what a candidate looks
-    /// like; all of them are fitted, and the best fit counts.
-    pub fn propose(plane: &Plane<'_>, models: &MarkerModels, white: Option<u8>, views: &Views) -> Self {
+    /// The likeliest discs within reach of each marker's place at rest, at most so many. The second of the views says what a
+    /// candidate looks like; all of them are fitted, and the best fit counts.
+    pub fn propose(plane: &Plane<'_>, models: &MarkerModels, views: &Views, count_of_each: usize) -> Self {
         let mut discs = [[None; DISCS]; 4];
         for (index, discs) in discs.iter_mut().enumerate() {
             let Some(view) = views[1][index].or(views[0][index]) else { continue };
             let mut places = [Candidate::default(); PLACES];
             let (start, reach) = (models.rest_px[index], models.reach_px[index]);
-            let count = view.candidates(plane, start, reach, white, &mut places);
+            let count = view.candidates(plane, start, reach, &mut places);
             let fits = places[..count].iter().filter_map(|place| {
                 let fits = views.iter().filter_map(|views| {
                     views[index]?.fit(plane, place.at_px, FIT_REACH_PX, None, DVec2::ZERO)
                 });
                 fits.min_by(|a, b| a.misfit.total_cmp(&b.misfit))
             });
-            for (to, disc) in discs.iter_mut().zip(fits) {
+            for (to, disc) in discs.iter_mut().take(count_of_each).zip(fits) {
                 *to = Some(disc);
             }
         }

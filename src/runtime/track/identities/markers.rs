@@ -13,8 +13,6 @@ const MAX_REFOUND: usize = 8;
 pub(in crate::track) struct MarkerFrame<'a, 'b> {
     pub plane: &'a Plane<'b>,
     pub models: &'a MarkerModels,
-    /// The level that a marker must pass, if one is fixed.
-    pub white: Option<u8>,
     /// How far from where the last pose puts it a marker is looked for when it is not at once in place, px.
     pub reach_px: f64,
 }
@@ -72,7 +70,7 @@ impl MarkerIdentities {
             *disc = view.fit(frame.plane, start, FIT_REACH_PX, levels, shading);
             if disc.is_none() {
                 let mut best = [Candidate::default(); 1];
-                if view.candidates(frame.plane, start, frame.reach_px, frame.white, &mut best) > 0 {
+                if view.candidates(frame.plane, start, frame.reach_px, &mut best) > 0 {
                     *disc = view.fit(frame.plane, best[0].at_px, FIT_REACH_PX, None, shading);
                 }
             }
@@ -105,10 +103,15 @@ impl MarkerIdentities {
         }
     }
 
-    /// Four markers anywhere in their reach, without a pose to start from: every disc that each of them may be. The best
-    /// of each are taken as found.
-    pub fn find_anywhere(&mut self, frame: &MarkerFrame<'_, '_>, views: &Views) -> MarkerHypotheses {
-        let hypotheses = MarkerHypotheses::propose(frame.plane, frame.models, frame.white, views);
+    /// Four markers anywhere in their reach, without a pose to start from: up to so many discs that each of them may be. The
+    /// best of each are taken as found.
+    pub fn find_anywhere(
+        &mut self,
+        frame: &MarkerFrame<'_, '_>,
+        views: &Views,
+        discs: usize,
+    ) -> MarkerHypotheses {
+        let hypotheses = MarkerHypotheses::propose(frame.plane, frame.models, views, discs);
         self.choose(&hypotheses, [Some(0); 4]);
         hypotheses
     }

@@ -12,6 +12,6 @@ mod state;
 
 pub(crate) use marker::marker_in_still;
 pub(super) use marker::{Candidate, FIT_REACH_PX, FittedDisc, MAX_HALF_PX, MarkerView, ShadingSlope};
-pub(super) use scan::{BlobScan, DarkBlob, ScanSettings};
+pub(super) use scan::{BlobScan, DarkBlob};
 pub(super) use spot::{DarkSpot, MAX_RADIUS_PX, SpotFault, SpotMeter, SpotOutline, SpotShape};
 pub use state::MarkState;

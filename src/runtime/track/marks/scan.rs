@@ -9,23 +9,10 @@ use crate::track::frame::Plane;
 /// half of a block, wherever a dot lies in it.
 const MIN_BLOCK: usize = 16;
 const BLOCK_BY_DIAMETER: f64 = 1.5;
+/// Least difference between ground and mark, in parts of the ground's level.
+const MIN_CONTRAST: f32 = 0.12;
 /// Largest number of runs that a frame of marks could have; noise has more.
 const MAX_RUNS: usize = 1 << 15;
-
-/// How the search is done.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ScanSettings {
-    /// Blur before.
-    pub blur: bool,
-    /// Sharpen before.
-    pub sharpen: bool,
-    /// Open the thresholded frame.
-    pub open: bool,
-    /// One level for the whole frame; `None`: half way between ground and mark of each neighbourhood.
-    pub level: Option<u8>,
-    /// Least difference between ground and mark, in parts of the ground's level.
-    pub min_contrast: f32,
-}
 
 /// A dark blob.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -102,7 +89,6 @@ impl BlobScan {
         &mut self,
         plane: &Plane<'_>,
         span: impl Fn(usize) -> [usize; 2],
-        settings: &ScanSettings,
     ) -> Option<&[DarkBlob]> {
         let (width, height, side) = (self.width, self.height, self.block);
         if plane.width() != width || plane.height() != height {
@@ -111,15 +97,10 @@ impl BlobScan {
         for (y, row) in self.first.chunks_exact_mut(width).enumerate() {
             plane.row_into(0, y, row);
         }
-        if settings.blur {
-            filter::blur(width, height, &self.first, &mut self.second, &mut self.pads);
-            std::mem::swap(&mut self.first, &mut self.second);
-        }
-        if settings.sharpen {
-            filter::sharpen(width, height, &self.first, &mut self.second, &mut self.pads);
-            std::mem::swap(&mut self.first, &mut self.second);
-        }
-        self.find_levels(settings);
+        // Noise of single pixels makes no blobs then.
+        filter::blur(width, height, &self.first, &mut self.second, &mut self.pads);
+        std::mem::swap(&mut self.first, &mut self.second);
+        self.find_levels();
         // Marks become ones in the second buffer.
         let across = width.div_ceil(side);
         for y in 0..height {
@@ -138,19 +119,12 @@ impl BlobScan {
                 }
             }
         }
-        if settings.open {
-            filter::open(width, height, &mut self.second, &mut self.first, &mut self.pads);
-        }
         self.components()
     }
 
     /// Threshold of each block: half way from the ground to the darkest in the blocks around; 0 where nothing there
     /// is dark enough.
-    fn find_levels(&mut self, settings: &ScanSettings) {
-        if let Some(level) = settings.level {
-            self.levels.fill(level);
-            return;
-        }
+    fn find_levels(&mut self) {
         let side = self.block;
         let (across, down) = (self.width.div_ceil(side), self.height.div_ceil(side));
         for by in 0..down {
@@ -189,7 +163,7 @@ impl BlobScan {
                     }
                 }
                 let deep = f32::from(own) - f32::from(low);
-                let enough = deep > settings.min_contrast * f32::from(own) && deep >= 6.0;
+                let enough = deep > MIN_CONTRAST * f32::from(own) && deep >= 6.0;
                 self.levels[by * across + bx] =
                     if enough { ((u16::from(own) + u16::from(low)).div_ceil(2)) as u8 } else { 0 };
             }

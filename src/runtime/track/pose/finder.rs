@@ -4,7 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::refine::{MarkerSighting, RefinedPose, refine};
 use super::residual_scale::ResidualScale;
-use crate::track::identities::{Choice, MarkerFrame, MarkerHypotheses, MarkerIdentities};
+use crate::track::identities::{Choice, DISCS, MarkerFrame, MarkerHypotheses, MarkerIdentities};
 use crate::track::marks::{FittedDisc, MarkerView};
 use crate::track::model::SensorModel;
 use domecast_optics::SensorOptics;
@@ -267,10 +267,13 @@ impl PoseFinder {
                 }
             }
         }
-        let hypotheses = markers.find_anywhere(frame, &views);
-        let coarse = self
-            .best_of(frame, &hypotheses, markers)
-            .or_else(|| self.best_of_three(frame, model, &hypotheses, markers))?;
+        // Mostly the likeliest discs are the markers: only where they do not fit well the others are looked at too.
+        let likeliest = markers.find_anywhere(frame, &views, 1);
+        let coarse = self.best_of(frame, &likeliest, markers).filter(|found| self.is_clear(found)).or_else(|| {
+            let hypotheses = markers.find_anywhere(frame, &views, DISCS);
+            self.best_of(frame, &hypotheses, markers)
+                .or_else(|| self.best_of_three(frame, model, &hypotheses, markers))
+        })?;
         // Fitted again as they look from there; and asked whether another pose fits as well.
         self.optics.move_to(&coarse.pose).ok()?;
         markers.refit(frame, &self.optics);
@@ -287,6 +290,11 @@ impl PoseFinder {
         Some(refined)
     }
 
+    /// Whether a pose fits so well that it needs no rivals.
+    fn is_clear(&self, found: &RefinedPose) -> bool {
+        found.rms_px < CLEAR_PART * self.max_residual_px
+    }
+
     /// The combination of discs that a pose explains best; it is taken as found, or the likeliest if none is explained.
     fn best_of(
         &mut self,
@@ -301,7 +309,7 @@ impl PoseFinder {
         let mut last_rank = 0;
         for (rank, choice) in hypotheses.combinations(None) {
             // The first choices fitting well need no rivals.
-            let clear = best.as_ref().is_some_and(|(b, _)| b.rms_px < CLEAR_PART * self.max_residual_px);
+            let clear = best.as_ref().is_some_and(|(found, _)| self.is_clear(found));
             if rank > last_rank && clear {
                 break;
             }

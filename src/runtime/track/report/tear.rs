@@ -113,11 +113,11 @@ mod tests {
         assert!(!check.is_torn(&dots(|at| DVec2::new(2.0 + 0.01 * at.y, 0.003 * at.x)), middle));
         check.restart();
         check.is_torn(&dots(|_| DVec2::ZERO), middle);
-        let dent = |at: DVec2| {
+        let press = |at: DVec2| {
             (at - DVec2::new(300.0, 200.0))
                 * 0.1
                 * (-at.distance_squared(DVec2::new(300.0, 200.0)) / 8e3).exp()
         };
-        assert!(!check.is_torn(&dots(dent), middle));
+        assert!(!check.is_torn(&dots(press), middle));
     }
 }

@@ -30,6 +30,9 @@ const WIDER: f64 = 2.0;
 /// Slope of the displacement from which on the membrane may fold over a slanting ray.
 const FOLDING: f32 = 0.4;
 
+/// A point further off its ray than this is not where the ray meets the membrane, mm.
+pub const MAX_OFF_RAY_MM: f32 = 2e-3;
+
 /// How far beyond the pressed part the nodes lie close, mm.
 const CLOSE_MARGIN_MM: f64 = 1.5;
 
@@ -48,6 +51,8 @@ pub struct Displaced {
     pub displacement_mm: Vec3A,
     /// Outward unit normal of the deformed membrane there.
     pub normal: Vec3A,
+    /// Its distance from the ray that was followed, mm; 0 where the search for their intersection ended.
+    pub off_ray_mm: f32,
 }
 
 /// Where the nodes of the tables lie: one for all the times that are to be mixed.
@@ -178,7 +183,8 @@ impl DisplacementMap {
             if miss2 < NEAR_MM * NEAR_MM {
                 // So near that the tangent plane is the membrane: the point on it, and where that was.
                 let place = chart.point_near(at + on_plane);
-                return Some((place, Displaced { displacement_mm: surface + miss - place, normal }));
+                let displacement_mm = surface + miss - place;
+                return Some((place, Displaced { displacement_mm, normal, off_ray_mm: 0.0 }));
             }
             let off2 = (surface - rest_mm).reject_from_normalized(inside).length_squared();
             let here = Nearest {
@@ -187,7 +193,7 @@ impl DisplacementMap {
                 on_plane: on_plane.clamp_length_max(FARTHEST_MM),
                 off2,
                 part: 1.0,
-                met: (place, Displaced { displacement_mm: moved.displacement_mm, normal }),
+                met: (place, Displaced { displacement_mm: moved.displacement_mm, normal, off_ray_mm: off2.sqrt() }),
             };
             // What is not a number is no nearer.
             let is_nearer = on_plane.is_finite() && nearest.is_none_or(|best| off2 < best.off2);

@@ -87,13 +87,12 @@ impl MarkerView {
     }
 
     /// The places within `reach_px` of `start` that look most like a marker, the best first, at least its own size
-    /// apart; `white`: the level that they must pass, if one is fixed. Returns how many of `out` are filled.
+    /// apart. Returns how many of `out` are filled.
     pub fn candidates(
         &self,
         plane: &Plane<'_>,
         start: DVec2,
         reach_px: f64,
-        white: Option<u8>,
         out: &mut [Candidate],
     ) -> usize {
         let mut count = 0;
@@ -106,7 +105,7 @@ impl MarkerView {
             let columns = (cx - reach).max(1)..=(cx + reach).min(plane.width() as i32 - 2);
             for x in columns.step_by(step) {
                 let level = plane.at(x, y);
-                if white.is_some_and(|white| level <= white) || level < MIN_RISE as u8 {
+                if level < MIN_RISE as u8 {
                     continue;
                 }
                 let at_px = DVec2::new(f64::from(x), f64::from(y));

@@ -174,7 +174,7 @@ mod tests {
         let frame = CameraFrame::new(48, 40, 1, &bytes).unwrap();
         let plane = Plane::new(&frame, Channel::Luma);
         let mut places = [Candidate::default(); 2];
-        assert!(view().candidates(&plane, DVec2::new(20.0, 20.0), 10.0, None, &mut places) > 0);
+        assert!(view().candidates(&plane, DVec2::new(20.0, 20.0), 10.0, &mut places) > 0);
         let disc = view().fit(&plane, places[0].at_px, FIT_REACH_PX, None, DVec2::ZERO).unwrap();
         assert!(disc.centroid_px.distance(center) < 0.03, "{}", disc.centroid_px);
         assert!(disc.sd_px > 0.0 && disc.sd_px < 0.05 && disc.misfit < 0.1, "{disc:?}");

@@ -269,11 +269,12 @@ impl PoseFinder {
         }
         // Mostly the likeliest discs are the markers: only where they do not fit well the others are looked at too.
         let likeliest = markers.find_anywhere(frame, &views, 1);
-        let coarse = self.best_of(frame, &likeliest, markers).filter(|found| self.is_clear(found)).or_else(|| {
-            let hypotheses = markers.find_anywhere(frame, &views, DISCS);
-            self.best_of(frame, &hypotheses, markers)
-                .or_else(|| self.best_of_three(frame, model, &hypotheses, markers))
-        })?;
+        let coarse =
+            self.best_of(frame, &likeliest, markers).filter(|found| self.is_clear(found)).or_else(|| {
+                let hypotheses = markers.find_anywhere(frame, &views, DISCS);
+                self.best_of(frame, &hypotheses, markers)
+                    .or_else(|| self.best_of_three(frame, model, &hypotheses, markers))
+            })?;
         // Fitted again as they look from there; and asked whether another pose fits as well.
         self.optics.move_to(&coarse.pose).ok()?;
         markers.refit(frame, &self.optics);

@@ -193,7 +193,10 @@ impl DisplacementMap {
                 on_plane: on_plane.clamp_length_max(FARTHEST_MM),
                 off2,
                 part: 1.0,
-                met: (place, Displaced { displacement_mm: moved.displacement_mm, normal, off_ray_mm: off2.sqrt() }),
+                met: (
+                    place,
+                    Displaced { displacement_mm: moved.displacement_mm, normal, off_ray_mm: off2.sqrt() },
+                ),
             };
             // What is not a number is no nearer.
             let is_nearer = on_plane.is_finite() && nearest.is_none_or(|best| off2 < best.off2);

@@ -88,13 +88,7 @@ impl MarkerView {
 
     /// The places within `reach_px` of `start` that look most like a marker, the best first, at least its own size
     /// apart. Returns how many of `out` are filled.
-    pub fn candidates(
-        &self,
-        plane: &Plane<'_>,
-        start: DVec2,
-        reach_px: f64,
-        out: &mut [Candidate],
-    ) -> usize {
+    pub fn candidates(&self, plane: &Plane<'_>, start: DVec2, reach_px: f64, out: &mut [Candidate]) -> usize {
         let mut count = 0;
         let (cx, cy) = (start.x.round() as i32, start.y.round() as i32);
         let reach = reach_px.clamp(1.0, 2000.0).ceil() as i32;

@@ -9,6 +9,8 @@ with the build's constants, and every frame is held to the truth:
 - a dot that is called `ok` is no other dot: nearer than two fifths of the spacing to where it was drawn;
 - the status of the frames is one of those that the scenario names;
 - no more dots are withheld than the scenario allows.
+
+`--random N` adds N frames under touches drawn from the seed, each unlike the one before: no dot called `ok` is another.
 """
 import copy
 import json

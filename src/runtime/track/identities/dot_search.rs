@@ -23,6 +23,10 @@ const SAME_PLACE: f64 = 0.25;
 const SURELY_SMOOTH: f64 = 0.3;
 /// How far a dot's motion may differ from its neighbours', in parts of its spacing.
 const MAX_UNLIKE: f64 = 0.4;
+/// A dot this near to where the skin leads is no other one, in parts of its spacing; farther off it may be a neighbour that fits
+/// by no more than this worse.
+const MAX_CLEAR: f64 = 0.25;
+const UNCLEAR: f64 = 0.15;
 /// One dot in so many is looked at anew in each frame.
 const LOOKED_AT_PART: usize = 4;
 /// Rounds in which found dots lead to their neighbours.
@@ -173,7 +177,34 @@ impl DotSearch<'_, '_> {
         if torn_dots > 0 {
             torn_dots += self.lose_islands();
         }
+        self.lose_unclear();
         torn_dots
+    }
+
+    /// Where the skin is folded together, a dot's blob may be that of a neighbour which is not found: a dot that lies beside
+    /// where the skin leads, on a place that the neighbour fits as well, is of unsure identity.
+    fn lose_unclear(&mut self) {
+        for index in 0..self.tracks.len() {
+            let (models, tracks) = (self.models, &*self.tracks);
+            let Some(now) = tracks[index].now_px() else { continue };
+            let at = |other: usize| tracks[other].expected_px;
+            let by = |other: usize| Some(tracks[other].now_px()? - tracks[other].expected_px?);
+            let off_px = |dot: usize| {
+                let lead = skin::estimate(dot, models, at, by)?;
+                Some(now.distance(at(dot)? + lead.displaced_px))
+            };
+            let spacing = models[index].spacing_px;
+            let Some(own_px) = off_px(index).filter(|own_px| *own_px > MAX_CLEAR * spacing) else { continue };
+            let may_be = |other: &usize| {
+                let is_absent = tracks[*other].spot.is_none() && tracks[*other].is_wanted();
+                is_absent && off_px(*other).is_some_and(|off_px| off_px < own_px + UNCLEAR * spacing)
+            };
+            if models[index].neighbors.iter().any(may_be) {
+                let track = &mut self.tracks[index];
+                track.lose(MarkState::IdentityUnsure);
+                track.displaced_px = None;
+            }
+        }
     }
 
     /// Loses the dots that moved unlike their neighbours, or that the skin around them could not have there; how many.

@@ -100,7 +100,7 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
     check_size(&*source, arguments, &constants)?;
     let page = match arguments.show {
         Some(port) => {
-            Some(LivePage::start(port, tracker.optics().rest_from_camera(), skin).map_err(|error| {
+            Some(LivePage::start(port, *tracker.optics().rest_from_camera(), skin).map_err(|error| {
                 let problem = format!("cannot be used ({error})");
                 input_fault(
                     Path::new(&format!("--show {port}")),

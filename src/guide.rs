@@ -4,7 +4,7 @@
 //! |---|---|
 //! | choose and design | [`design`], [`dots`], [`simulating`], [`accuracy`] |
 //! | make | [`printing`], [`casting`] |
-//! | calibrate and run | [`force`], [`tracking`], [`formats`] |
+//! | calibrate and run | [`force`], [`tracking`], [`live`], [`formats`] |
 //! | change domecast | [`architecture`] |
 
 #[doc = include_str!("guide/design.md")]
@@ -21,6 +21,8 @@ pub mod force {}
 pub mod simulating {}
 #[doc = include_str!("guide/tracking.md")]
 pub mod tracking {}
+#[doc = include_str!("guide/live.md")]
+pub mod live {}
 #[doc = include_str!("guide/accuracy.md")]
 pub mod accuracy {}
 #[doc = include_str!("guide/formats.md")]

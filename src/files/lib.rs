@@ -162,3 +162,49 @@ impl StagedFile {
         staging.commit(&path, command)
     }
 }
+
+/// A file that grows in its place, for recordings that must be readable however the program ends. It refuses and keeps what
+/// a [`StagedFile`] does; once [`GrowingFile::end`] was called it is a result like others. One that was not ended is
+/// someone's work: only `force` replaces it, and keeps it.
+#[derive(Debug)]
+pub struct GrowingFile {
+    file: File,
+    path: PathBuf,
+    command: &'static str,
+}
+
+impl GrowingFile {
+    /// Begins the file `path` as an empty one; also says where the copy of what stood there is, where one is kept.
+    ///
+    /// # Errors
+    /// Those of [`StagedFile::new`].
+    pub fn new(
+        path: &Path,
+        command: &'static str,
+        rules: &OutputRules<'_>,
+    ) -> Result<(Self, Option<PathBuf>), WriteError> {
+        let kept = StagedFile::new(path, command, rules)?.commit()?;
+        let opened = File::options().append(true).open(path);
+        let file = opened.map_err(WriteError::io("write the file", path))?;
+        Ok((Self { file, path: path.to_path_buf(), command }, kept))
+    }
+
+    /// Has all that was written on the disk, and marks the file as the command's result.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`]; what was written is there all the same.
+    pub fn end(self) -> Result<(), WriteError> {
+        drop(self.file);
+        marker::mark(&self.path, self.command).map_err(WriteError::io("write the file", &self.path))
+    }
+}
+
+impl Write for GrowingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::staging::{PREFIX, Staging, replace, tidy};
-use crate::{OutputRules, StagedFile, StagedFolder, WriteError, list_files, recover};
+use crate::{GrowingFile, OutputRules, StagedFile, StagedFolder, WriteError, list_files, recover};
 
 const ANY: OutputRules<'_> = OutputRules { force: false, inputs: &[] };
 const FORCE: OutputRules<'_> = OutputRules { force: true, inputs: &[] };
@@ -283,4 +283,30 @@ fn two_steps_do_where_there_is_no_exchange() {
     // a step that fails leaves the place as it was
     assert!(replace(&at("none"), &at("out"), &at("aside")).is_err());
     assert_eq!(fs::read_to_string(at("out/a.txt")).unwrap(), "new");
+}
+
+#[test]
+fn a_growing_file_is_there_at_once_and_a_result_once_it_has_ended() {
+    use std::io::Write;
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("a.mcap");
+    let (mut growing, kept) = GrowingFile::new(&path, "track", &ANY).unwrap();
+    assert_eq!(kept, None);
+    growing.write_all(b"first").unwrap();
+    // as it is after a kill
+    assert_eq!(fs::read(&path).unwrap(), b"first");
+    assert!(matches!(GrowingFile::new(&path, "track", &ANY), Err(WriteError::NotOurs { .. })));
+    growing.write_all(b" second").unwrap();
+    growing.end().unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"first second");
+    // a whole one is a result like others, where the file system can mark it
+    if file(&path, "third", &ANY).is_err() {
+        return;
+    }
+    fs::write(&path, "someone's").unwrap();
+    assert!(GrowingFile::new(&path, "track", &ANY).is_err());
+    let (growing, kept) = GrowingFile::new(&path, "track", &FORCE).unwrap();
+    assert_eq!(fs::read_to_string(kept.unwrap()).unwrap(), "someone's");
+    drop(growing);
+    assert_eq!(fs::read(&path).unwrap(), b"");
 }

@@ -11,15 +11,18 @@ mod explain;
 mod illuminate;
 mod input;
 mod list;
+mod live;
 mod new;
 mod new_scene;
 mod of_a_design;
 mod output;
 mod points;
+mod recording;
 mod schema;
 mod shell;
 mod simulate;
 mod track;
+mod tracker_arguments;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -205,6 +208,8 @@ enum Command {
     },
     /// From frames to markers, pose, wrench and local displacement.
     Track(Box<track::TrackArguments>),
+    /// Read a camera live: numbers at its rate, on the terminal, as JSON lines, as a page, into a recording.
+    Live(Box<live::LiveArguments>),
     /// Print the completions for a shell.
     Completions {
         /// Which shell.
@@ -315,6 +320,7 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::Simulate { scene, options } => simulate::run(output, scene, options),
         Command::Schema { scene } => schema::run(output, *scene),
         Command::Track(arguments) => track::run(output, arguments),
+        Command::Live(arguments) => live::run(output, arguments),
         Command::CalibratePrint { measured, design, out, marks } => {
             calibrate_print::run(output, measured, design, out.as_deref(), *marks)
         }

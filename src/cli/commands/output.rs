@@ -19,6 +19,8 @@ pub enum Failure {
     Negative,
     /// Standard output could not be written.
     Print(io::Error),
+    /// A recording that cannot go on; what was written of it stays.
+    Record(PathBuf, String),
     /// Something that must not happen, whatever the input.
     Internal(String),
 }
@@ -46,15 +48,17 @@ impl Failure {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Print(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
-            Self::Input(_) | Self::Write(_) | Self::Negative | Self::Print(_) => 1,
+            Self::Input(_) | Self::Write(_) | Self::Negative | Self::Record(..) | Self::Print(_) => 1,
             Self::Internal(_) => 3,
         }
     }
 
-    fn message(&self) -> Option<String> {
+    /// What is said of it; nothing where all is said.
+    pub fn message(&self) -> Option<String> {
         match self {
             Self::Input(error) => Some(error.to_string()),
             Self::Write(error) => Some(error.to_string()),
+            Self::Record(path, problem) => Some(format!("{}: {problem}", path.display())),
             Self::Negative => None,
             Self::Print(error) if error.kind() == io::ErrorKind::BrokenPipe => None,
             Self::Print(error) => Some(format!("standard output: cannot be written ({error})")),

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use super::source::RawSize;
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
-use domecast_runtime::track::{Channel, Field, Reference, TrackError, TrackOptions};
+use crate::commands::tracker_arguments::TrackerArguments;
+use domecast_runtime::track::{Field, TrackError};
 
 /// What is written for each frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -18,15 +19,6 @@ pub enum Format {
     DotsCsv,
     /// Pose and wrench as binary records of 240 bytes, a frame each: for loops that have no time to read text.
     Records,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum ChannelName {
-    Red,
-    Green,
-    Blue,
-    /// The paper's grey.
-    Luma,
 }
 
 /// Arguments of `domecast track`.
@@ -59,6 +51,11 @@ pub struct TrackArguments {
     /// skin in 3D. It opens from a disk without a network.
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
+    /// Record frames, wrench, pose, dots and status as ROS 2 messages, which Foxglove, rerun and `ros2 bag` open; with --shape
+    /// the skin's heights too. It grows in its place: killed, it is there to its last half second. Without --times frames
+    /// stand a thirtieth of a second apart.
+    #[arg(long, value_name = "FILE")]
+    pub mcap: Option<PathBuf>,
     /// How many times as long as they are the arrows of the dots are drawn.
     #[arg(long, default_value_t = 1.0)]
     pub magnify: f64,
@@ -80,10 +77,8 @@ pub struct TrackArguments {
     /// their times are gaps.
     #[arg(long, value_name = "FILE")]
     pub times: Option<PathBuf>,
-    /// The channel that marks are measured in: colour filters and JPEG leave luma whole, where they are not, green is
-    /// free of dispersion.
-    #[arg(long, value_enum, default_value = "luma")]
-    channel: ChannelName,
+    #[command(flatten)]
+    pub tracker: TrackerArguments,
     // taken for one version more, without effect
     #[arg(long, hide = true)]
     flow: bool,
@@ -97,48 +92,15 @@ pub struct TrackArguments {
     no_blur: bool,
     #[arg(long, hide = true)]
     open: bool,
-    /// Count from the mean of the first so many good frames, which are without load, not from the constants' rest.
-    #[arg(long)]
-    reference: Option<u32>,
-    /// Search the whole frame at least every so many frames; 0: only when needed.
-    #[arg(long, default_value_t = 30)]
-    search_every: u32,
-    /// Largest rms of the white markers' residuals that is still a pose, px.
-    #[arg(long, alias = "most-residual-px", default_value_t = 2.0)]
-    max_residual_px: f64,
-    /// Share of the dots' spacing by which three quarters of them may be misplaced before the constants are called
-    /// another sensor's.
-    #[arg(long, alias = "most-misplaced", default_value_t = 0.5)]
-    max_misplaced: f64,
-    /// The camera is mounted so that the picture is turned clockwise by so many degrees against the constants. With a
-    /// number, 0 too, a key that cannot be seen is no fault.
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = degrees)]
-    camera_turned: Option<f64>,
-    /// The picture is mirrored left to right, before it is turned; pixels are then stated as in the picture mirrored back.
-    #[arg(long)]
-    pub camera_mirrored: bool,
-    /// Temperature of the springs, degrees C [default: that of the constants' stiffness].
-    #[arg(long, value_name = "C", allow_negative_numbers = true, value_parser = crate::commands::calibrate_force::celsius)]
-    temperature: Option<f64>,
 }
 
-fn field(text: &str) -> Result<Field, String> {
+/// A field by its name.
+pub fn field(text: &str) -> Result<Field, String> {
     let names = || Field::ALL.map(Field::as_str).join(", ");
     Field::from_name(text.trim()).ok_or_else(|| format!("one of {}", names()))
 }
 
-fn degrees(text: &str) -> Result<f64, String> {
-    let number = text.trim().parse().ok().filter(|v: &f64| v.abs() <= 360.0);
-    number.ok_or_else(|| "a number of degrees from -360 to 360".into())
-}
-
 impl TrackArguments {
-    /// A picture that is mirrored and then turned is, mirrored back, turned the other way.
-    fn camera_turned_rad(&self) -> Option<f64> {
-        let turned_rad = self.camera_turned.map(f64::to_radians);
-        if self.camera_mirrored { Some(-turned_rad.unwrap_or(0.0)) } else { turned_rad }
-    }
-
     /// Constants that cannot be tracked with.
     pub fn unfit(&self, error: &TrackError) -> Failure {
         input_fault(&self.constants, error.to_string(), "constants of a sensor")
@@ -158,24 +120,6 @@ impl TrackArguments {
             output.warn(&format!(
                 "{option} has no effect any more: dots are found where the pose puts them; the next version does not take it"
             ));
-        }
-    }
-
-    /// What the tracker is to do.
-    pub fn options(&self) -> TrackOptions {
-        TrackOptions {
-            channel: match self.channel {
-                ChannelName::Red => Channel::Red,
-                ChannelName::Green => Channel::Green,
-                ChannelName::Blue => Channel::Blue,
-                ChannelName::Luma => Channel::Luma,
-            },
-            reference: self.reference.map_or(Reference::Constants, Reference::Frames),
-            search_every: self.search_every,
-            max_residual_px: self.max_residual_px,
-            max_misplaced: self.max_misplaced,
-            camera_turned_rad: self.camera_turned_rad(),
-            temperature_c: self.temperature,
         }
     }
 }

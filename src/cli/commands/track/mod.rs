@@ -1,7 +1,6 @@
 //! `domecast track FRAMES --constants FILE`
 
 mod arguments;
-mod decode;
 mod pictures;
 mod results;
 mod shape;
@@ -14,6 +13,7 @@ use std::time::Instant;
 
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
+use domecast_live::decode::Picture;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::ShapeMap;
 use domecast_runtime::track::{CameraFrame, CameraTurn, Tracked, Tracker};
@@ -23,10 +23,10 @@ use source::FrameSource;
 use tally::Tally;
 use times::FrameTimes;
 
-pub use arguments::TrackArguments;
+pub use arguments::{TrackArguments, field};
 
 /// What cures pictures that lie otherwise than the constants say.
-fn turned_hint(turn: CameraTurn) -> String {
+pub fn turned_hint(turn: CameraTurn) -> String {
     let deg = (turn.turned_rad.to_degrees() * 10.0).round() / 10.0;
     let (how, option) = if turn.is_mirrored {
         ("mirrored left to right, then turned", "--camera-mirrored --camera-turned")
@@ -85,7 +85,7 @@ fn press(forces: &mut ForceDistribution, tracked: &Tracked, skin: Option<&ShapeM
     };
 }
 
-fn frame_of(picture: &Result<decode::Picture, String>) -> Result<CameraFrame<'_>, String> {
+fn frame_of(picture: &Result<Picture, String>) -> Result<CameraFrame<'_>, String> {
     let picture = picture.as_ref().map_err(String::clone)?;
     let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
     frame.map_err(|error| error.to_string())
@@ -95,11 +95,12 @@ fn frame_of(picture: &Result<decode::Picture, String>) -> Result<CameraFrame<'_>
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     arguments.note_what_is_gone(output);
     let constants = read_constants(&arguments.constants)?;
-    let mut tracker = Tracker::new(&constants, arguments.options()).map_err(|e| arguments.unfit(&e))?;
+    let mut tracker =
+        Tracker::new(&constants, arguments.tracker.options()).map_err(|e| arguments.unfit(&e))?;
     let mut forces = forces_of(arguments, &constants)?;
     let inputs = inputs_of(arguments);
     let rules = output.rules(&inputs);
-    let mut results = Results::open(arguments, &rules, &constants, &tracker)?;
+    let mut results = Results::open(output, arguments, &rules, &constants, &tracker)?;
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
     let mut times = FrameTimes::open(arguments.times.as_deref())?;
     results.begin(arguments)?;
@@ -107,10 +108,11 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     warn_without_key(output, arguments, &constants);
     let mut turn = None;
     while let Some(mut next) = source.next_frame() {
-        if arguments.camera_mirrored
+        if arguments.tracker.camera_mirrored
             && let Ok(picture) = &mut next.picture
         {
             picture.mirror();
+            next.encoded = None;
         }
         output.step(&format!("frame {}", next.number));
         let picture = frame_of(&next.picture);
@@ -136,7 +138,8 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         }
         turn = tracked.camera_turn.or(turn);
         *tally.counts.entry(tracked.status()).or_default() += 1;
-        results.write(output, arguments, picture.as_ref().ok(), tracked, forces.as_mut())?;
+        let encoded = next.encoded.as_deref();
+        results.write(output, arguments, picture.as_ref().ok(), encoded, tracked, forces.as_mut())?;
         source.reuse(next.picture);
     }
     output.steps_done();

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use super::arguments::TrackArguments;
-use super::decode;
 use crate::commands::output::{Failure, Output};
 use domecast_files::{OutputRules, StagedFolder};
+use domecast_live::decode;
 use domecast_optics::SensorOptics;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::overlay::{OverlayLayers, depth_range_mm, overlay_png};

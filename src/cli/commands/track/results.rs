@@ -1,7 +1,7 @@
 //! Everything that `track` writes, frame by frame.
 
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
@@ -9,6 +9,7 @@ use super::arguments::{Format, TrackArguments};
 use super::pictures::Pictures;
 use super::shape::ShapeFiles;
 use crate::commands::output::{Failure, Output};
+use crate::commands::recording::{Recording, recorded, time_ns};
 use crate::track_report::{TrackReport, page};
 use domecast_files::{OutputRules, StagedFile};
 use domecast_runtime::constants::Constants;
@@ -82,6 +83,7 @@ pub(super) struct Results {
     pictures: Pictures,
     shape: Option<ShapeFiles>,
     page: Option<(StagedFile, TrackReport)>,
+    recording: Option<Recording>,
     at_mm: DVec3,
     line: Vec<u8>,
 }
@@ -89,6 +91,7 @@ pub(super) struct Results {
 impl Results {
     /// Opens all that is asked for, and refuses what could not be written.
     pub fn open(
+        output: &Output,
         arguments: &TrackArguments,
         rules: &OutputRules<'_>,
         constants: &Constants,
@@ -106,7 +109,10 @@ impl Results {
             }
             None => None,
         };
-        Ok(Self { sink, pictures, shape, page, at_mm, line: Vec::new() })
+        // last, for it is there at once
+        let begin = |path: &PathBuf| Recording::begin(output, path, "track", rules, constants, tracker);
+        let recording = arguments.mcap.as_ref().map(begin).transpose()?;
+        Ok(Self { sink, pictures, shape, page, recording, at_mm, line: Vec::new() })
     }
 
     /// Writes what stands before the lines.
@@ -124,12 +130,13 @@ impl Results {
         self.shape.as_ref().map(ShapeFiles::map)
     }
 
-    /// Writes all of a frame; there is none where it could not be read.
+    /// Writes all of a frame, and of its file's bytes where it has a file; there is none where it could not be read.
     pub fn write(
         &mut self,
         output: &Output,
         arguments: &TrackArguments,
         frame: Option<&CameraFrame<'_>>,
+        encoded: Option<&[u8]>,
         tracked: &Tracked,
         mut forces: Option<&mut ForceDistribution>,
     ) -> Result<(), Failure> {
@@ -150,6 +157,9 @@ impl Results {
         if let Some((_, report)) = &mut self.page {
             report.add(tracked, skin);
         }
+        if let Some(recording) = &mut self.recording {
+            recording.add(time_ns(tracked), recorded(frame.copied(), encoded), tracked, skin)?;
+        }
         Ok(())
     }
 
@@ -164,6 +174,6 @@ impl Results {
             file.write(page(&report).as_str().as_bytes())?;
             output.kept(file.commit()?);
         }
-        Ok(())
+        self.recording.map_or(Ok(()), Recording::end)
     }
 }

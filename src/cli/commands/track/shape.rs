@@ -5,10 +5,10 @@ use std::path::Path;
 use serde_json::json;
 
 use super::arguments::TrackArguments;
-use super::decode;
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
 use domecast_files::{OutputRules, StagedFolder, npy_f32, npy_u8, ply, png_u16};
+use domecast_live::decode;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeMap, ShapeOptions};
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};

@@ -1,6 +1,6 @@
 //! Where frames come from: files, a video through ffmpeg, a stream.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -8,11 +8,9 @@ use std::str::FromStr;
 
 use super::super::input::input_fault;
 use super::super::output::Failure;
-use super::decode::{self, Picture};
+use domecast_live::decode::{self, Picture};
+use domecast_live::frame_files::{has_extension, numbered, pictures_in, read_whole};
 
-/// Bytes at most of a picture's file.
-const MAX_FILE_BYTES: u64 = 1 << 28;
-const PICTURES: [&str; 5] = ["png", "jpg", "jpeg", "pgm", "ppm"];
 const VIDEOS: [&str; 8] = ["avi", "mp4", "mkv", "mov", "webm", "m4v", "mjpeg", "mpg"];
 const ALLOWED: &str = "a folder of PNG or JPEG frames, frames, one video, or - for a stream";
 
@@ -46,6 +44,8 @@ impl FromStr for RawSize {
 pub struct NextFrame {
     pub number: u64,
     pub picture: Result<Picture, String>,
+    /// The bytes of its file, where it has one.
+    pub encoded: Option<Vec<u8>>,
 }
 
 enum Kind {
@@ -93,7 +93,7 @@ impl FrameSource {
         for named in paths {
             named.metadata().map_err(|error| unreadable(named, &error))?;
         }
-        let files = if path.is_dir() && more.is_empty() { pictures_in(path)? } else { paths.to_vec() };
+        let files = if path.is_dir() && more.is_empty() { pictures_of(path)? } else { paths.to_vec() };
         Ok(of(Kind::Files(numbered(files).into_iter())))
     }
 
@@ -135,8 +135,11 @@ impl FrameSource {
         match &mut self.kind {
             Kind::Files(files) => {
                 let (number, path) = files.next()?;
-                let picture = read_whole(&path).and_then(|bytes| decode::picture(&bytes));
-                Some(NextFrame { number, picture: picture.map_err(|e| format!("{}: {e}", path.display())) })
+                let encoded = read_whole(&path).map_err(|error| format!("cannot be read ({error})"));
+                let picture =
+                    encoded.as_ref().map_err(String::clone).and_then(|bytes| decode::picture(bytes));
+                let picture = picture.map_err(|e| format!("{}: {e}", path.display()));
+                Some(NextFrame { number, picture, encoded: encoded.ok() })
             }
             Kind::Raw(stream, size) => {
                 let wanted = size.width * size.height * size.channels;
@@ -153,12 +156,12 @@ impl FrameSource {
                     Err(error) => Err(format!("the stream broke off ({error})")),
                 };
                 self.done = picture.is_err();
-                Some(NextFrame { number, picture })
+                Some(NextFrame { number, picture, encoded: None })
             }
             Kind::Pnm(stream) => {
                 let picture = decode::pnm(stream).transpose()?;
                 self.done = picture.is_err();
-                Some(NextFrame { number, picture })
+                Some(NextFrame { number, picture, encoded: None })
             }
         }
     }
@@ -191,51 +194,10 @@ fn unreadable(path: &Path, error: &io::Error) -> Failure {
     input_fault(path, problem, ALLOWED)
 }
 
-fn has_extension(path: &Path, list: &[&str]) -> bool {
-    path.extension().and_then(|e| e.to_str()).is_some_and(|e| list.contains(&e.to_ascii_lowercase().as_str()))
-}
-
-fn read_whole(path: &Path) -> Result<Vec<u8>, String> {
-    let fault = |error: io::Error| format!("cannot be read ({error})");
-    let file = File::open(path).map_err(fault)?;
-    let mut bytes = Vec::new();
-    file.take(MAX_FILE_BYTES).read_to_end(&mut bytes).map_err(fault)?;
-    Ok(bytes)
-}
-
-fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let entries = fs::read_dir(folder).map_err(|e| unreadable(folder, &e))?;
-    let mut found = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(|e| unreadable(folder, &e))?.path();
-        if has_extension(&path, &PICTURES) {
-            found.push(path);
-        }
-    }
+fn pictures_of(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let found = pictures_in(folder).map_err(|error| unreadable(folder, &error))?;
     if found.is_empty() {
         return Err(input_fault(folder, "holds no PNG or JPEG frame", ALLOWED));
     }
-    found.sort();
     Ok(found)
-}
-
-/// The last number in a file's name.
-fn number_of(path: &Path) -> Option<u64> {
-    let name = path.file_stem()?.to_str()?;
-    let digits: String =
-        name.chars().rev().skip_while(|c| !c.is_ascii_digit()).take_while(char::is_ascii_digit).collect();
-    digits.chars().rev().collect::<String>().parse().ok()
-}
-
-/// Frames by the numbers in their names, so that a missing file shows as a gap; by their order where some have none,
-/// or two have the same.
-fn numbered(files: Vec<PathBuf>) -> Vec<(u64, PathBuf)> {
-    let mut by_name: Vec<(u64, PathBuf)> =
-        files.iter().filter_map(|path| Some((number_of(path)?, path.clone()))).collect();
-    by_name.sort_by_key(|(number, _)| *number);
-    let distinct = by_name.windows(2).all(|pair| pair[0].0 != pair[1].0);
-    if by_name.len() == files.len() && distinct {
-        return by_name;
-    }
-    files.into_iter().enumerate().map(|(i, path)| (i as u64, path)).collect()
 }

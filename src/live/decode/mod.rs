@@ -1,8 +1,23 @@
-//! Pictures from their files, and back.
+//! Pictures from their files and from cameras, and back.
+//!
+//! ```
+//! use domecast_live::decode::{picture, png_of};
+//!
+//! let file = png_of(2, 1, 1, &[7, 9])?;
+//! let read = picture(&file)?;
+//! assert_eq!((read.width, read.height, read.bytes), (2, 1, vec![7, 9]));
+//! # Ok::<(), String>(())
+//! ```
+
+mod huffman;
+mod yuyv;
 
 use std::io::Read;
 
 use domecast_runtime::track::CameraFrame;
+
+pub use huffman::with_huffman_tables;
+pub use yuyv::yuyv;
 
 /// Bytes at most of an unpacked picture.
 const MAX_BYTES: usize = 3 << 26;
@@ -10,10 +25,44 @@ const MAX_BYTES: usize = 3 << 26;
 /// A decoded picture: grey or interleaved red, green, blue.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
+    /// Pixels across.
     pub width: usize,
+    /// Pixels down.
     pub height: usize,
+    /// 1 or 3.
     pub channels: usize,
+    /// Rows from the top.
     pub bytes: Vec<u8>,
+}
+
+/// How the bytes of a picture's file are coded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PictureFormat {
+    /// Portable Network Graphics.
+    Png,
+    /// JPEG, also a frame of Motion JPEG.
+    Jpeg,
+}
+
+impl PictureFormat {
+    /// By the first bytes; `None` for others.
+    pub fn of(bytes: &[u8]) -> Option<Self> {
+        if bytes.starts_with(b"\x89PNG") {
+            Some(Self::Png)
+        } else if bytes.starts_with(b"\xff\xd8") {
+            Some(Self::Jpeg)
+        } else {
+            None
+        }
+    }
+
+    /// `png` or `jpeg`, as ROS 2 names them.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Jpeg => "jpeg",
+        }
+    }
 }
 
 impl Picture {
@@ -39,11 +88,15 @@ impl Picture {
 }
 
 /// A PNG, JPEG or PNM picture, recognized by its first bytes.
+///
+/// # Errors
+/// What is wrong with it: cut off, too large, of another kind.
 pub fn picture(bytes: &[u8]) -> Result<Picture, String> {
-    if bytes.starts_with(b"\x89PNG") {
-        png(bytes)
-    } else if bytes.starts_with(b"\xff\xd8") {
-        jpeg(bytes)
+    if let Some(format) = PictureFormat::of(bytes) {
+        match format {
+            PictureFormat::Png => png(bytes),
+            PictureFormat::Jpeg => jpeg(bytes),
+        }
     } else if bytes.starts_with(b"P5") || bytes.starts_with(b"P6") {
         let mut rest = bytes;
         pnm(&mut rest)?.ok_or_else(|| "holds nothing".into())
@@ -96,6 +149,9 @@ fn jpeg(bytes: &[u8]) -> Result<Picture, String> {
 }
 
 /// The next PGM or PPM picture (binary, 8 bit) of a stream; `None` at its end.
+///
+/// # Errors
+/// A stream that broke off, or holds something else.
 pub fn pnm(stream: &mut dyn Read) -> Result<Option<Picture>, String> {
     let fault = |error: std::io::Error| format!("the stream broke off ({error})");
     let mut byte = || -> Result<Option<u8>, String> {
@@ -144,7 +200,10 @@ pub fn pnm(stream: &mut dyn Read) -> Result<Option<Picture>, String> {
     Picture { width, height, channels, bytes }.checked().map(Some)
 }
 
-/// A PNG of bytes.
+/// A PNG of bytes: rows from the top, 1 or 3 channels.
+///
+/// # Errors
+/// Bytes that are not of the size.
 pub fn png_of(width: usize, height: usize, channels: usize, bytes: &[u8]) -> Result<Vec<u8>, String> {
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, width as u32, height as u32);
@@ -167,7 +226,7 @@ mod tests {
         pgm.extend(&bytes[..32 * 24]);
         let mut ppm = b"P6 # a comment\n32 24 255\n".to_vec();
         ppm.extend(&bytes);
-        let jpeg = include_bytes!("../../../../tests/cases/frames/tiny.jpg").to_vec();
+        let jpeg = include_bytes!("../../../tests/cases/frames/tiny.jpg").to_vec();
         [png_of(32, 24, 3, &bytes).unwrap(), jpeg, pgm, ppm]
     }
 

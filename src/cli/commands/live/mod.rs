@@ -1,0 +1,150 @@
+//! `domecast live DEVICE --constants FILE`
+
+mod arguments;
+mod health;
+mod session;
+mod terminal;
+
+use std::io::{self, BufReader};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use super::input::{input_fault, read_constants};
+use super::output::{Failure, Output};
+use super::recording::Recording;
+use domecast_files::StopWish;
+use domecast_live::decode::picture;
+use domecast_live::frame_files::read_whole;
+use domecast_live::page::LivePage;
+use domecast_live::source::{CameraRequest, FrameSource, PictureStream, Player, PlayerOptions, open_camera};
+use domecast_live::{LiveEvent, LiveReader};
+use domecast_runtime::constants::Constants;
+use domecast_runtime::shape::{ShapeFromColor, ShapeOptions};
+use domecast_runtime::track::{CameraFrame, Tracker};
+use session::Session;
+
+pub use arguments::LiveArguments;
+
+/// Frames that wait at most: what is older than that is no longer live.
+const MAX_WAITING: usize = 4;
+/// How often the work looks whether it is to end.
+const LOOK: Duration = Duration::from_millis(100);
+/// A device that gives nothing for so long is named.
+const STALLED: Duration = Duration::from_secs(1);
+
+const DEVICES: &str = "a camera such as /dev/video0, - for PPM pictures, or player:FOLDER";
+
+fn open_source(arguments: &LiveArguments, constants: &Constants) -> Result<Box<dyn FrameSource>, Failure> {
+    let device = arguments.device.as_str();
+    let fault = |problem: String| input_fault(Path::new(device), problem, DEVICES);
+    if device == "-" {
+        return Ok(Box::new(PictureStream::new(BufReader::new(io::stdin()))));
+    }
+    if let Some(spec) = device.strip_prefix("player:") {
+        let (folder, options) = PlayerOptions::parse(spec).map_err(fault)?;
+        let player = Player::open(&folder, options);
+        return Ok(Box::new(player.map_err(|problem| input_fault(&folder, problem, "a folder of frames"))?));
+    }
+    let size = [constants.camera.width, constants.camera.height];
+    let request = CameraRequest { size, rate_hz: arguments.rate, controls: arguments.controls() };
+    open_camera(Path::new(device), request).map_err(fault)
+}
+
+/// Frames of another size say nothing, and never will.
+fn check_size(
+    source: &dyn FrameSource,
+    arguments: &LiveArguments,
+    constants: &Constants,
+) -> Result<(), Failure> {
+    let wanted = [constants.camera.width as usize, constants.camera.height as usize];
+    match source.info().size {
+        Some([width, height]) if [width, height] != wanted => {
+            let [w, h] = wanted;
+            let problem = format!(
+                "gives frames of {width} x {height}, {} is of {w} x {h}",
+                arguments.constants.display()
+            );
+            let allowed = "frames of that size, or the constants.json of this camera's sensor";
+            Err(input_fault(Path::new(&arguments.device), problem, allowed))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What reads the skin, from a frame at rest.
+fn skin_of(
+    arguments: &LiveArguments,
+    constants: &Constants,
+    tracker: &Tracker,
+) -> Result<Option<ShapeFromColor>, Failure> {
+    let Some(rest) = &arguments.rest else { return Ok(None) };
+    let fault = |path: &Path, problem: String| input_fault(path, problem, "what shape from colour needs");
+    let shape = ShapeFromColor::new(constants, tracker, ShapeOptions::default());
+    let mut shape = shape.map_err(|error| fault(&arguments.constants, error.to_string()))?;
+    let bytes = read_whole(rest).map_err(|error| fault(rest, format!("cannot be read ({error})")))?;
+    let picture = picture(&bytes).map_err(|problem| fault(rest, problem))?;
+    let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
+    let frame = frame.map_err(|error| fault(rest, error.to_string()))?;
+    let tracked = tracker.clone().track(0, &frame).clone();
+    shape.set_rest(&frame, &tracked).map_err(|error| fault(rest, error.to_string()))?;
+    Ok(Some(shape))
+}
+
+/// Reads until the source ends, the frames that were asked for are there, or Ctrl-C.
+pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
+    let constants = read_constants(&arguments.constants)?;
+    let unfit = |problem: String| input_fault(&arguments.constants, problem, "constants of a sensor");
+    let tracker = Tracker::new(&constants, arguments.tracker.options()).map_err(|e| unfit(e.to_string()))?;
+    let skin = skin_of(arguments, &constants, &tracker)?;
+    let source = open_source(arguments, &constants)?;
+    check_size(&*source, arguments, &constants)?;
+    let page = match arguments.show {
+        Some(port) => {
+            Some(LivePage::start(port, *tracker.optics().rest_from_camera(), skin).map_err(|error| {
+                let problem = format!("cannot be used ({error})");
+                input_fault(
+                    Path::new(&format!("--show {port}")),
+                    problem,
+                    "a port that is free, or none for any",
+                )
+            })?)
+        }
+        None => None,
+    };
+    let inputs = [arguments.constants.as_path()];
+    let rules = output.rules(&inputs);
+    let begin =
+        |path: &std::path::PathBuf| Recording::begin(output, path, "live", &rules, &constants, &tracker);
+    let recording = arguments.record.as_ref().map(begin).transpose()?;
+    // the first Ctrl-C ends the reading in good order, with the recording's index and the summary
+    let wish = StopWish::heed();
+    let mut session = Session::begin(output, arguments, tracker, source.info(), page, recording)?;
+    let reader = LiveReader::start(source, MAX_WAITING).map_err(Failure::Print)?;
+    let mut heard = Instant::now();
+    let mut is_stalled = false;
+    while !wish.came() && arguments.frames.is_none_or(|count| session.frames() < count) {
+        match reader.next(LOOK) {
+            Some(LiveEvent::Frame(frame, pushed_out)) => {
+                (heard, is_stalled) = (Instant::now(), false);
+                session.frame(&frame, pushed_out)?;
+            }
+            Some(LiveEvent::Unplugged(why)) => session.unplugged(&why)?,
+            Some(LiveEvent::Replugged(after, info)) => {
+                heard = Instant::now();
+                session.replugged(after, &info)?;
+            }
+            Some(LiveEvent::Ended(why)) => {
+                if let Some(why) = why {
+                    session.failed(&why)?;
+                }
+                break;
+            }
+            None if !is_stalled && heard.elapsed() > STALLED => {
+                is_stalled = true;
+                session.stalled()?;
+            }
+            None => {}
+        }
+    }
+    session.end()
+}

@@ -1,0 +1,320 @@
+//! What is done with each frame, and what is said of the device.
+
+use std::collections::BTreeMap;
+use std::io::{self, IsTerminal, Write};
+use std::time::{Duration, Instant, SystemTime};
+
+use serde_json::{Value, json};
+
+use super::arguments::LiveArguments;
+use super::health::Health;
+use super::terminal::{Around, TerminalView};
+use crate::commands::input::input_fault;
+use crate::commands::output::{Failure, Output};
+use crate::commands::recording::{Recording, recorded};
+use domecast_live::AgeStatistics;
+use domecast_live::decode::Picture;
+use domecast_live::page::{LivePage, LiveReading};
+use domecast_live::source::{ArrivedFrame, SourceInfo};
+use domecast_runtime::track::{CameraFrame, Tracked, Tracker, write_json_fields};
+use std::sync::Arc;
+
+/// How fast the shown rate follows.
+const FOLLOW: f64 = 0.05;
+
+/// A run of `live`.
+pub struct Session<'a> {
+    output: &'a Output,
+    arguments: &'a LiveArguments,
+    tracker: Tracker,
+    page: Option<LivePage>,
+    recording: Option<Recording>,
+    is_recording_lost: bool,
+    view: Option<TerminalView>,
+    head: String,
+    line: Vec<u8>,
+    /// Nanoseconds since 1970 of the source's time 0.
+    began_ns: u64,
+    last: Option<Instant>,
+    step_s: f64,
+    device: &'static str,
+    health: Health,
+    ages: AgeStatistics,
+    age_ms: f64,
+    counts: BTreeMap<&'static str, u64>,
+    dropped: u64,
+    reconnects: u64,
+}
+
+/// What a source says of itself, in a line.
+fn head(info: &SourceInfo) -> String {
+    let mut text = format!("domecast live: {}", info.name);
+    if let Some([width, height]) = info.size {
+        text += &format!(", {width} x {height}");
+    }
+    text += &format!(", {}", info.format);
+    for control in &info.controls {
+        text += &format!(", {} {}", control.name, control.value);
+    }
+    text
+}
+
+fn described(info: &SourceInfo) -> Value {
+    let controls: BTreeMap<&str, i32> = info.controls.iter().map(|c| (c.name, c.value)).collect();
+    json!({
+        "device": info.name, "size": info.size, "format": info.format, "rate_hz": info.rate_hz, "controls": controls,
+        "warnings": info.warnings,
+    })
+}
+
+impl<'a> Session<'a> {
+    pub fn begin(
+        output: &'a Output,
+        arguments: &'a LiveArguments,
+        tracker: Tracker,
+        info: &SourceInfo,
+        page: Option<LivePage>,
+        recording: Option<Recording>,
+    ) -> Result<Self, Failure> {
+        let is_seen = io::stdout().is_terminal() && !output.is_json();
+        let began = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let url = page.as_ref().map(LivePage::url);
+        let mut session = Self {
+            output,
+            arguments,
+            tracker,
+            page,
+            recording,
+            is_recording_lost: false,
+            view: is_seen.then(TerminalView::default),
+            head: head(info),
+            line: Vec::new(),
+            began_ns: u64::try_from(began.as_nanos()).unwrap_or(u64::MAX),
+            last: None,
+            step_s: 0.0,
+            device: "ok",
+            health: Health::default(),
+            ages: AgeStatistics::default(),
+            age_ms: 0.0,
+            counts: BTreeMap::new(),
+            dropped: 0,
+            reconnects: 0,
+        };
+        let mut about = described(info);
+        about["page"] = json!(url);
+        session.event("started", about, None)?;
+        if let Some(url) = url {
+            output.note(&format!("the page is at {url}"));
+        }
+        for warning in &info.warnings {
+            session.output.warn(warning);
+        }
+        Ok(session)
+    }
+
+    /// How many frames there were.
+    pub fn frames(&self) -> u64 {
+        self.counts.values().sum()
+    }
+
+    fn put_line(&mut self) -> Result<(), Failure> {
+        let mut out = io::stdout().lock();
+        Ok(out.write_all(&self.line).and_then(|()| out.flush())?)
+    }
+
+    /// Says what happened: a JSON line, or below the view.
+    fn event(&mut self, name: &str, mut about: Value, message: Option<&str>) -> Result<(), Failure> {
+        if let Some(view) = &mut self.view {
+            view.leave();
+        }
+        if let Some(message) = message {
+            self.output.warn(message);
+            about["message"] = json!(message);
+        }
+        if self.view.is_none() {
+            let mut line = json!({ "event": name });
+            if let (Some(line), Value::Object(about)) = (line.as_object_mut(), about) {
+                line.extend(about);
+            }
+            self.line.clear();
+            writeln!(self.line, "{line}")?;
+            self.put_line()?;
+        }
+        Ok(())
+    }
+
+    /// Reads a frame and gives its numbers out.
+    pub fn frame(&mut self, frame: &ArrivedFrame, pushed_out: u64) -> Result<(), Failure> {
+        self.dropped += pushed_out;
+        let mut decoded = frame.data.decode();
+        let is_mirrored = self.arguments.tracker.camera_mirrored;
+        if let (true, Ok(picture)) = (is_mirrored, &mut decoded) {
+            Arc::make_mut(picture).mirror();
+        }
+        self.tracker.stamp(frame.time_s);
+        let seen = decoded.as_deref().map_err(Clone::clone).and_then(camera_frame);
+        let tracked = match &seen {
+            Ok(seen) => self.tracker.track(frame.number, seen),
+            Err(_) => self.tracker.skip(frame.number),
+        };
+        *self.counts.entry(tracked.status()).or_default() += 1;
+        if self.view.is_none() {
+            write_reading(&mut self.line, tracked, self.arguments, frame.complete.elapsed(), self.dropped)?;
+            let mut out = io::stdout().lock();
+            out.write_all(&self.line).and_then(|()| out.flush())?;
+        }
+        let age = frame.complete.elapsed();
+        // the numbers are out; what follows is of no reading's age but the next one's
+        self.ages.add(age);
+        self.age_ms = 1e3 * age.as_secs_f64();
+        self.keep_pace(frame.complete);
+        let file = frame.file.as_deref().filter(|_| !is_mirrored);
+        self.record(frame, seen.as_ref().ok().copied(), file)?;
+        self.look(frame.complete, decoded.ok())
+    }
+
+    /// The rate, from frame to frame.
+    fn keep_pace(&mut self, now: Instant) {
+        if let Some(last) = self.last.replace(now) {
+            let step_s = now.saturating_duration_since(last).as_secs_f64();
+            self.step_s =
+                if self.step_s == 0.0 { step_s } else { self.step_s + FOLLOW * (step_s - self.step_s) };
+        }
+    }
+
+    fn rate_hz(&self) -> f64 {
+        if self.step_s > 0.0 { 1.0 / self.step_s } else { 0.0 }
+    }
+
+    fn record(
+        &mut self,
+        frame: &ArrivedFrame,
+        seen: Option<CameraFrame<'_>>,
+        file: Option<&[u8]>,
+    ) -> Result<(), Failure> {
+        let Some(recording) = &mut self.recording else { return Ok(()) };
+        let time_ns = self.began_ns.saturating_add((1e9 * frame.time_s).max(0.0) as u64);
+        let added = recording.add(time_ns, recorded(seen, file), self.tracker.result(), None);
+        if let Err(failure) = added {
+            // reading goes on: a full disk must not stop a robot
+            self.recording = None;
+            self.is_recording_lost = true;
+            let message = failure.message().unwrap_or_default();
+            self.event("recording_lost", json!({}), Some(&message))?;
+        }
+        Ok(())
+    }
+
+    /// Shows the reading to people, and says what is wrong with all frames.
+    fn look(&mut self, now: Instant, picture: Option<Arc<Picture>>) -> Result<(), Failure> {
+        let found = self.health.watch(self.tracker.result(), now);
+        let device = self.health.status().unwrap_or(self.device);
+        if let Some(found) = found {
+            let about = json!({ "status": found.status });
+            self.event("no_measurement", about, Some(&found.message))?;
+        }
+        let rate_hz = self.rate_hz();
+        let tracked = self.tracker.result();
+        if let Some(page) = &self.page {
+            let (age_ms, dropped) = (self.age_ms, self.dropped);
+            page.show(|| LiveReading { picture, tracked: tracked.clone(), age_ms, rate_hz, dropped, device });
+        }
+        let Some(view) = &mut self.view else { return Ok(()) };
+        let quantile = |share| self.ages.quantile_ms(share).unwrap_or(0.0);
+        let around = Around {
+            head: &self.head,
+            device,
+            rate_hz,
+            age_ms: self.age_ms,
+            age_p50_ms: quantile(0.5),
+            age_p99_ms: quantile(0.99),
+            dropped: self.dropped,
+        };
+        Ok(view.show(tracked, &around)?)
+    }
+
+    pub fn unplugged(&mut self, why: &str) -> Result<(), Failure> {
+        self.device = "unplugged";
+        self.event("unplugged", json!({}), Some(&format!("{why}; waiting for it to come back")))
+    }
+
+    pub fn replugged(&mut self, after: Duration, info: &SourceInfo) -> Result<(), Failure> {
+        self.device = "ok";
+        self.reconnects += 1;
+        // the steps across it are none
+        self.last = None;
+        self.head = head(info);
+        let mut about = described(info);
+        about["after_s"] = json!((1e3 * after.as_secs_f64()).round() / 1e3);
+        self.event(
+            "replugged",
+            about,
+            Some(&format!("the device is back after {:.1} s", after.as_secs_f64())),
+        )
+    }
+
+    pub fn stalled(&mut self) -> Result<(), Failure> {
+        if self.device != "ok" {
+            return Ok(());
+        }
+        self.event("stalled", json!({}), Some("no frame came for a second"))
+    }
+
+    pub fn failed(&mut self, why: &str) -> Result<(), Failure> {
+        self.event("failed", json!({}), Some(why))
+    }
+
+    /// The summary.
+    pub fn end(mut self) -> Result<(), Failure> {
+        if let Some(recording) = self.recording.take() {
+            recording.end()?;
+        }
+        let ms = |share| self.ages.quantile_ms(share).map(|ms| (1e3 * ms).round() / 1e3);
+        let (p50, p99, max) = (ms(0.5), ms(0.99), ms(1.0));
+        let frames = self.frames();
+        let about = json!({
+            "frames": frames, "dropped": self.dropped, "reconnects": self.reconnects, "status": self.counts,
+            "age_p50_ms": p50, "age_p99_ms": p99, "age_max_ms": max,
+        });
+        let statuses: Vec<String> = self.counts.iter().map(|(status, n)| format!("{n} {status}")).collect();
+        let (dropped, reconnects) = (self.dropped, self.reconnects);
+        self.event("ended", about, None)?;
+        if frames == 0 {
+            let device = std::path::Path::new(&self.arguments.device);
+            return Err(input_fault(device, "gave no frame", "a device that gives frames"));
+        }
+        if self.view.is_some() {
+            let age = |ms: Option<f64>| ms.unwrap_or(0.0);
+            self.output.say(&format!(
+                "{frames} frames ({}), {dropped} dropped, {reconnects} reconnects; age of a reading: half to {:.2} ms, 99 of 100 to \
+                 {:.2} ms, at most {:.2} ms",
+                statuses.join(", "),
+                age(p50),
+                age(p99),
+                age(max),
+            ))?;
+        }
+        if self.is_recording_lost { Err(Failure::Negative) } else { Ok(()) }
+    }
+}
+
+fn camera_frame(picture: &Picture) -> Result<CameraFrame<'_>, String> {
+    let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
+    frame.map_err(|error| error.to_string())
+}
+
+/// A reading's line: that of `track`, with its age and how many frames were pushed out so far.
+fn write_reading(
+    line: &mut Vec<u8>,
+    tracked: &Tracked,
+    arguments: &LiveArguments,
+    age: Duration,
+    dropped: u64,
+) -> io::Result<()> {
+    line.clear();
+    write_json_fields(line, tracked, &arguments.fields)?;
+    if line.ends_with(b"}\n") {
+        line.truncate(line.len() - 2);
+    }
+    writeln!(line, ",\"age_ms\":{:.3},\"dropped\":{dropped}}}", 1e3 * age.as_secs_f64())
+}

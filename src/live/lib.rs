@@ -1,0 +1,12 @@
+//! A camera's frames as they come, recordings for ROS 2 and its viewers, and a page that shows them live.
+
+mod ages;
+pub mod decode;
+pub mod frame_files;
+pub mod page;
+mod reader;
+pub mod record;
+pub mod source;
+
+pub use ages::AgeStatistics;
+pub use reader::{LiveEvent, LiveReader};

@@ -1,0 +1,127 @@
+//! A page of this machine that shows the readings live: the frame with what is tracked in it, curves of the wrench, the skin's
+//! depth as colours.
+//!
+//! The server answers on 127.0.0.1 alone, to requests that name that host, and to no page of another site. The page gets
+//! server-sent events: one way is all it needs, browsers connect again by themselves, and unlike a WebSocket it stands
+//! behind the browser's own rule that other sites read nothing. Each browser has a thread that sends the newest picture when it
+//! has sent the last one, so a slow one sees fewer and holds nobody up.
+//!
+//! ```
+//! use domecast_live::page::LivePage;
+//! use domecast_optics::numeric::Rigid;
+//!
+//! let page = LivePage::start(0, Rigid::identity(), None)?;
+//! assert!(page.url().starts_with("http://127.0.0.1:"));
+//! # Ok::<(), std::io::Error>(())
+//! ```
+
+mod latest;
+mod painter;
+mod request;
+mod server;
+
+use std::collections::VecDeque;
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use crate::decode::Picture;
+use domecast_optics::numeric::Rigid;
+use domecast_runtime::shape::ShapeFromColor;
+use domecast_runtime::track::Tracked;
+use latest::Latest;
+use painter::paint;
+use server::serve;
+
+/// Wrenches at most between two pictures: 10 s at 60 Hz.
+const MAX_SAMPLES: usize = 600;
+
+/// A reading as the page shows it.
+#[derive(Debug, Clone)]
+pub struct LiveReading {
+    /// The frame; `None` where it could not be read.
+    pub picture: Option<Arc<Picture>>,
+    /// What is tracked in it.
+    pub tracked: Tracked,
+    /// How old the reading was, ms.
+    pub age_ms: f64,
+    /// Frames a second, lately.
+    pub rate_hz: f64,
+    /// Frames that were pushed out of the queue so far.
+    pub dropped: u64,
+    /// What the device is: `ok`, `unplugged`, or what is wrong with all frames.
+    pub device: &'static str,
+}
+
+/// A wrench with its time, s.
+type Sample = (f64, Option<[f64; 6]>);
+
+/// What the program, the painter and the browsers' threads share.
+#[derive(Default)]
+struct Shared {
+    reading: Latest<LiveReading>,
+    samples: Mutex<VecDeque<Sample>>,
+    /// The newest picture, as the text of an event.
+    event: Latest<Arc<str>>,
+    browsers: AtomicUsize,
+    is_stopped: AtomicBool,
+}
+
+/// The page and its server.
+pub struct LivePage {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+}
+
+impl LivePage {
+    /// Starts the server at a port of 127.0.0.1; 0: any that is free. Forces are drawn as the camera sees them; with `skin` the depth of the skin is measured in the
+    /// frames that are shown.
+    ///
+    /// # Errors
+    /// The port is taken, or the system has no threads.
+    pub fn start(port: u16, rest_from_camera: Rigid, skin: Option<ShapeFromColor>) -> io::Result<Self> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+        let address = listener.local_addr()?;
+        let shared = Arc::new(Shared::default());
+        let of_painter = Arc::clone(&shared);
+        thread::Builder::new()
+            .name("painter".into())
+            .spawn(move || paint(&of_painter, rest_from_camera, skin))?;
+        let of_server = Arc::clone(&shared);
+        thread::Builder::new().name("page".into()).spawn(move || serve(&listener, &of_server))?;
+        Ok(Self { shared, address })
+    }
+
+    /// Where a browser finds it.
+    pub fn url(&self) -> String {
+        format!("http://{}/", self.address)
+    }
+
+    /// Shows a reading, if anybody looks; never waits for a browser.
+    pub fn show(&self, reading: impl FnOnce() -> LiveReading) {
+        if self.shared.browsers.load(Ordering::Relaxed) == 0 {
+            return;
+        }
+        let reading = reading();
+        let mut samples = self.shared.samples.lock().unwrap_or_else(PoisonError::into_inner);
+        if samples.len() >= MAX_SAMPLES {
+            samples.pop_front();
+        }
+        let time_s = reading.tracked.time_s.unwrap_or(0.0);
+        samples.push_back((time_s, reading.tracked.wrench.map(|wrench| wrench.to_array())));
+        drop(samples);
+        self.shared.reading.set(reading);
+    }
+}
+
+impl Drop for LivePage {
+    fn drop(&mut self) {
+        self.shared.is_stopped.store(true, Ordering::Relaxed);
+        self.shared.reading.wake();
+        self.shared.event.wake();
+        // wakes the server, which waits for a browser
+        let _ = TcpStream::connect(self.address);
+    }
+}

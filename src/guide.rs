@@ -4,7 +4,7 @@
 //! |---|---|
 //! | choose and design | [`design`], [`dots`], [`simulating`], [`accuracy`] |
 //! | make | [`printing`], [`casting`] |
-//! | calibrate and run | [`force`], [`tracking`], [`formats`] |
+//! | calibrate and run | [`force`], [`tracking`], [`python`], [`formats`] |
 //! | change domecast | [`architecture`] |
 
 #[doc = include_str!("guide/design.md")]
@@ -23,6 +23,8 @@ pub mod simulating {}
 pub mod tracking {}
 #[doc = include_str!("guide/accuracy.md")]
 pub mod accuracy {}
+#[doc = include_str!("guide/python.md")]
+pub mod python {}
 #[doc = include_str!("guide/formats.md")]
 pub mod formats {}
 #[doc = include_str!("guide/architecture.md")]

@@ -146,6 +146,7 @@ def main():
             attempt(name, call, value)
         judged()
     total = sum(SEEN.values())
+    FOLDER.cleanup()
     print(f"wrong inputs: {total} calls, none panicked: {dict(SEEN)}")
     return 0
 

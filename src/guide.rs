@@ -4,7 +4,7 @@
 //! |---|---|
 //! | choose and design | [`design`], [`dots`], [`simulating`], [`accuracy`] |
 //! | make | [`printing`], [`casting`] |
-//! | calibrate and run | [`force`], [`tracking`], [`live`], [`formats`] |
+//! | calibrate and run | [`force`], [`tracking`], [`live`], [`python`], [`formats`] |
 //! | change domecast | [`architecture`] |
 
 #[doc = include_str!("guide/design.md")]
@@ -25,6 +25,8 @@ pub mod tracking {}
 pub mod live {}
 #[doc = include_str!("guide/accuracy.md")]
 pub mod accuracy {}
+#[doc = include_str!("guide/python.md")]
+pub mod python {}
 #[doc = include_str!("guide/formats.md")]
 pub mod formats {}
 #[doc = include_str!("guide/architecture.md")]

@@ -5,4 +5,5 @@ mod commands;
 mod touch_scene;
 mod track_report;
 
-pub use commands::run;
+pub use commands::points::{Unseen, projected, traced};
+pub use commands::{CallError, Called, call, run, run_with, shape_members};

@@ -8,7 +8,7 @@ use crate::tokens::tokens;
 use crate::{assert_none, crates, members, short, text, workspace};
 
 /// The crates from the ground up; each may depend on those named beside it and on no others of ours.
-const CRATES: [(&str, &[&str]); 13] = [
+const CRATES: [(&str, &[&str]); 14] = [
     ("files", &[]),
     ("optics", &[]),
     ("mesh", &[]),
@@ -22,6 +22,7 @@ const CRATES: [(&str, &[&str]); 13] = [
     ("fab", &["design", "files", "mesh", "optics", "runtime", "sim", "springs"]),
     ("live", &["optics", "runtime", "springs"]),
     ("cli", &["contact", "design", "fab", "files", "live", "mesh", "optics", "runtime", "sim", "springs"]),
+    ("python", &["cli", "design", "fab", "files", "optics", "runtime", "sim", "springs"]),
 ];
 
 /// Where data runs through stages: the crate, the folder of the stages, and they in order.

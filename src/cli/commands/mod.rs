@@ -16,7 +16,7 @@ mod new;
 mod new_scene;
 mod of_a_design;
 mod output;
-mod points;
+pub mod points;
 mod recording;
 mod schema;
 mod shell;
@@ -24,12 +24,16 @@ mod simulate;
 mod track;
 mod tracker_arguments;
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
 use output::{Failure, Output};
+
+pub use output::{CallError, Called};
+pub use track::shape_members;
 
 /// From a parameter file to a dome-shaped camera tactile sensor that can be made, calibrated and read.
 #[derive(Debug, Parser)]
@@ -239,8 +243,8 @@ const RENAMED: [(&str, &str); 2] =
     [("--most-residual-px", "--max-residual-px"), ("--most-misplaced", "--max-misplaced")];
 
 /// Says so where an option is given by its old name.
-fn note_old_names(output: &Output) {
-    for given in std::env::args_os().skip(1) {
+fn note_old_names(output: &Output, arguments: &[OsString]) {
+    for given in arguments.iter().skip(1) {
         let given = given.to_string_lossy();
         let name = given.split('=').next().unwrap_or_default();
         if let Some((old, new)) = RENAMED.iter().find(|(old, _)| *old == name) {
@@ -253,32 +257,55 @@ fn note_old_names(output: &Output) {
 ///
 /// Exit codes: 0 done, 1 the input is at fault, 2 usage, 3 our fault.
 pub fn run() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    ExitCode::from(run_with(&std::env::args_os().collect::<Vec<_>>()))
+}
+
+/// [`run`] on arguments, the program's name first; returns the exit code. An interrupt (Ctrl-C) or a request to terminate ends
+/// the process from now on.
+pub fn run_with(given: &[OsString]) -> u8 {
+    let arguments = match Arguments::try_parse_from(given) {
         Ok(arguments) => arguments,
         Err(error) => {
             // help and version are asked for, not errors
             let code = u8::from(error.use_stderr()) * 2;
             // nothing is left to do if even this cannot be printed
             let _ = error.print();
-            return ExitCode::from(code);
+            return code;
         }
     };
     let output = Output::new(arguments.json, arguments.quiet, arguments.force);
-    note_old_names(&output);
+    note_old_names(&output, given);
     domecast_files::tidy_on_signals();
-    for note in domecast_files::recover(std::env::args_os().skip(1)) {
+    for note in domecast_files::recover(given.iter().skip(1).cloned()) {
         output.note(&note);
     }
-    // no input should lead to a panic; if one does, it is our fault and has its own exit code
-    let ran = std::panic::catch_unwind(|| dispatch(&output, &arguments.command));
-    let done = ran.unwrap_or_else(|_| Err(Failure::Internal("it stopped at the place named above".into())));
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
+    match dispatch_safely(&output, &arguments.command) {
+        Ok(()) => 0,
         Err(failure) => {
             output.failure(&failure);
-            ExitCode::from(failure.exit_code())
+            failure.exit_code()
         }
     }
+}
+
+/// Runs a command as a function of a library: arguments as on the command line, without the program's name. Nothing is
+/// printed, and the process's signals stay its own. For commands that end by themselves and have a result.
+///
+/// # Errors
+/// [`CallError`].
+pub fn call(given: &[OsString]) -> Result<Called, CallError> {
+    let program = OsString::from("domecast");
+    let arguments = Arguments::try_parse_from(std::iter::once(&program).chain(given))
+        .map_err(|error| CallError::Other(error.to_string().trim_end().to_owned()))?;
+    let output = Output::silent(arguments.force);
+    dispatch_safely(&output, &arguments.command).map_err(Failure::into_call_error)?;
+    Ok(output.into_called())
+}
+
+/// No input should lead to a panic; if one does, it is our fault and has its own exit code.
+fn dispatch_safely(output: &Output, command: &Command) -> Result<(), Failure> {
+    let ran = std::panic::catch_unwind(|| dispatch(output, command));
+    ran.unwrap_or_else(|_| Err(Failure::Internal("it stopped at the place named above".into())))
 }
 
 fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {

@@ -2,6 +2,7 @@
 
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Value, json};
 
@@ -53,6 +54,15 @@ impl Failure {
         }
     }
 
+    /// The same for the caller of a library.
+    pub fn into_call_error(self) -> CallError {
+        match self {
+            Self::Input(error) => CallError::Input(error),
+            Self::Internal(what) => CallError::Internal(what),
+            other => CallError::Other(other.message().unwrap_or_else(|| "the answer is no".into())),
+        }
+    }
+
     /// What is said of it; nothing where all is said.
     pub fn message(&self) -> Option<String> {
         match self {
@@ -67,6 +77,27 @@ impl Failure {
     }
 }
 
+/// Why a command that was called as a function has no result.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum CallError {
+    /// The design, or another input, is at fault.
+    Input(Box<DesignError>),
+    /// Arguments that the command does not take, or a result that cannot be written, in words.
+    Other(String),
+    /// Something that must not happen, whatever the input.
+    Internal(String),
+}
+
+/// What a command that was called as a function says.
+#[derive(Debug, Default)]
+pub struct Called {
+    /// Its result, as `--json` prints it; null of a command without one.
+    pub result: Value,
+    /// What its caller must know of their files, a sentence each.
+    pub notes: Vec<String>,
+}
+
 /// Standard output and standard error, as the user wants them.
 #[derive(Debug)]
 pub struct Output {
@@ -74,12 +105,33 @@ pub struct Output {
     quiet: bool,
     progress: bool,
     force: bool,
+    /// Where results and notes go instead of being printed.
+    called: Option<Mutex<Called>>,
 }
 
 impl Output {
     /// Progress shows only on a terminal.
     pub fn new(json: bool, quiet: bool, force: bool) -> Self {
-        Self { json, quiet, progress: !json && !quiet && io::stderr().is_terminal(), force }
+        let progress = !json && !quiet && io::stderr().is_terminal();
+        Self { json, quiet, progress, force, called: None }
+    }
+
+    /// Prints nothing: results and notes are kept.
+    pub fn silent(force: bool) -> Self {
+        Self { called: Some(Mutex::default()), ..Self::new(true, true, force) }
+    }
+
+    /// What was kept.
+    pub fn into_called(self) -> Called {
+        let called = self.called.map(|called| called.into_inner().unwrap_or_else(PoisonError::into_inner));
+        called.unwrap_or_default()
+    }
+
+    /// Keeps something; whether it is to be kept.
+    fn keep(&self, take: impl FnOnce(&mut Called)) -> bool {
+        let Some(called) = &self.called else { return false };
+        take(&mut called.lock().unwrap_or_else(PoisonError::into_inner));
+        true
     }
 
     /// What may be replaced by the result of a command that reads `inputs`.
@@ -89,6 +141,9 @@ impl Output {
 
     /// Something of the user's files that they must know of, whatever the mode; never on standard output.
     pub fn note(&self, line: &str) {
+        if self.keep(|called| called.notes.push(line.to_owned())) {
+            return;
+        }
         let _ = writeln!(io::stderr(), "note: {line}");
     }
 
@@ -150,6 +205,9 @@ impl Output {
 
     /// The result, for programs only.
     pub fn result(&self, value: &Value) -> Result<(), Failure> {
+        if self.keep(|called| called.result = value.clone()) {
+            return Ok(());
+        }
         if self.json {
             writeln!(io::stdout(), "{value:#}")?;
         }

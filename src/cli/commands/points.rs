@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 
 use super::output::{Failure, Output};
 use domecast_design::{DesignError, load_optics, parse_json, read_text, read_text_from};
-use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
+use domecast_optics::{SensorOptics, SurfacePoint};
 
 /// Rounding of a double, relative: what every coordinate that is read is off by.
 const ROUNDING: f64 = f64::EPSILON / 2.0;
@@ -22,6 +22,54 @@ const ILL_CONDITIONED: &str = "ill_conditioned";
 /// Answers this many points at a time, so that output starts early and memory stays flat.
 const CHUNK: usize = 4096;
 
+/// Why a pixel or a point has no answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unseen {
+    /// The name of the reason.
+    pub status: &'static str,
+    /// What rounding alone would give the answer, where that is the reason, mm or px.
+    pub rounding_sd: Option<f64>,
+}
+
+impl Unseen {
+    fn beyond(limit: &'static str) -> Self {
+        Self { status: limit, rounding_sd: None }
+    }
+
+    /// Refuses what rounding alone would move too far.
+    fn check(rounding_sd: f64) -> Result<f64, Self> {
+        if rounding_sd.is_nan() || rounding_sd > MAX_ROUNDING_SD {
+            let rounding_sd = Some(rounding_sd).filter(|sd| sd.is_finite());
+            return Err(Self { status: ILL_CONDITIONED, rounding_sd });
+        }
+        Ok(rounding_sd)
+    }
+}
+
+/// What a raw pixel sees on the dome, and the standard deviation that rounding alone gives it, mm.
+///
+/// # Errors
+/// [`Unseen`]: beyond the lens or the dome, or drowned by rounding.
+pub fn traced(optics: &SensorOptics, pixel: DVec2) -> Result<(SurfacePoint, f64), Unseen> {
+    let spec = optics.lens().spec();
+    let hit = optics.trace(pixel).map_err(|limit| Unseen::beyond(limit.as_str()))?;
+    let by_pixel = optics.trace_with_jacobian(pixel).map_or(f64::NAN, |(_, by_pixel)| by_pixel.norm());
+    let raster_px = DVec2::new(f64::from(spec.width), f64::from(spec.height));
+    let sd_mm = ROUNDING * by_pixel * pixel.abs().max(raster_px).length();
+    Ok((hit, Unseen::check(sd_mm)?))
+}
+
+/// The raw pixel that shows a point of the dome (sensor frame, mm), and the standard deviation that rounding alone gives it, px.
+///
+/// # Errors
+/// [`Unseen`]: beyond the lens or the dome, or drowned by rounding.
+pub fn projected(optics: &SensorOptics, place_mm: DVec3) -> Result<(DVec2, f64), Unseen> {
+    let pixel = optics.project(place_mm).map_err(|limit| Unseen::beyond(limit.as_str()))?;
+    let by_point = optics.project_with_jacobian(place_mm).map_or(f64::NAN, |(_, by_point)| by_point.norm());
+    let sd_px = ROUNDING * by_point * place_mm.abs().max(DVec3::splat(optics.dome_radius_mm())).length();
+    Ok((pixel, Unseen::check(sd_px)?))
+}
+
 /// `domecast trace DESIGN --pixels FILE|-`
 pub fn trace(output: &Output, design: &Path, pixels: &Path, pose: Option<&Path>) -> Result<(), Failure> {
     let optics = optics(design, pose)?;
@@ -30,27 +78,17 @@ pub fn trace(output: &Output, design: &Path, pixels: &Path, pose: Option<&Path>)
     answer(output, pixels, ["u", "v"], |[u, v]| {
         let pixel = DVec2::new(u, v);
         let in_image = in_image_bounds(pixel, width, height);
-        let none = |status: &str, sd_mm: Option<f64>| {
-            json!({
+        match traced(&optics, pixel) {
+            Ok((hit, sd_mm)) => json!({
+                "pixel": [u, v], "status": "ok",
+                "surface_mm": hit.surface_mm.to_array(), "normal": hit.normal.to_array(),
+                "field_angle_rad": hit.field_angle_rad, "in_image": in_image, "rounding_sd_mm": sd_mm,
+            }),
+            Err(Unseen { status, rounding_sd }) => json!({
                 "pixel": finite([u, v]), "status": status, "surface_mm": null, "normal": null,
-                "field_angle_rad": null, "in_image": in_image, "rounding_sd_mm": sd_mm,
-            })
-        };
-        let hit = match optics.trace(pixel) {
-            Ok(hit) => hit,
-            Err(limit) => return none(limit.as_str(), None),
-        };
-        let by_pixel = optics.trace_with_jacobian(pixel).map_or(f64::NAN, |(_, by_pixel)| by_pixel.norm());
-        let raster_px = DVec2::new(f64::from(width), f64::from(height));
-        let sd_mm = ROUNDING * by_pixel * pixel.abs().max(raster_px).length();
-        if sd_mm.is_nan() || sd_mm > MAX_ROUNDING_SD {
-            return none(ILL_CONDITIONED, sd_mm.is_finite().then_some(sd_mm));
+                "field_angle_rad": null, "in_image": in_image, "rounding_sd_mm": rounding_sd,
+            }),
         }
-        json!({
-            "pixel": [u, v], "status": "ok",
-            "surface_mm": hit.surface_mm.to_array(), "normal": hit.normal.to_array(),
-            "field_angle_rad": hit.field_angle_rad, "in_image": in_image, "rounding_sd_mm": sd_mm,
-        })
     })
 }
 
@@ -59,29 +97,15 @@ pub fn project(output: &Output, design: &Path, points: &Path, pose: Option<&Path
     let optics = optics(design, pose)?;
     let spec = optics.lens().spec();
     let (width, height) = (spec.width, spec.height);
-    let scale_mm = optics.dome_radius_mm();
-    answer(output, points, ["x", "y", "z"], |point| {
-        let none = |status: &str, sd_px: Option<f64>| {
-            json!({
-                "point_mm": finite(point), "status": status, "image_px": null, "in_image": null,
-                "rounding_sd_px": sd_px,
-            })
-        };
-        let place_mm = DVec3::from_array(point);
-        let pixel = match optics.project(place_mm) {
-            Ok(pixel) => pixel,
-            Err(limit) => return none(limit.as_str(), None),
-        };
-        let by_point =
-            optics.project_with_jacobian(place_mm).map_or(f64::NAN, |(_, by_point)| by_point.norm());
-        let sd_px = ROUNDING * by_point * place_mm.abs().max(DVec3::splat(scale_mm)).length();
-        if sd_px.is_nan() || sd_px > MAX_ROUNDING_SD {
-            return none(ILL_CONDITIONED, sd_px.is_finite().then_some(sd_px));
-        }
-        json!({
+    answer(output, points, ["x", "y", "z"], |point| match projected(&optics, DVec3::from_array(point)) {
+        Ok((pixel, sd_px)) => json!({
             "point_mm": point, "status": "ok", "image_px": pixel.to_array(),
             "in_image": in_image_bounds(pixel, width, height), "rounding_sd_px": sd_px,
-        })
+        }),
+        Err(Unseen { status, rounding_sd }) => json!({
+            "point_mm": finite(point), "status": status, "image_px": null, "in_image": null,
+            "rounding_sd_px": rounding_sd,
+        }),
     })
 }
 

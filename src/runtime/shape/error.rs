@@ -11,11 +11,19 @@ pub struct ShapeError {
     pub problem: String,
     /// What to do.
     pub cure: &'static str,
+    /// Two colours of a frame that fit only when they are swapped.
+    pub swapped: Option<[&'static str; 2]>,
 }
 
 impl ShapeError {
     pub(super) fn new(field: &'static str, problem: impl Into<String>, cure: &'static str) -> Self {
-        Self { field, problem: problem.into(), cure }
+        Self { field, problem: problem.into(), cure, swapped: None }
+    }
+
+    /// The same fault, of two colours that fit only when they are swapped.
+    pub(super) fn of_swapped(mut self, colours: [&'static str; 2]) -> Self {
+        self.swapped = Some(colours);
+        self
     }
 }
 

@@ -249,7 +249,7 @@ fn check(seen: &[Seen], medians: Vec3A) -> Result<(), ShapeError> {
         if correlation(a, b) > MIN_CORRELATION && correlation(b, a) > MIN_CORRELATION {
             let problem = format!("has {} and {} swapped against the constants' light", names[a], names[b]);
             let cure = "give the frames in the order red, green, blue (--raw ..:rgb or :bgr), or mend the lights' wires";
-            return Err(ShapeError::new("rest", problem, cure));
+            return Err(ShapeError::new("rest", problem, cure).of_swapped([names[a], names[b]]));
         }
     }
     let worst = (0..3).min_by(|a, b| own[*a].total_cmp(&own[*b])).unwrap_or(0);

@@ -15,6 +15,7 @@ use domecast_contact::{
     Push, Relaxation,
 };
 use domecast_design::DesignError;
+use domecast_optics::numeric::Rigid;
 
 /// The dome touched at one time.
 #[derive(Debug, Clone)]
@@ -37,6 +38,8 @@ pub struct Stepper<'a> {
     gel: Option<GelMemory>,
     /// Frames that are solved already.
     known: Option<Arc<SolvedFrames>>,
+    /// Poses that stand in place of the scene's paths, by object.
+    placed: Option<Vec<Option<Rigid>>>,
 }
 
 /// What the frame before leaves to the next one.
@@ -96,10 +99,18 @@ impl<'a> Stepper<'a> {
         let px_per_mm = largest_px_per_mm(scene);
         if let Some(known) = scene.kept::<SolvedFrames>().filter(|known| known.level == level) {
             let contact = known.contact.clone();
-            return Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: None, known: Some(known) });
+            return Ok(Self {
+                scene,
+                contact,
+                px_per_mm,
+                last: Last::Free,
+                gel: None,
+                known: Some(known),
+                placed: None,
+            });
         }
         let contact = Contact::new(elastomer_of(scene.design()), level).map_err(|error| unfit(&error))?;
-        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: None, known: None })
+        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: None, known: None, placed: None })
     }
 
     /// The same over a gel whose modulus relaxes, from that instant modulus, MPa; before the first frame nothing touches
@@ -117,7 +128,13 @@ impl<'a> Stepper<'a> {
         let step_s = 1.0 / scene.file().frames.rate_hz;
         let (gel, contact) =
             GelMemory::new(relaxation.clone(), step_s, &elastomer, level).map_err(|error| unfit(&error))?;
-        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: Some(gel), known: None })
+        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: Some(gel), known: None, placed: None })
+    }
+
+    /// From now on holds the objects at these poses, `rest_from_object`, whatever their paths say; `None`: away from the dome.
+    pub fn place(&mut self, poses: &[Option<Rigid>]) {
+        self.placed = Some(poses.to_vec());
+        self.known = None;
     }
 
     /// Solves the next frame.
@@ -159,7 +176,7 @@ impl<'a> Stepper<'a> {
             Last::One(pressed) => Some(&**pressed),
             _ => None,
         };
-        let solved = match (self.push(object, time_s), suspension) {
+        let solved = match (self.push(0, object, time_s), suspension) {
             (None, _) => return Ok(None),
             (Some(Push::At(pose)), Some(suspension)) => {
                 self.contact.press(&object.indenter, suspension, &pose, before)
@@ -185,8 +202,9 @@ impl<'a> Stepper<'a> {
     /// Several objects, or a slow gel; `None` while nothing touches and the dome has its shape.
     fn several(&mut self, frame: u32, time_s: f64, work: &mut Work) -> Result<Option<Touch>, SimError> {
         let scene = self.scene;
+        let numbered = scene.objects().iter().enumerate();
         let objects: Vec<_> =
-            scene.objects().iter().map(|object| (&object.indenter, self.push(object, time_s))).collect();
+            numbered.map(|(k, object)| (&object.indenter, self.push(k, object, time_s))).collect();
         let beside = self.gel.as_ref().map(GelMemory::beside).unwrap_or_default();
         if beside.is_still() && objects.iter().all(|object| object.1.is_none()) {
             return Ok(None);
@@ -214,9 +232,13 @@ impl<'a> Stepper<'a> {
     }
 
     /// What an object does at a time; `None` while it cannot touch.
-    fn push(&self, object: &SceneObject, time_s: f64) -> Option<Push> {
+    fn push(&self, index: usize, object: &SceneObject, time_s: f64) -> Option<Push> {
         // What a slow gel remembers stays within the dome at rest.
         let dome = self.scene.optics().dome();
+        if let Some(placed) = &self.placed {
+            let pose = placed.get(index).copied().flatten();
+            return pose.filter(|pose| object.may_touch_at(pose, dome)).map(Push::At);
+        }
         match object.hold_at(time_s) {
             Hold::Away(_) => None,
             Hold::At(_) if !object.may_touch(time_s, dome) => None,

@@ -11,6 +11,7 @@ mod error;
 mod in_order;
 mod parts;
 pub(crate) mod render;
+mod sequence;
 mod timing;
 pub(crate) mod truth;
 mod video;
@@ -38,6 +39,7 @@ pub use depth::{BearingMaps, DepthMaps, DepthTruth};
 pub use error::RunError;
 pub use parts::{ContactFault, PLAN_NAME, Summary, TRUTH_NAME, VIDEO_NAME, WorstContact};
 use parts::{Pending, Sent};
+pub use sequence::{LiveScene, each_frame};
 use writer::Writer;
 
 /// Frames on their way from contact to file, for each thread.

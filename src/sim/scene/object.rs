@@ -87,11 +87,14 @@ impl SceneObject {
         match self.hold_at(time_s) {
             Hold::Pressed(..) => true,
             Hold::Away(_) => false,
-            Hold::At(pose) => {
-                let (center, radius) = self.indenter.solid.bounding_sphere();
-                dome.distance_mm(pose.point(center)) <= radius
-            }
+            Hold::At(pose) => self.may_touch_at(&pose, dome),
         }
+    }
+
+    /// The same at a pose, `rest_from_object`.
+    pub fn may_touch_at(&self, pose: &Rigid, dome: &DomeShape) -> bool {
+        let (center, radius) = self.indenter.solid.bounding_sphere();
+        dome.distance_mm(pose.point(center)) <= radius
     }
 }
 

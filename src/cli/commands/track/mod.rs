@@ -24,6 +24,7 @@ use tally::Tally;
 use times::FrameTimes;
 
 pub use arguments::{TrackArguments, field};
+pub use shape::shape_members;
 
 /// What cures pictures that lie otherwise than the constants say.
 pub fn turned_hint(turn: CameraTurn) -> String {

@@ -85,7 +85,7 @@ impl ShapeFiles {
         while line.last().is_some_and(|byte| matches!(byte, b'\n' | b'}')) {
             line.pop();
         }
-        line.extend_from_slice(format!(",{}}}\n", members(map, has_forces)).as_bytes());
+        line.extend_from_slice(format!(",{}}}\n", shape_members(map, has_forces)).as_bytes());
         Ok(())
     }
 
@@ -134,8 +134,8 @@ fn unfit(path: &Path, error: &ShapeError) -> Failure {
     input_fault(path, error.to_string(), "what shape from colour needs")
 }
 
-/// The members of a JSON line that the shape adds.
-fn members(map: &ShapeMap, has_forces: bool) -> String {
+/// The members of a JSON line that the shape adds, without what encloses them.
+pub fn shape_members(map: &ShapeMap, has_forces: bool) -> String {
     let mut shape = match &map.status {
         None => json!({ "status": "no_pose" }),
         Some(solved) => json!({

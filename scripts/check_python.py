@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""Builds the wheel and judges it from outside.
+
+    check_python.py DOMECAST [--profile release] [--all] [--wheel FILE] [--keep FOLDER] [--inputs N] [--frames N]
+
+The wheel is built by maturin with the cargo profile that DOMECAST was built with, at most 10 MB, and installed with numpy and
+nothing else into a fresh virtual environment. There
+
+- its command line builds a sensor;
+- every call gives what DOMECAST writes, bit for bit; two threads at once; flat memory (`python/same_as_cli.py`).
+
+Then, beside the test's own packages,
+
+- random wrong inputs end in exceptions, never in a panic (`python/wrong_inputs.py`);
+- stubs and examples are clean under `pyright` and `mypy --strict`, and the examples and notebooks run;
+- the simulators' side is judged by MuJoCo and gymnasium (`python/simulators.py`).
+
+Times are printed and judged nowhere. --all: more frames, more wrong inputs.
+"""
+
+import argparse
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+HERE = REPOSITORY / "scripts/python"
+MAX_WHEEL_BYTES = 10_000_000
+
+
+def run(*words, **options):
+    began = time.monotonic()
+    done = subprocess.run([str(word) for word in words], **options)
+    if done.returncode != 0:
+        sys.exit(f"failed with {done.returncode}: {' '.join(map(str, words))}")
+    return time.monotonic() - began
+
+
+def build_wheel(profile, folder):
+    """Builds it among the files of the program's own build."""
+    words = ["-m", "maturin", "build", "--profile", profile, "--strip", "--out", folder, "--locked", "--quiet"]
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    took = run(sys.executable, *words, "--manifest-path", REPOSITORY / "src/python/Cargo.toml", env=environment)
+    [wheel] = folder.glob("domecast-*.whl")
+    print(f"wheel built in {took:.0f} s")
+    return wheel
+
+
+def check_wheel(wheel):
+    version = re.search(r'^version = "(.+)"', (REPOSITORY / "Cargo.toml").read_text(), re.M)[1]
+    names = zipfile.ZipFile(wheel).namelist()
+    size = wheel.stat().st_size
+    print(f"{wheel.name}: {size / 1e6:.1f} MB, {len(names)} files")
+    assert size <= MAX_WHEEL_BYTES, f"the wheel has {size} bytes, at most {MAX_WHEEL_BYTES} are wanted"
+    assert wheel.name.startswith(f"domecast-{version}-cp310-abi3-"), wheel.name
+    for wanted in ("domecast/py.typed", "domecast/_native.pyi", "domecast/__init__.py", "domecast/_native.abi3.so"):
+        assert wanted in names, f"the wheel lacks {wanted}"
+
+
+def bare_environment(folder, wheel):
+    """A virtual environment with the wheel and what it asks for; its Python."""
+    began = time.monotonic()
+    run(sys.executable, "-m", "venv", folder)
+    python = folder / "bin/python"
+    numpy = next(line for line in (REPOSITORY / "scripts/requirements.txt").read_text().splitlines() if line.startswith("numpy=="))
+    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", numpy, wheel)
+    installed = time.monotonic() - began
+    out = folder / "thumb24"
+    took = run(folder / "bin/domecast", "build", REPOSITORY / "designs/thumb24.json", "--out", out, "--quiet")
+    assert (out / "report/index.html").exists()
+    print(f"virtual environment with the wheel in {installed:.1f} s, domecast build in {took:.1f} s")
+    return python
+
+
+def check_program(domecast, program, folder):
+    """The wheel's command line answers as the program does: text, streams, exit codes."""
+    design = REPOSITORY / "designs/thumb24.json"
+    (folder / "broken.json").write_text('{"version": 1,')
+    for words in (["--version"], ["--help"], ["explain", "leds.tilt_deg"], ["list", "cameras", "--json"], [], ["nonsense"], ["build"],
+                  ["build", "no-such.json"], ["build", "broken.json", "--json"], ["trace", design, "--pixels", "no-such.csv"]):
+        told = [subprocess.run([one, *map(str, words)], cwd=folder, capture_output=True) for one in (domecast, program)]
+        same = {(one.returncode, one.stdout, one.stderr) for one in told}
+        assert len(same) == 1, f"{words}: {told}"
+    print("the wheel's command line answers as the program does, exit codes included")
+
+
+def check_interrupt(program, folder):
+    """Ctrl-C ends a command of the wheel at once, and leaves nothing behind."""
+    import signal
+    scene = REPOSITORY / "designs/scenes/ball.json"
+    child = subprocess.Popen([program, "simulate", scene, "--frames", "400", "--out", "stopped", "--quiet"], cwd=folder)
+    until = time.monotonic() + 60
+    while not any(one.name.startswith(".domecast") for one in folder.iterdir()) and time.monotonic() < until:
+        time.sleep(0.05)
+    child.send_signal(signal.SIGINT)
+    code = child.wait(timeout=60)
+    left = [one.name for one in folder.iterdir() if "stopped" in one.name or one.name.startswith(".domecast")]
+    assert code == -signal.SIGINT and not left, (code, left)
+    print("Ctrl-C ends the wheel's command line and leaves nothing behind")
+
+
+def check_types(site):
+    """Stubs and examples under the two strict checkers."""
+    examples = sorted((HERE / "examples").glob("*.py"))
+    environment = {**os.environ, "PYTHONPATH": str(site), "MYPYPATH": ""}
+    run(sys.executable, "-m", "mypy", "--strict", "--no-error-summary", "--cache-dir", site.parent / "mypy", *examples,
+        site / "domecast", env=environment, cwd=site.parent)
+    shutil.copytree(HERE / "examples", site.parent / "examples", dirs_exist_ok=True)
+    settings = {"include": ["site/domecast", "examples"], "typeCheckingMode": "strict", "extraPaths": ["site"],
+                "reportMissingTypeStubs": False, "reportPrivateUsage": False,
+                "reportMissingModuleSource": False, "pythonVersion": "3.11"}
+    (site.parent / "pyrightconfig.json").write_text(json.dumps(settings))
+    run(sys.executable, "-m", "pyright", "--pythonpath", sys.executable, "-p", site.parent / "pyrightconfig.json", env=environment)
+    print("stubs and examples: clean under mypy --strict and pyright strict")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("domecast")
+    parser.add_argument("--profile", default="release")
+    parser.add_argument("--all", action="store_true")
+    parser.add_argument("--wheel", type=Path)
+    parser.add_argument("--keep", type=Path)
+    parser.add_argument("--inputs", type=int, help="random wrong inputs [default: 3,000; with --all 20,000]")
+    parser.add_argument("--frames", type=int, help="frames that must leave the memory as it was [default: 1,500; with --all 20,000]")
+    asked = parser.parse_args()
+    domecast = Path(asked.domecast).resolve()
+    with tempfile.TemporaryDirectory() as base:
+        base = asked.keep.resolve() if asked.keep else Path(base)
+        base.mkdir(exist_ok=True, parents=True)
+        wheel = asked.wheel or build_wheel(asked.profile, base / "dist")
+        check_wheel(wheel)
+        python = bare_environment(base / "bare", wheel)
+        (base / "work").mkdir(exist_ok=True)
+        check_program(domecast, python.parent / "domecast", base / "work")
+        check_interrupt(python.parent / "domecast", base / "work")
+        frames = asked.frames or (20_000 if asked.all else 1_500)
+        run(python, HERE / "same_as_cli.py", domecast, REPOSITORY, base / "work", frames, cwd=base)
+        # beside the packages of the tests: the installed files alone
+        site = base / "site"
+        shutil.rmtree(site, ignore_errors=True)
+        zipfile.ZipFile(wheel).extractall(site)
+        shutil.rmtree(next(site.glob("*.dist-info")))
+        beside = {**os.environ, "PYTHONPATH": str(site), "PYTHONDONTWRITEBYTECODE": "1"}
+        check_types(site)
+        constants = base / "work/by-cli/constants/constants.json"
+        inputs = asked.inputs or (20_000 if asked.all else 3_000)
+        run(sys.executable, HERE / "wrong_inputs.py", constants, REPOSITORY, inputs, env=beside, cwd=base)
+        run(sys.executable, HERE / "run_notebooks.py", REPOSITORY, base / "notebooks", env=beside)
+        if (HERE / "simulators.py").exists():
+            run(sys.executable, HERE / "simulators.py", REPOSITORY, env=beside, cwd=base)
+    print("python: 0 faults")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,337 @@
+"""The installed wheel gives what the command line gives, bit for bit; it runs where only the wheel and numpy are installed.
+
+    same_as_cli.py DOMECAST REPOSITORY WORK FRAMES
+
+FRAMES: how many frames must leave the memory as it was.
+"""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+import warnings
+import zlib
+from pathlib import Path
+
+BEGAN = time.perf_counter()
+import domecast  # noqa: E402
+
+IMPORT_S = time.perf_counter() - BEGAN
+NUMPY_CAME_WITH_IT = "numpy" in sys.modules
+
+import numpy as np  # noqa: E402
+
+DOMECAST, REPOSITORY, WORK, FRAMES = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]), int(sys.argv[4])
+DESIGN = REPOSITORY / "designs/thumb24.json"
+FAULTS = []
+
+
+def check(is_so, what):
+    print(f"{'ok  ' if is_so else 'FAIL'} {what}")
+    if not is_so:
+        FAULTS.append(what)
+
+
+def cli(*words, inputs=None):
+    done = subprocess.run([DOMECAST, *map(str, words)], capture_output=True, text=True, cwd=WORK, input=inputs)
+    if done.returncode != 0:
+        sys.exit(f"{words}: {done.stdout[-500:]}{done.stderr[-2000:]}")
+    return done.stdout
+
+
+def read_png(path):
+    """A PNG of 8 bits, grey or RGB: numpy alone is installed here."""
+    data = path.read_bytes()
+    at, body, head = 8, b"", None
+    while at < len(data):
+        length, kind = int.from_bytes(data[at:at + 4], "big"), data[at + 4:at + 8]
+        chunk = data[at + 8:at + 8 + length]
+        head = chunk if kind == b"IHDR" else head
+        body += chunk if kind == b"IDAT" else b""
+        at += 12 + length
+    width, height, step = int.from_bytes(head[:4], "big"), int.from_bytes(head[4:8], "big"), 3 if head[9] == 2 else 1
+    rows = np.frombuffer(zlib.decompress(body), np.uint8).reshape(height, 1 + width * step)
+    out = np.zeros((height, width, step), np.uint8)
+    above = np.zeros((width, step), np.uint8)
+    for y in range(height):
+        row = rows[y, 1:].reshape(width, step)
+        match rows[y, 0]:
+            case 0: above = row
+            case 1: above = np.cumsum(row, axis=0, dtype=np.uint8)
+            case 2: above = row + above
+            case _: above = slow_filter(rows[y, 0], row, above)
+        out[y] = above
+    return out if step == 3 else out[:, :, 0]
+
+
+def slow_filter(kind, row, above):
+    now, left, corner = np.zeros_like(row), np.zeros(row.shape[1], int), np.zeros(row.shape[1], int)
+    for x in range(len(row)):
+        up = above[x].astype(int)
+        if kind == 3:
+            guess = (left + up) // 2
+        else:
+            sums = left + up - corner
+            ways = np.abs([sums - left, sums - up, sums - corner])
+            guess = np.where((ways[0] <= ways[1]) & (ways[0] <= ways[2]), left, np.where(ways[1] <= ways[2], up, corner))
+        corner = up
+        left = (row[x] + guess) & 255
+        now[x] = left
+    return now
+
+
+def optics(design):
+    random = np.random.default_rng(1)
+    uv = random.uniform([-20, -20], [660, 500], (500, 2))
+    lines = cli("trace", DESIGN, "--pixels", "-", inputs=json.dumps(uv.tolist())).splitlines()
+    told = [json.loads(line) for line in lines]
+    xyz, status = design.optics().trace(uv)
+    check([one["status"] for one in told] == status.tolist(), f"trace: statuses of {len(uv)} pixels, {len(set(status.tolist()))} kinds")
+    check(all(one["surface_mm"] is None and np.isnan(at).all() or one["surface_mm"] == at.tolist() for one, at in zip(told, xyz)),
+          "trace: points")
+    seen = xyz[status == "ok"]
+    lines = cli("project", DESIGN, "--points", "-", inputs=json.dumps(seen.tolist())).splitlines()
+    back, states = design.optics().project(seen)
+    check([json.loads(line)["image_px"] for line in lines] == back.tolist() and set(states.tolist()) == {"ok"}, "project: pixels")
+    same, _ = design.optics().trace(np.asfortranarray(uv))
+    check(np.array_equal(same, xyz, equal_nan=True), "trace: of an array that is not contiguous")
+
+
+def builds(design):
+    made = design.build(WORK / "by-python")
+    cli("build", DESIGN, "--out", WORK / "by-cli", "--quiet")
+    own, other = [json.loads((WORK / place / "manifest.json").read_text()) for place in ("by-python", "by-cli")]
+    check(own == other and made["manifest"] == own, f"build: a manifest of {len(own['files'])} hashed files")
+    cli("check", WORK / "by-python", "--quiet")
+    constants = (WORK / "by-cli/constants/constants.json").read_text()
+    check(design.sensor().json() == constants, "sensor() of a design: the build's constants.json")
+    check(domecast.Sensor.from_str(constants).json() == constants, "a Sensor keeps its file")
+    (WORK / "by-python/mine.txt").write_text("mine")
+    try:
+        design.build(WORK / "by-python")
+        check(False, "a folder that holds a user's file is not built over")
+    except domecast.DomecastError as error:
+        check("mine.txt" in str(error), "a folder that holds a user's file is not built over")
+
+
+def edits(design):
+    edited = design.copy()
+    edited["leds"]["tilt_deg"] = np.float64(80)
+    edited.save(WORK / "edited.json")
+    check(domecast.Design.load(WORK / "edited.json").text == edited.text, "an edited design is saved as it stands")
+    check(design.text == DESIGN.read_text() and design["leds"] != edited["leds"], "the other stays as it was read")
+    for field, value, named in [("leds", {"tilt_deg": "steep"}, "leds.tilt_deg"), ("dome", {"radius_mm": -1}, "dome.radius_mm"),
+                                ("dome", {"radius_mm": float("nan")}, "dome.radius_mm"), ("dome", {"radius_mm": object()}, "dome.radius_mm")]:
+        wrong = design.copy()
+        wrong[field].update(value)
+        try:
+            wrong.layout()
+            check(False, f"{value} is refused")
+        except domecast.DomecastError as error:
+            check(error.field == named and bool(error.allowed), f"{value}: `{error.field}`; allowed: {error.allowed}")
+
+
+def simulated(name, *options, **keywords):
+    out = WORK / f"simulated-{name}"
+    cli("simulate", REPOSITORY / f"designs/scenes/{name}.json", "--out", out, *options, "--quiet")
+    scene = domecast.Scene.load(REPOSITORY / f"designs/scenes/{name}.json", **keywords)
+    truths = [json.loads(line) for line in (out / "truth.jsonl").read_text().splitlines()]
+    frames = []
+    for (frame, truth), known in zip(scene.frames(), truths, strict=True):
+        pixels = read_png(out / f"frame_{known['frame']:04}.png")
+        check(np.array_equal(frame, pixels) and truth == known, f"simulate {name}: frame {known['frame']} and its truth")
+        frames.append(np.array(frame))
+    check(scene.plan() == {key: value for key, value in json.loads((out / "plan.json").read_text()).items()}, f"simulate {name}: plan")
+    return out, frames
+
+
+def tracks(folder, frames):
+    constants = WORK / "by-cli/constants/constants.json"
+    sensor = domecast.Sensor.load(constants)
+    lines = cli("track", folder, "--constants", constants).splitlines()
+
+    def lines_of(frames, rgb, **options):
+        tracker = domecast.Tracker(sensor, **options)
+        return [tracker.update(frame, rgb=rgb) for frame in frames]
+
+    readings = lines_of(frames, True)
+    check([reading.json() for reading in readings] == lines, f"track: {len(lines)} lines")
+    check([reading.json() for reading in lines_of([frame[:, :, ::-1] for frame in frames], False)] == lines, "track: blue first, a view")
+    some = cli("track", folder, "--constants", constants, "--fields", "wrench,pose").splitlines()
+    check([reading.json(["wrench", "pose"]) for reading in readings] == some, "track: chosen fields")
+    gray = cli("track", folder, "--constants", constants, "--channel", "green", "--reference", "2").splitlines()
+    check([reading.json() for reading in lines_of(frames, True, channel="green", reference=2)] == gray, "track: options")
+    forces = domecast.Traction(sensor)
+    pressed = cli("track", folder, "--constants", constants, "--traction").splitlines()
+    check([forces.update(reading).json() for reading in readings] == pressed, "track --traction: lines")
+    for reading, line in zip(readings, map(json.loads, lines)):
+        same = [reading.status == line["status"], reading.problems == line["problems"]]
+        for name in ("wrench", "wrench_sd"):
+            value = getattr(reading, name)
+            same.append(line[name] is None if value is None else np.allclose(value, line[name], atol=6e-7, rtol=0))
+        dots = reading.dots
+        same.append(dots["state"].tolist() == [dot["state"] for dot in line["black_dots"]])
+        same += [bool(np.isnan(own).all()) if dot["image_px"] is None else bool(np.allclose(own, dot["image_px"], atol=6e-5, rtol=0))
+                 for own, dot in zip(dots["image_px"], line["black_dots"])]
+        if not all(same):
+            check(False, f"attributes of frame {reading.frame} are those of the line")
+            break
+    return sensor, lines
+
+
+def shapes(folder, frames, rest):
+    constants = WORK / "by-cli/constants/constants.json"
+    lines = cli("track", folder, "--constants", constants, "--shape", WORK / "maps", "--rest", rest, "--traction").splitlines()
+    sensor = domecast.Sensor.load(constants)
+    tracker = domecast.Tracker(sensor)
+    shape, forces = domecast.Shape(sensor, tracker), domecast.Traction(sensor, correlation_mm=1)
+    shape.set_rest(read_png(rest), rgb=True)
+    for number, (frame, line) in enumerate(zip(frames, lines, strict=True)):
+        reading = tracker.update(frame, rgb=True)
+        found = shape.update(frame, reading, rgb=True)
+        same = [np.array_equal(getattr(found, own), np.load(WORK / f"maps/frame_{number:04}.{name}.npy"), equal_nan=True)
+                for own, name in [("height_mm", "height"), ("height_sd_mm", "height_sd"), ("normal", "normal"), ("touched", "contact")]]
+        pressed = forces.update(reading, shape=found)
+        pressure = forces.pressure(found)[0]
+        same.append(np.array_equal(pressure, np.load(WORK / f"maps/frame_{number:04}.pressure.npy"), equal_nan=True))
+        check(all(same) and pressed.json(shape=found) == line, f"track --shape --traction: frame {number}, its maps and line")
+        if number:
+            pictures = [found._repr_png_(), reading._repr_png_(), reading.overlay_png(frame, rgb=True, shape=found, forces=pressed)]
+            check(all(one.startswith(b"\x89PNG") for one in pictures), "pictures of a touch")
+    swapped = read_png(rest)[:, :, ::-1]
+    for name, call in [("tracker", lambda: domecast.Tracker(sensor).update(swapped, rgb=True)),
+                       ("shape", lambda: shape.set_rest(swapped, rgb=True))]:
+        try:
+            call()
+            check(False, f"{name}: colours that fit only when swapped are refused")
+        except domecast.DomecastError as error:
+            check("swapped" in str(error), f"{name}: {error}")
+
+
+def calibrations(simulated):
+    constants = WORK / "by-cli/constants/constants.json"
+    tree = json.loads(constants.read_text())
+    random = np.random.default_rng(3)
+    motions = random.uniform(-1, 1, (40, 6)) * [0.1, 0.1, 0.1, 0.005, 0.005, 0.005]
+    wrenches = motions @ np.array(tree["springs"]["stiffness"]).T * (1 + random.normal(0, 0.005, (40, 6)))
+    table = ["tx,ty,tz,rx,ry,rz,Fx,Fy,Fz,Mx,My,Mz", *(",".join(map(repr, map(float, row))) for row in np.hstack([motions, wrenches]))]
+    (WORK / "force.csv").write_text("\n".join(table) + "\n")
+    rows = ["frame,kind,id,u,v"]
+    for line in (simulated / "truth.jsonl").read_text().splitlines():
+        truth = json.loads(line)
+        for kind, name in (("white", "white_markers"), ("black", "black_dots")):
+            rows += [f"{truth['frame']},{kind},{one['id']},{u!r},{v!r}" for one in truth[name] if one["visible"] for u, v in [one["centroid_px"]]]
+    (WORK / "seen.csv").write_text("\n".join(rows) + "\n")
+    for command, call, table in [("calibrate-force", domecast.calibrate_force, "force.csv"), ("calibrate-optics", domecast.calibrate_optics, "seen.csv")]:
+        known = json.loads(cli(command, table, constants, "--out", WORK / f"{command}-1.json", "--json"))
+        found = call(WORK / table, constants, out=WORK / f"{command}-2.json")
+        same = (WORK / f"{command}-1.json").read_bytes() == (WORK / f"{command}-2.json").read_bytes()
+        check(same and {**found, "constants": ""} == {**known, "constants": ""}, f"{command}: file and result")
+        try:
+            call(WORK / "missing.csv", constants, out=WORK / "none.json")
+            check(False, f"{command}: a table that is not there")
+        except domecast.DomecastError as error:
+            check(error.file is not None and "missing.csv" in error.file, f"{command}: {error}")
+
+
+def resident_mb():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def memory(sensor, frames):
+    tracker, place = domecast.Tracker(sensor), np.empty_like(frames[0])
+
+    def run(count):
+        for number in range(count):
+            place[:] = frames[number % len(frames)]
+            reading = tracker.update(place, rgb=True, time=None)
+            if number % 10 == 0:
+                assert len(reading.json()) + len(reading.dots) + len(reading.markers) > 0
+            if number % 50 == 0:
+                try:
+                    tracker.update(place[:, :, :2], rgb=True)
+                except domecast.DomecastError:
+                    pass
+    run(min(300, FRAMES))
+    before = resident_mb()
+    run(FRAMES)
+    grown = resident_mb() - before
+    check(grown < 2.0, f"memory after {FRAMES} frames: {grown:+.2f} MB")
+
+
+def threads(sensor, frames, lines):
+    found = {}
+
+    def follow(name):
+        tracker = domecast.Tracker(sensor)
+        found[name] = [tracker.update(frame, rgb=True).json() for frame in frames * 4][:len(lines)]
+    running = [threading.Thread(target=follow, args=(name,)) for name in "ab"]
+    [one.start() for one in running]
+    [one.join() for one in running]
+    check(found["a"] == lines and found["b"] == lines, "two threads at once give the same lines")
+    shared, faults = domecast.Tracker(sensor), []
+
+    def share():
+        for frame in frames * 4:
+            try:
+                shared.update(frame, rgb=True)
+            except RuntimeError as error:
+                faults.append(error)
+    running = [threading.Thread(target=share) for _ in range(2)]
+    [one.start() for one in running]
+    [one.join() for one in running]
+    check(True, f"one tracker in two threads: {len(faults)} calls refused, none crashed")
+
+
+def overhead(sensor, frames):
+    """Both in turns, on the same frame: the machine may be busy."""
+    frame, tracker, alone = frames[-1], domecast.Tracker(sensor), domecast.Tracker(sensor)
+    rust, python = [], []
+    for _ in range(40):
+        rust.append(1e6 * alone.benchmark(frame, rgb=True, repeats=25))
+        times = []
+        for _ in range(25):
+            began = time.perf_counter()
+            reading = tracker.update(frame, rgb=True)
+            times.append(time.perf_counter() - began)
+        python.append(1e6 * sorted(times)[12])
+    assert reading.frame == 999
+    more = sorted(a - b for a, b in zip(python, rust))
+    print(f"     update: {sorted(python)[20]:.1f} us, in Rust alone {sorted(rust)[20]:.1f} us, in turns {more[20]:+.1f} us (medians)")
+    times = []
+    for _ in range(2000):
+        began = time.perf_counter()
+        tracker.skip()
+        times.append(time.perf_counter() - began)
+    print(f"     a call and its Reading without the work of a frame: {1e6 * sorted(times)[1000]:.1f} us")
+    print(f"     import domecast: {1e3 * IMPORT_S:.1f} ms")
+
+
+def main():
+    warnings.simplefilter("error")
+    for name in ("hypothesis", "mujoco", "gymnasium", "cv2"):
+        check(importlib.util.find_spec(name) is None, f"{name} is not installed here")
+    check(not NUMPY_CAME_WITH_IT, "import domecast leaves numpy where it is until an array is needed")
+    design = domecast.Design.load(DESIGN)
+    optics(design)
+    edits(design)
+    builds(design)
+    check("<img" in design._repr_html_() and design.layout()._repr_png_().startswith(b"\x89PNG"), "a design and its layout as pictures")
+    pushed, frames = simulated("push", "--frames", "6", frames=6)
+    sensor, lines = tracks(pushed, frames)
+    balls, pressed = simulated("ball", "--frames", "3", frames=3)
+    rest, _ = simulated("lit", "--seed", "7", seed=7)
+    shapes(balls, pressed, rest / "frame_0000.png")
+    calibrations(pushed)
+    threads(sensor, frames, lines)
+    memory(sensor, frames)
+    overhead(sensor, frames)
+    print(f"same as the command line: {len(FAULTS)} faults")
+    return 1 if FAULTS else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -162,3 +162,20 @@ impl StagedFile {
         staging.commit(&path, command)
     }
 }
+
+/// Replaces a small file by another in one step: for an index that is ours by its content, which the caller has looked at, and that
+/// grows with what lies beside it. Whoever reads it meanwhile sees the one or the other, whole.
+///
+/// # Errors
+/// [`WriteError::Io`]; then the file is as it was.
+pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let write = || -> io::Result<()> {
+        fs::create_dir_all(folder)?;
+        let mut draft = tempfile::Builder::new().prefix(".index-").tempfile_in(folder)?;
+        draft.write_all(bytes)?;
+        draft.as_file().sync_all()?;
+        draft.persist(path).map(|_| ()).map_err(|error| error.error)
+    };
+    write().map_err(WriteError::io("write the file", path))
+}

@@ -8,7 +8,7 @@ use crate::tokens::tokens;
 use crate::{assert_none, crates, members, short, text, workspace};
 
 /// The crates from the ground up; each may depend on those named beside it and on no others of ours.
-const CRATES: [(&str, &[&str]); 12] = [
+const CRATES: [(&str, &[&str]); 13] = [
     ("files", &[]),
     ("optics", &[]),
     ("mesh", &[]),
@@ -20,7 +20,8 @@ const CRATES: [(&str, &[&str]); 12] = [
     ("contact", &["elastic", "mesh", "optics", "springs"]),
     ("sim", &["contact", "design", "files", "light", "mesh", "optics", "springs"]),
     ("fab", &["design", "files", "mesh", "optics", "runtime", "sim", "springs"]),
-    ("cli", &["contact", "design", "fab", "files", "mesh", "optics", "runtime", "sim", "springs"]),
+    ("dataset", &["contact", "design", "fab", "files", "optics", "runtime", "sim", "springs"]),
+    ("cli", &["contact", "dataset", "design", "fab", "files", "mesh", "optics", "runtime", "sim", "springs"]),
 ];
 
 /// Where data runs through stages: the crate, the folder of the stages, and they in order.

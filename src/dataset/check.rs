@@ -6,6 +6,7 @@ use serde_json::json;
 use sha2::{Digest, Sha256};
 
 use crate::spec::{DatasetSpec, Split};
+use crate::splits::spread;
 use domecast_design::{Design, DesignError, FileKind};
 use domecast_sim::scene::objects::ShapeSection;
 
@@ -16,6 +17,8 @@ pub struct Dataset {
     pub(crate) folder: PathBuf,
     pub(crate) design: Design,
     pub(crate) hash: String,
+    /// Split of each sensor.
+    pub(crate) splits: Vec<Split>,
 }
 
 /// Changes when other bytes come of the same spec.
@@ -55,7 +58,9 @@ impl Dataset {
         parts.push(written.as_bytes());
         parts.extend(meshes.iter().map(Vec::as_slice));
         let hash = sha256_hex(&parts);
-        Ok(Self { spec, folder, design, hash })
+        let sensors = &spec.sensors;
+        let splits = spread([sensors.train, sensors.val, sensors.test]);
+        Ok(Self { spec, folder, design, hash, splits })
     }
 
     /// The spec as read.

@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 
 use crate::check::Dataset;
 use crate::spec::Split;
+use crate::splits::split_of_slice;
 use domecast_optics::numeric::{SeededRandom, mix64};
 use domecast_sim::scene::objects::ShapeSection;
 
@@ -67,33 +68,10 @@ fn log_even(random: &mut SeededRandom, [low, high]: [f64; 2]) -> f64 {
     random.between(low.ln(), high.ln()).exp()
 }
 
-/// The split of a slice of the loads.
-pub fn split_of_slice(slice: u32) -> Split {
-    match slice {
-        slice if slice % 4 == 2 => Split::Test,
-        slice if slice % 8 == 4 => Split::Val,
-        _ => Split::Train,
-    }
-}
-
 impl Dataset {
-    /// Split of a sensor: the splits' sensors are spread evenly over all.
+    /// Split of a sensor.
     pub fn split_of_sensor(&self, sensor: u32) -> Split {
-        let sensors = &self.spec.sensors;
-        let counts = [sensors.train, sensors.val, sensors.test].map(u64::from);
-        let all: u64 = counts.iter().sum::<u64>().max(1);
-        // the split that lies furthest behind its share gets the next sensor
-        let mut given = [0_u64; 3];
-        for number in 0..=u64::from(sensor) {
-            let behind = |k: usize| (number + 1) as i128 * counts[k] as i128 - (given[k] * all) as i128;
-            let next = (0..3).filter(|k| given[*k] < counts[*k]).max_by_key(|k| (behind(*k), 3 - *k));
-            let Some(next) = next else { break };
-            if number == u64::from(sensor) {
-                return Split::ALL[next];
-            }
-            given[next] += 1;
-        }
-        Split::Train
+        self.splits.get(sensor as usize).copied().unwrap_or(Split::Train)
     }
 
     /// Sensor of a pair: each has a block of pairs.

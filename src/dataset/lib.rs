@@ -19,12 +19,14 @@ mod record;
 mod scene;
 mod sensor;
 pub mod spec;
+mod splits;
 mod tar;
 mod tracked;
 mod video;
 
 pub use check::Dataset;
-pub use draw::{PairDraw, split_of_slice};
+pub use draw::PairDraw;
+pub use splits::split_of_slice;
 pub use index::{FORMAT, INDEX_NAME};
 pub use make::{Maker, Shard};
 pub use read::{StoredSet, StoredVideo};

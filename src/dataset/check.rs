@@ -195,7 +195,12 @@ fn check_splits(spec: &DatasetSpec) -> Result<(), DesignError> {
         }
         range(&field("tilt_deg"), shape.tilt_deg, 0.0, 90.0)?;
         if spec.shapes.iter().take(index).any(|other| other.name == shape.name) {
-            return Err(fault(&field("name"), json!(shape.name), "another shape has it", "a name of its own"));
+            return Err(fault(
+                &field("name"),
+                json!(shape.name),
+                "another shape has it",
+                "a name of its own",
+            ));
         }
     }
     Ok(())

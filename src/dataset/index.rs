@@ -66,7 +66,8 @@ impl Dataset {
         if let Some(classes) = &spec.hardness.classes {
             for split in Split::ALL {
                 let each = splits.get(split.as_str()).copied().unwrap_or(0) / 2;
-                let of: BTreeMap<&str, i32> = classes.iter().map(|class| (class.name.as_str(), each)).collect();
+                let of: BTreeMap<&str, i32> =
+                    classes.iter().map(|class| (class.name.as_str(), each)).collect();
                 balance.insert(split.as_str(), of);
             }
         }

@@ -26,9 +26,9 @@ mod video;
 
 pub use check::Dataset;
 pub use draw::PairDraw;
-pub use splits::split_of_slice;
 pub use index::{FORMAT, INDEX_NAME};
 pub use make::{Maker, Shard};
 pub use read::{StoredSet, StoredVideo};
 pub use readings::COLUMNS;
 pub use record::Made;
+pub use splits::split_of_slice;

@@ -143,7 +143,9 @@ impl<'a> Maker<'a> {
             }
         }
         let name = &self.dataset.spec.shapes[self.dataset.draw(pair, 0).shape_index].name;
-        let problem = format!("`{name}` (pair {pair}): no draw of {MAX_ATTEMPTS} gives two sound videos; the last: {last}");
+        let problem = format!(
+            "`{name}` (pair {pair}): no draw of {MAX_ATTEMPTS} gives two sound videos; the last: {last}"
+        );
         let allowed = "shapes, forces and places that the sensor can carry; see `press` and `scale`";
         Err(DesignError::at("shapes", "", problem, allowed).into())
     }

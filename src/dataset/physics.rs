@@ -218,7 +218,8 @@ fn mean_of_inverse(one: &Pressed, other: &Pressed) -> f64 {
 mod tests {
     use super::*;
 
-    const DOME: Dome = Dome { radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, at_mm: DVec3::new(0.0, 0.0, -10.0) };
+    const DOME: Dome =
+        Dome { radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, at_mm: DVec3::new(0.0, 0.0, -10.0) };
     const PRIOR: Prior = Prior { young_mpa: [0.01, 10.0], poisson: 0.47, travel_sd_mm: 0.005 };
 
     /// A ball by Hertz, pressed on the pole of a dome on springs of 8.4 N/mm.
@@ -226,15 +227,17 @@ mod tests {
         let yields = (1.0 - 0.49_f64.powi(2)) / 0.56 + (1.0 - 0.47_f64.powi(2)) / young_mpa;
         let modulus = 1.0 / yields;
         let curved = 1.0 / (1.0 / radius_mm + 0.1);
-        (0..10).map(|k| {
-            let force = 0.1 * f64::from(k);
-            let radius = (0.75 * force * curved / modulus).cbrt();
-            let depth = radius * radius / curved - HELD * force * yields / 10.0;
-            let mut row = [0.0; COLUMNS.len()];
-            (row[0], row[3], row[9], row[13], row[17]) =
-                (f64::from(k), -force, -force / 8.4, 3.0 + depth + force / 8.4, radius);
-            row
-        }).collect()
+        (0..10)
+            .map(|k| {
+                let force = 0.1 * f64::from(k);
+                let radius = (0.75 * force * curved / modulus).cbrt();
+                let depth = radius * radius / curved - HELD * force * yields / 10.0;
+                let mut row = [0.0; COLUMNS.len()];
+                (row[0], row[3], row[9], row[13], row[17]) =
+                    (f64::from(k), -force, -force / 8.4, 3.0 + depth + force / 8.4, radius);
+                row
+            })
+            .collect()
     }
 
     #[test]

@@ -43,7 +43,12 @@ impl StoredSet {
         let index = domecast_design::parse_json(&domecast_design::read_text(&path)?)
             .map_err(|error| error.in_file(&path))?;
         if index.get("format").and_then(Value::as_str) != Some(FORMAT) {
-            return Err(fault(&path, "format", "this is no data set's index", "what `domecast dataset` writes"));
+            return Err(fault(
+                &path,
+                "format",
+                "this is no data set's index",
+                "what `domecast dataset` writes",
+            ));
         }
         let columns = index.pointer("/readings/columns").and_then(Value::as_array);
         if !columns.is_some_and(|found| found.iter().map(Value::as_str).eq(COLUMNS.map(Some))) {
@@ -82,7 +87,9 @@ impl StoredSet {
             let bytes = std::fs::read(path)
                 .map_err(|error| fault(path, "", format!("cannot be read ({error})"), "a readable file"))?;
             let mut rows: Option<(String, Vec<Row>)> = None;
-            for (name, content) in entries(&bytes).map_err(|problem| fault(path, "", problem, "a whole shard"))? {
+            for (name, content) in
+                entries(&bytes).map_err(|problem| fault(path, "", problem, "a whole shard"))?
+            {
                 let Some((key, kind)) = name.split_once('.') else { continue };
                 if kind == "readings.npy" {
                     let read = readings(content);
@@ -128,8 +135,11 @@ fn entries(bytes: &[u8]) -> Result<Vec<(&str, &[u8])>, String> {
 fn readings(bytes: &[u8]) -> Result<Vec<Row>, String> {
     let length = bytes.get(8..10).ok_or("no header")?;
     let begin = 10 + usize::from(u16::from_le_bytes([length[0], length[1]]));
-    let header = bytes.get(10..begin).and_then(|header| std::str::from_utf8(header).ok()).ok_or("no header")?;
-    let right = header.contains("'<f4'") && header.contains("False") && header.contains(&format!(", {},", COLUMNS.len()));
+    let header =
+        bytes.get(10..begin).and_then(|header| std::str::from_utf8(header).ok()).ok_or("no header")?;
+    let right = header.contains("'<f4'")
+        && header.contains("False")
+        && header.contains(&format!(", {},", COLUMNS.len()));
     if !right {
         return Err(format!("it holds {}", header.trim()));
     }
@@ -155,7 +165,10 @@ mod tests {
         archive.add("000000.json", b"{}");
         let bytes = archive.finish();
         let found = entries(&bytes).expect("whole");
-        assert_eq!(found.iter().map(|entry| entry.0).collect::<Vec<_>>(), ["000000.readings.npy", "000000.json"]);
+        assert_eq!(
+            found.iter().map(|entry| entry.0).collect::<Vec<_>>(),
+            ["000000.readings.npy", "000000.json"]
+        );
         for cut in [0, 100, 700, bytes.len() - 1100] {
             assert!(entries(&bytes[..cut]).is_err(), "{cut}");
         }

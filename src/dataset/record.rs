@@ -37,7 +37,8 @@ pub fn label(dataset: &Dataset, draw: &PairDraw, video: &Video, number: u32) -> 
     let course = &video.course;
     let keys: Vec<Value> =
         course.times_s.iter().zip(&course.force_n).map(|(time, force)| list([*time, *force])).collect();
-    let force = |truth: &domecast_sim::FrameTruth| truth.wrench.iter().take(3).map(|f| f * f).sum::<f64>().sqrt();
+    let force =
+        |truth: &domecast_sim::FrameTruth| truth.wrench.iter().take(3).map(|f| f * f).sum::<f64>().sqrt();
     let label = json!({
         "key": key(number),
         "class": named.map(|class| class.name.as_str()),

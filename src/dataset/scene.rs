@@ -8,7 +8,9 @@ use crate::draw::PairDraw;
 use crate::sensor::SensorDraw;
 use domecast_sim::scene::SceneFile;
 use domecast_sim::scene::electronics::{ElectronicsSection, FocusSection, NoiseSection};
-use domecast_sim::scene::file::{ContactSection, FramesSection, InkSection, LevelName, OutputSection, ToleranceSection};
+use domecast_sim::scene::file::{
+    ContactSection, FramesSection, InkSection, LevelName, OutputSection, ToleranceSection,
+};
 use domecast_sim::scene::light::{LedLight, LightSection};
 use domecast_sim::scene::objects::{ForceKey, ObjectKey, ObjectSection, PressSection, ShapeSection};
 use domecast_sim::scene::slow_gel::{ModulusName, SlowGelSection};
@@ -152,15 +154,15 @@ pub fn video_scene(
     let start = draw.place_mm - draw.way * START_RADII * dataset.design.optics().dome_radius_mm();
     let last_s = course.times_s.last().copied().unwrap_or(0.0);
     let touch_s = f64::from(course.first_contact.saturating_sub(1)) * step_s;
-    let path = vec![
-        key(touch_s, start, draw.rotation_deg),
-        key(last_s, start + draw.drag_mm, draw.rotation_deg),
-    ];
+    let path =
+        vec![key(touch_s, start, draw.rotation_deg), key(last_s, start + draw.drag_mm, draw.rotation_deg)];
     let keys = course.times_s.iter().zip(&course.force_n);
-    let mut force: Vec<ForceKey> = keys.map(|(time, force)| ForceKey { time_s: *time, force_n: *force }).collect();
+    let mut force: Vec<ForceKey> =
+        keys.map(|(time, force)| ForceKey { time_s: *time, force_n: *force }).collect();
     force.push(ForceKey { time_s: last_s + step_s, force_n: 0.0 });
     let mut file = sensor.clone();
-    file.frames = FramesSection { count: count as u32 + 1, rate_hz: 1.0 / step_s, images: true, colour: true };
+    file.frames =
+        FramesSection { count: count as u32 + 1, rate_hz: 1.0 / step_s, images: true, colour: true };
     file.seed = seed;
     if let Some(leds) = &mut file.light.leds {
         leds.power = draw.power;

@@ -15,6 +15,8 @@ use domecast_sim::{Plan, Scene, SimError, elastomer_of};
 const STREAM_SENSOR: u64 = 1 << 40;
 /// No sensor is further off than this many standard deviations: makers measure what they ship.
 const MAX_SD: f64 = 2.0;
+/// What sensors as built may be larger than the room that their design has, mm.
+const ROOM_MM: f64 = 5.0;
 /// Length of a finite element on the dome, mm of a dome of 10 mm radius.
 const ELEMENT_PART: f64 = 0.1;
 
@@ -148,6 +150,8 @@ impl Dataset {
             springs.wire.elastic_modulus_mpa *= stiffer;
         }
         file.elastomer.young_modulus_mpa *= deviations.factor(spec.young_percent);
+        // the room that a sensor may take is asked of the design, not of what came out
+        file.envelope.size_mm = file.envelope.size_mm.map(|side| side + ROOM_MM);
         let leds = &mut file.leds;
         leds.center_radius_mm += deviations.next(spec.light_mm);
         leds.center_z_mm += deviations.next(spec.light_mm);

@@ -62,10 +62,14 @@ pub fn tracked(
         let frame = frame.map_err(|fault| refused(format!("{fault:?}")))?;
         let said = tracker.track(order as u64, &frame);
         let [wrench, platform] = numbers(said, at_mm);
-        let seen: Vec<Option<(DVec2, DVec2)>> = said.black_dots.iter().map(|dot| {
-            let at_rest_px = dot.undeformed_px?;
-            Some((at_rest_px, dot.image_px? - at_rest_px))
-        }).collect();
+        let seen: Vec<Option<(DVec2, DVec2)>> = said
+            .black_dots
+            .iter()
+            .map(|dot| {
+                let at_rest_px = dot.undeformed_px?;
+                Some((at_rest_px, dot.image_px? - at_rest_px))
+            })
+            .collect();
         scratch.give_back(image);
         let Some(tare) = &tare else {
             let dots_px = seen.iter().map(|dot| dot.map(|(_, moved)| moved)).collect();
@@ -74,10 +78,14 @@ pub fn tracked(
         };
         let wrench = std::array::from_fn(|k| wrench[k] - tare.wrench[k]);
         let platform = std::array::from_fn(|k| platform[k] - tare.platform[k]);
-        let seen: Vec<Option<SeenDot>> = seen.iter().zip(&tare.dots_px).map(|(dot, rest)| {
-            let ((at_px, moved_px), rest_px) = (*dot).zip(*rest)?;
-            Some(SeenDot { at_px, moved_px: moved_px - rest_px })
-        }).collect();
+        let seen: Vec<Option<SeenDot>> = seen
+            .iter()
+            .zip(&tare.dots_px)
+            .map(|(dot, rest)| {
+                let ((at_px, moved_px), rest_px) = (*dot).zip(*rest)?;
+                Some(SeenDot { at_px, moved_px: moved_px - rest_px })
+            })
+            .collect();
         let travel_mm = match dataset.spec().readings.robot_travel_sd_mm {
             Some(sd_mm) => video.travel_mm[at] + sd_mm * random.normal(),
             None => f64::NAN,

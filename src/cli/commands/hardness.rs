@@ -48,11 +48,14 @@ impl Tally {
 pub fn run(output: &Output, folder: &Path, out: Option<&Path>) -> Result<(), Failure> {
     let set = StoredSet::open(folder)?;
     let in_index = |field: &str, problem: &str| {
-        DesignError::at(field, "", problem, "what `domecast dataset` writes").in_file(&folder.join(INDEX_NAME))
+        DesignError::at(field, "", problem, "what `domecast dataset` writes")
+            .in_file(&folder.join(INDEX_NAME))
     };
     let dome = set.dome().ok_or_else(|| in_index("dome", "a number of the dome is missing"))?;
-    let (prior, border) = prior(&set.index).ok_or_else(|| in_index("spec.hardness", "no range of hardness"))?;
-    let mut staged = out.map(|path| StagedFile::new(path, "hardness", &output.rules(&[folder]))).transpose()?;
+    let (prior, border) =
+        prior(&set.index).ok_or_else(|| in_index("spec.hardness", "no range of hardness"))?;
+    let mut staged =
+        out.map(|path| StagedFile::new(path, "hardness", &output.rules(&[folder]))).transpose()?;
     let mut splits: BTreeMap<String, Tally> = BTreeMap::new();
     let mut lines = String::new();
     set.each(&mut |video| {
@@ -75,7 +78,8 @@ pub fn run(output: &Output, folder: &Path, out: Option<&Path>) -> Result<(), Fai
         staged.write(lines.as_bytes())?;
         output.kept(staged.commit()?);
     }
-    let splits: BTreeMap<String, Value> = splits.iter().map(|(split, tally)| (split.clone(), tally.to_json())).collect();
+    let splits: BTreeMap<String, Value> =
+        splits.iter().map(|(split, tally)| (split.clone(), tally.to_json())).collect();
     for (split, tally) in &splits {
         output.say(&format!("{split}: {tally}"))?;
     }

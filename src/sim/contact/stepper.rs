@@ -162,7 +162,12 @@ impl<'a> Stepper<'a> {
             None => {
                 self.last = Last::Free;
                 let state = self.scene.state_at(frame, time_s)?;
-                Ok(Touch { state, contact: None, solved: ContactTruth::away(), rest_from_objects: Vec::new() })
+                Ok(Touch {
+                    state,
+                    contact: None,
+                    solved: ContactTruth::away(),
+                    rest_from_objects: Vec::new(),
+                })
             }
         }
     }
@@ -231,7 +236,8 @@ impl<'a> Stepper<'a> {
         let contact = pressed.state.is_moved().then(|| Arc::new(pressed.state.clone()));
         let names = scene.objects().iter().map(|object| object.name.as_str());
         let solved = ContactTruth::of_several(&pressed, names);
-        let places = pressed.objects.iter().map(|object| object.as_ref().map(|object| object.rest_from_object));
+        let places =
+            pressed.objects.iter().map(|object| object.as_ref().map(|object| object.rest_from_object));
         let rest_from_objects = places.collect();
         self.last = Last::Several(Box::new(pressed));
         Ok(Some(Touch { state, contact, solved, rest_from_objects }))

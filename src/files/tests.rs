@@ -284,3 +284,16 @@ fn two_steps_do_where_there_is_no_exchange() {
     assert!(replace(&at("none"), &at("out"), &at("aside")).is_err());
     assert_eq!(fs::read_to_string(at("out/a.txt")).unwrap(), "new");
 }
+
+#[test]
+fn an_index_is_replaced_whole_and_leaves_nothing_beside_it() {
+    let place = tempfile::tempdir().expect("a folder");
+    let path = place.path().join("new/index.json");
+    for text in ["{}", "{\"a\": 1}"] {
+        super::replace_file(&path, text.as_bytes()).expect("written");
+        assert_eq!(std::fs::read_to_string(&path).expect("there"), text);
+    }
+    assert_eq!(std::fs::read_dir(place.path().join("new")).expect("a folder").count(), 1);
+    let refused = super::replace_file(&place.path().join("new"), b"x").expect_err("a folder stands there");
+    assert!(refused.to_string().contains("new"), "{refused}");
+}

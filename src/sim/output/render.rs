@@ -28,7 +28,6 @@ use crate::raster::settings::Timing;
 use crate::raster::spots::{Points, Spots};
 use crate::scene::Scene;
 use crate::work::Work;
-use domecast_contact::Contact;
 use domecast_optics::numeric::Rigid;
 
 /// Draws the frames of a scene with the effects of a plan.
@@ -105,17 +104,6 @@ impl<'a> Renderer<'a> {
             Some(gel) => Stepper::slow(self.scene, level, gel)?,
             None => Stepper::new(self.scene, level)?,
         }))
-    }
-
-    /// The same on a dome whose tables are there already ([`Contact`] of the pipeline's level).
-    ///
-    /// # Errors
-    /// As [`Renderer::stepper`].
-    pub fn stepper_on(&self, dome: &Contact) -> Result<Option<Stepper<'a>>, SimError> {
-        if self.pipeline.contact.is_none() {
-            return Ok(None);
-        }
-        Stepper::on(self.scene, dome, self.pipeline.slow_gel.as_ref()).map(Some)
     }
 
     /// The sensor at a frame's time; `around` is the touched dome about the frame.

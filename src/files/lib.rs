@@ -172,10 +172,12 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let write = || -> io::Result<()> {
         fs::create_dir_all(folder)?;
-        let mut draft = tempfile::Builder::new().prefix(".index-").tempfile_in(folder)?;
-        draft.write_all(bytes)?;
-        draft.as_file().sync_all()?;
-        draft.persist(path).map(|_| ()).map_err(|error| error.error)
+        // one process writes one index at a time; what a stopped one left has its number and is overwritten or harmless
+        let draft = folder.join(format!(".index-{}", std::process::id()));
+        let mut file = File::create(&draft)?;
+        let written =
+            file.write_all(bytes).and_then(|()| file.sync_all()).and_then(|()| fs::rename(&draft, path));
+        written.inspect_err(|_| drop(fs::remove_file(&draft)))
     };
     write().map_err(WriteError::io("write the file", path))
 }

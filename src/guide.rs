@@ -5,6 +5,7 @@
 //! | choose and design | [`design`], [`dots`], [`simulating`], [`accuracy`] |
 //! | make | [`printing`], [`casting`] |
 //! | calibrate and run | [`force`], [`tracking`], [`live`], [`python`], [`formats`] |
+//! | learn | [`hardness`] |
 //! | change domecast | [`architecture`] |
 
 #[doc = include_str!("guide/design.md")]
@@ -29,5 +30,7 @@ pub mod accuracy {}
 pub mod python {}
 #[doc = include_str!("guide/formats.md")]
 pub mod formats {}
+#[doc = include_str!("guide/hardness.md")]
+pub mod hardness {}
 #[doc = include_str!("guide/architecture.md")]
 pub mod architecture {}

@@ -52,6 +52,24 @@ impl Contact {
         Ok(Self { elastomer, level, prepared })
     }
 
+    /// The same dome with another friction and Young's modulus, MPa: its tables are kept, for friction is not in them and a
+    /// modulus only scales them.
+    ///
+    /// # Errors
+    /// As [`Contact::new`].
+    pub fn with_material(&self, friction: f64, young_mpa: f64) -> Result<Self, ContactError> {
+        let elastomer = Elastomer { friction, young_mpa, ..self.elastomer };
+        elastomer.check()?;
+        let factor = self.elastomer.young_mpa / young_mpa;
+        let prepared = match &self.prepared {
+            Prepared::Compliance(compliance) if factor != 1.0 => {
+                Prepared::Compliance(Arc::new(compliance.scaled(factor)))
+            }
+            prepared => prepared.clone(),
+        };
+        Ok(Self { elastomer, prepared, ..self.clone() })
+    }
+
     /// The same dome with other tables.
     pub(crate) fn with_prepared(&self, prepared: Prepared) -> Self {
         Self { prepared, ..self.clone() }

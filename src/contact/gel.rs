@@ -99,12 +99,34 @@ impl GelMemory {
         if !matches!(level, Level::Linear { .. }) {
             return Err(ContactError::NoSlowGel { level: level.name() });
         }
-        let step_s = positive("frames.step_s", step_s)?;
-        let terms = vec![Field::Still; relaxation.terms().len()];
-        let memory = Self { relaxation, step_s, shape: Field::Still, terms };
+        let memory = Self::at_rest(relaxation, step_s)?;
         let young_mpa = elastomer.young_mpa * memory.alpha();
         let contact = Contact::new(crate::elastomer::Elastomer { young_mpa, ..*elastomer }, level)?;
         Ok((memory, contact))
+    }
+
+    /// The same with the tables of a dome that is there, whatever its modulus; `young_mpa` is that of a fast press.
+    ///
+    /// # Errors
+    /// As [`GelMemory::new`].
+    pub fn on(
+        relaxation: Relaxation,
+        step_s: f64,
+        dome: &Contact,
+        young_mpa: f64,
+    ) -> Result<(Self, Contact), ContactError> {
+        if !matches!(dome.level(), Level::Linear { .. }) {
+            return Err(ContactError::NoSlowGel { level: dome.level().name() });
+        }
+        let memory = Self::at_rest(relaxation, step_s)?;
+        let contact = dome.with_material(dome.elastomer().friction, young_mpa * memory.alpha())?;
+        Ok((memory, contact))
+    }
+
+    fn at_rest(relaxation: Relaxation, step_s: f64) -> Result<Self, ContactError> {
+        let step_s = positive("frames.step_s", step_s)?;
+        let terms = vec![Field::Still; relaxation.terms().len()];
+        Ok(Self { relaxation, step_s, shape: Field::Still, terms })
     }
 
     /// rho and gamma of a term.

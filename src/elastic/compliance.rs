@@ -58,6 +58,19 @@ impl Compliance {
         Ok(Self { grid, places, table: Arc::new(table), spectrum })
     }
 
+    /// The same of a dome that yields `factor` times as much.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let softer = |one: &Spectrum| Spectrum {
+            first_ring: one.first_ring,
+            columns: one.columns.iter().map(|column| column.iter().map(|v| v * factor).collect()).collect(),
+        };
+        Self {
+            table: Arc::new(self.table.iter().map(|entry| entry.map(|value| value * factor)).collect()),
+            spectrum: Arc::new(self.spectrum.iter().map(softer).collect()),
+            ..self.clone()
+        }
+    }
+
     /// The same dome, its nodes moved by forces on others (number; force in the node's frame, N) where `is_near` is true
     /// of their place at rest: there an object is looked at. The rest stays, for no node of it can be touched.
     pub fn displaced(&self, forces: &[(usize, DVec3)], is_near: impl Fn(DVec3) -> bool) -> Self {

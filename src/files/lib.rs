@@ -208,3 +208,22 @@ impl Write for GrowingFile {
         self.file.flush()
     }
 }
+
+/// Replaces a small file by another in one step: for an index that is ours by its content, which the caller has looked at, and that
+/// grows with what lies beside it. Whoever reads it meanwhile sees the one or the other, whole.
+///
+/// # Errors
+/// [`WriteError::Io`]; then the file is as it was.
+pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let write = || -> io::Result<()> {
+        fs::create_dir_all(folder)?;
+        // one process writes one index at a time; what a stopped one left has its number and is overwritten or harmless
+        let draft = folder.join(format!(".index-{}", std::process::id()));
+        let mut file = File::create(&draft)?;
+        let written =
+            file.write_all(bytes).and_then(|()| file.sync_all()).and_then(|()| fs::rename(&draft, path));
+        written.inspect_err(|_| drop(fs::remove_file(&draft)))
+    };
+    write().map_err(WriteError::io("write the file", path))
+}

@@ -310,3 +310,16 @@ fn a_growing_file_is_there_at_once_and_a_result_once_it_has_ended() {
     drop(growing);
     assert_eq!(fs::read(&path).unwrap(), b"");
 }
+
+#[test]
+fn an_index_is_replaced_whole_and_leaves_nothing_beside_it() {
+    let place = tempfile::tempdir().expect("a folder");
+    let path = place.path().join("new/index.json");
+    for text in ["{}", "{\"a\": 1}"] {
+        super::replace_file(&path, text.as_bytes()).expect("written");
+        assert_eq!(std::fs::read_to_string(&path).expect("there"), text);
+    }
+    assert_eq!(std::fs::read_dir(place.path().join("new")).expect("a folder").count(), 1);
+    let refused = super::replace_file(&place.path().join("new"), b"x").expect_err("a folder stands there");
+    assert!(refused.to_string().contains("new"), "{refused}");
+}

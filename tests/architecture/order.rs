@@ -8,7 +8,7 @@ use crate::tokens::tokens;
 use crate::{assert_none, crates, members, short, text, workspace};
 
 /// The crates from the ground up; each may depend on those named beside it and on no others of ours.
-const CRATES: [(&str, &[&str]); 14] = [
+const CRATES: [(&str, &[&str]); 15] = [
     ("files", &[]),
     ("optics", &[]),
     ("mesh", &[]),
@@ -21,7 +21,11 @@ const CRATES: [(&str, &[&str]); 14] = [
     ("sim", &["contact", "design", "files", "light", "mesh", "optics", "springs"]),
     ("fab", &["design", "files", "mesh", "optics", "runtime", "sim", "springs"]),
     ("live", &["optics", "runtime", "springs"]),
-    ("cli", &["contact", "design", "fab", "files", "live", "mesh", "optics", "runtime", "sim", "springs"]),
+    ("dataset", &["contact", "design", "fab", "files", "optics", "runtime", "sim", "springs"]),
+    (
+        "cli",
+        &["contact", "dataset", "design", "fab", "files", "live", "mesh", "optics", "runtime", "sim", "springs"],
+    ),
     ("python", &["cli", "design", "fab", "files", "optics", "runtime", "sim", "springs"]),
 ];
 

@@ -7,7 +7,9 @@ mod calibrate_optics;
 mod calibrate_print;
 mod check;
 mod compare;
+mod dataset;
 mod explain;
+mod hardness;
 mod illuminate;
 mod input;
 mod list;
@@ -204,11 +206,29 @@ enum Command {
         #[command(flatten)]
         options: simulate::SimulateOptions,
     },
+    /// Draw many touches for learning, balanced and split, as shards of a WebDataset.
+    Dataset {
+        /// The spec of the set.
+        spec: PathBuf,
+        #[command(flatten)]
+        options: dataset::DatasetOptions,
+    },
+    /// Hardness by contact mechanics, of every video of a data set: a logarithm of Young's modulus with its interval.
+    Hardness {
+        /// The folder of the set.
+        dataset: PathBuf,
+        /// Where to write a line of JSON for each video.
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
     /// Print the JSON schema of the design file.
     Schema {
         /// That of the scene file instead.
         #[arg(long)]
         scene: bool,
+        /// That of the spec of a data set instead.
+        #[arg(long, conflicts_with = "scene")]
+        dataset: bool,
     },
     /// From frames to markers, pose, wrench and local displacement.
     Track(Box<track::TrackArguments>),
@@ -345,7 +365,9 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
             calibrate_optics::run(output, seen, constants, &files, *rest_frames)
         }
         Command::Simulate { scene, options } => simulate::run(output, scene, options),
-        Command::Schema { scene } => schema::run(output, *scene),
+        Command::Dataset { spec, options } => dataset::run(output, spec, options),
+        Command::Hardness { dataset, out } => hardness::run(output, dataset, out.as_deref()),
+        Command::Schema { scene, dataset } => schema::run(output, *scene, *dataset),
         Command::Track(arguments) => track::run(output, arguments),
         Command::Live(arguments) => live::run(output, arguments),
         Command::CalibratePrint { measured, design, out, marks } => {

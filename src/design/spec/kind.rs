@@ -13,6 +13,8 @@ pub enum FileKind {
     Scene,
     /// The constants of a build.
     Constants,
+    /// The spec of a data set.
+    Dataset,
 }
 
 impl FileKind {
@@ -21,6 +23,8 @@ impl FileKind {
         let has = |field: &str| value.get(field).is_some();
         if value.get("format").and_then(Value::as_str) == Some("domecast-constants") {
             Some(Self::Constants)
+        } else if has("hardness") && has("shapes") {
+            Some(Self::Dataset)
         } else if has("design") && has("frames") {
             Some(Self::Scene)
         } else {
@@ -47,6 +51,7 @@ impl FileKind {
             Self::Design => "a design file",
             Self::Scene => "a scene file",
             Self::Constants => "a constants file",
+            Self::Dataset => "the spec of a data set",
         }
     }
 
@@ -54,6 +59,7 @@ impl FileKind {
         match self {
             Self::Design => "`domecast build` takes designs; a scene names its design in the field `design`",
             Self::Scene => "`domecast simulate` draws scenes",
+            Self::Dataset => "`domecast dataset` takes specs of data sets",
             Self::Constants => "`domecast track` and `domecast calibrate-force` take constants",
         }
     }

@@ -26,6 +26,8 @@ pub struct Touch {
     pub contact: Option<Arc<ContactState>>,
     /// How it was solved.
     pub solved: ContactTruth,
+    /// Where each object is that touches or is held near, `rest_from_object`; empty while all are away.
+    pub rest_from_objects: Vec<Option<Rigid>>,
 }
 
 /// Solves the contact of a scene from frame to frame.
@@ -113,6 +115,24 @@ impl<'a> Stepper<'a> {
         Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: None, known: None, placed: None })
     }
 
+    /// The same on a dome whose tables are there already, at the level that they were made for.
+    ///
+    /// # Errors
+    /// A slow gel that the dome's level cannot work with.
+    pub fn on(scene: &'a Scene, dome: &Contact, gel: Option<&(Relaxation, f64)>) -> Result<Self, SimError> {
+        let px_per_mm = largest_px_per_mm(scene);
+        let step_s = 1.0 / scene.file().frames.rate_hz;
+        let (gel, contact) = match gel {
+            None => (None, dome.clone()),
+            Some((relaxation, young_mpa)) => {
+                let made = GelMemory::on(relaxation.clone(), step_s, dome, *young_mpa);
+                let (gel, contact) = made.map_err(|error| unfit(&error))?;
+                (Some(gel), contact)
+            }
+        };
+        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel, known: None, placed: None })
+    }
+
     /// The same over a gel whose modulus relaxes, from that instant modulus, MPa; before the first frame nothing touches
     /// it.
     ///
@@ -158,7 +178,12 @@ impl<'a> Stepper<'a> {
             None => {
                 self.last = Last::Free;
                 let state = self.scene.state_at(frame, time_s)?;
-                Ok(Touch { state, contact: None, solved: ContactTruth::away() })
+                Ok(Touch {
+                    state,
+                    contact: None,
+                    solved: ContactTruth::away(),
+                    rest_from_objects: Vec::new(),
+                })
             }
         }
     }
@@ -195,8 +220,9 @@ impl<'a> Stepper<'a> {
         let state = State { pose: pressed.rest_from_platform, wrench: pressed.wrench, held };
         let contact = (!pressed.state.nodes.is_empty()).then(|| Arc::new(pressed.state.clone()));
         let solved = ContactTruth::of(&pressed, self.px_per_mm);
+        let rest_from_objects = vec![Some(pressed.rest_from_object)];
         self.last = Last::One(Box::new(pressed));
-        Ok(Some(Touch { state, contact, solved }))
+        Ok(Some(Touch { state, contact, solved, rest_from_objects }))
     }
 
     /// Several objects, or a slow gel; `None` while nothing touches and the dome has its shape.
@@ -227,8 +253,11 @@ impl<'a> Stepper<'a> {
         let contact = pressed.state.is_moved().then(|| Arc::new(pressed.state.clone()));
         let names = scene.objects().iter().map(|object| object.name.as_str());
         let solved = ContactTruth::of_several(&pressed, names);
+        let places =
+            pressed.objects.iter().map(|object| object.as_ref().map(|object| object.rest_from_object));
+        let rest_from_objects = places.collect();
         self.last = Last::Several(Box::new(pressed));
-        Ok(Some(Touch { state, contact, solved }))
+        Ok(Some(Touch { state, contact, solved, rest_from_objects }))
     }
 
     /// What an object does at a time; `None` while it cannot touch.

@@ -1,5 +1,6 @@
 //! What happens: from a scene file to a resolved, validated [`Scene`].
 
+mod built;
 pub mod camera;
 mod check_camera;
 pub mod dust;

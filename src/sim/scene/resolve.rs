@@ -65,18 +65,43 @@ fn from_text(text: &str, folder: &Path) -> Result<Scene, SimError> {
 }
 
 fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimError> {
-    check(&file)?;
-    let lens = design.optics().lens().spec();
-    check_camera::check(&file, [lens.width, lens.height])?;
+    check_own(&file, &design)?;
     let layout = Layout::of_design(&design)?;
+    let suspension = if design.is_rigid() { None } else { Some(suspension_of(&design)?) };
+    let dots = layout.dots.iter().map(|dot| scene_dot(dot, design.optics())).collect();
+    let diameter_mm = design.sections().white_markers.diameter_mm;
+    let numbered = (0..).zip(design.white_markers_mm());
+    let markers = numbered.map(|(id, position_mm)| Marker { id, position_mm, diameter_mm }).collect();
+    happening(file, folder, Sensor { design, layout, suspension, dots, markers })
+}
+
+/// What a scene's own fields say against each other and the camera.
+fn check_own(file: &SceneFile, design: &Design) -> Result<(), SimError> {
+    check(file)?;
+    let lens = design.optics().lens().spec();
+    Ok(check_camera::check(file, [lens.width, lens.height])?)
+}
+
+/// What of a scene is the sensor's.
+pub(super) struct Sensor {
+    pub design: Design,
+    pub layout: Layout,
+    pub suspension: Option<Suspension>,
+    /// The dots, none of them broken.
+    pub dots: Vec<SceneDot>,
+    pub markers: Vec<Marker>,
+}
+
+/// What happens to a sensor.
+pub(super) fn happening(file: SceneFile, folder: &Path, sensor: Sensor) -> Result<Scene, SimError> {
+    let Sensor { design, layout, suspension, mut dots, markers } = sensor;
+    check_own(&file, &design)?;
     if design.is_rigid() && file.motion.is_some() {
         let allowed = "no `motion`: objects may press on the dome, or a design with mount.kind = \"springs\"";
         return Err(DesignError::at("motion", "", "rigid mount: the platform does not move", allowed).into());
     }
     check_dome(&file, &design)?;
     check_gel(&file, &design)?;
-    let suspension = if design.is_rigid() { None } else { Some(suspension_of(&design)?) };
-    let mut dots: Vec<SceneDot> = layout.dots.iter().map(|dot| scene_dot(dot, design.optics())).collect();
     for (index, broken) in file.ink.broken.iter().enumerate() {
         let count = dots.len();
         let dot = dots.get_mut(broken.id as usize).ok_or_else(|| {
@@ -86,9 +111,6 @@ fn resolve(file: SceneFile, folder: &Path, design: Design) -> Result<Scene, SimE
         dot.cut = Some((broken.left, broken.direction_deg.to_radians()));
     }
     let motion = Motion::new(file.motion.as_ref(), &design, suspension.as_ref());
-    let diameter_mm = design.sections().white_markers.diameter_mm;
-    let numbered = (0..).zip(design.white_markers_mm());
-    let markers = numbered.map(|(id, position_mm)| Marker { id, position_mm, diameter_mm }).collect();
     let object = |(index, section): (usize, &super::objects::ObjectSection)| {
         SceneObject::new(section, &format!("objects[{index}]"), folder)
     };

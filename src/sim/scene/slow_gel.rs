@@ -50,7 +50,7 @@ impl SlowGelSection {
     ///
     /// # Errors
     /// Terms that are no relaxation.
-    pub(crate) fn resolved(&self, young_mpa: f64) -> Result<(Relaxation, f64), ContactError> {
+    pub fn resolved(&self, young_mpa: f64) -> Result<(Relaxation, f64), ContactError> {
         let terms = self.terms.iter().map(|term| RelaxationTerm { part: term.part, time_s: term.time_s });
         let relaxation = Relaxation::new(terms.collect())?;
         let instant_mpa = match self.modulus {

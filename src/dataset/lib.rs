@@ -1,0 +1,34 @@
+//! Sets of simulated touches for learning, and what contact mechanics makes of them.
+//!
+//! A [`Dataset`] is read from a spec ([`spec::DatasetSpec`]). Its videos come in pairs that share everything (object, press, sensor,
+//! light, times, forces) but the object's stiffness and the noise, so that nothing but what stiffness does tells the two apart.
+//! A [`Maker`] makes shards: a pair depends on the spec and its own number alone, so a shard has the same bytes wherever it is made.
+//!
+//! ```text
+//! spec -> check -> draw -> sensor, scene -> video -> readings, tracked -> record -> make -> index
+//! ```
+
+mod check;
+mod draw;
+mod index;
+mod make;
+pub mod physics;
+mod read;
+mod readings;
+mod record;
+mod scene;
+mod sensor;
+pub mod spec;
+mod splits;
+mod tar;
+mod tracked;
+mod video;
+
+pub use check::Dataset;
+pub use draw::PairDraw;
+pub use index::{FORMAT, INDEX_NAME};
+pub use make::{Maker, Shard};
+pub use read::{StoredSet, StoredVideo};
+pub use readings::COLUMNS;
+pub use record::Made;
+pub use splits::split_of_slice;

@@ -1,0 +1,106 @@
+//! Readings as `track` says them of frames at the design's own size.
+
+use glam::DVec2;
+
+use crate::check::Dataset;
+use crate::draw::PairDraw;
+use crate::readings::{Readings, SeenDot, row, written};
+use crate::scene::video_scene;
+use crate::sensor::{BuiltSensor, FullSensor};
+use crate::video::{NoVideo, Refused, Video, touches};
+use domecast_optics::numeric::SeededRandom;
+use domecast_runtime::track::{CameraFrame, TrackOptions, Tracked, Tracker};
+use domecast_sim::{Around, Renderer, Scratch};
+use domecast_springs::Displacement;
+
+/// Stream of the noise of what is not tracked.
+const STREAM_TRACKED: u64 = 0x7eac;
+
+/// What is taken off: a sensor whose constants are those of its design sees something at rest.
+struct Tare {
+    wrench: [f64; 6],
+    platform: [f64; 6],
+    dots_px: Vec<Option<DVec2>>,
+}
+
+/// The readings of a video: the tracker has the design's constants, not those of the sensor as built, and what it says of the
+/// frame at rest is taken off. The contact's radius is not tracked, nor is the hand's travel.
+///
+/// # Errors
+/// [`NoVideo`].
+pub fn tracked(
+    dataset: &Dataset,
+    (sensor, full): (&BuiltSensor, &FullSensor),
+    draw: &PairDraw,
+    (young_mpa, seed): (f64, u64),
+    video: &Video,
+) -> Result<Readings, NoVideo> {
+    let refused = |why: String| NoVideo::Refused(Refused(why));
+    let file = video_scene(dataset, full.scene.file(), draw, (young_mpa, seed, 1.0));
+    let scene = full.scene.with_file(file)?;
+    let touched = touches(dataset, sensor, &scene, draw)?;
+    let renderer = Renderer::new(&scene, &full.plan).map_err(NoVideo::Fault)?;
+    let layout = domecast_design::layout::Layout::of_design(&dataset.design);
+    let layout = layout.map_err(|error| refused(error.to_string()))?;
+    let constants = domecast_fab::constants::of(&dataset.design, &layout);
+    let constants = constants.map_err(|error| refused(error.to_string()))?;
+    let tracker = Tracker::new(&constants, TrackOptions::default());
+    let mut tracker = tracker.map_err(|error| refused(error.to_string()))?;
+    let at_mm = scene.reference_mm();
+    let mut random = SeededRandom::stream(seed, STREAM_TRACKED);
+    let mut scratch = Scratch::default();
+    let count = touched.touches.len();
+    let mut tare: Option<Tare> = None;
+    let (mut rows, mut dots) = (Vec::new(), Vec::new());
+    // the frame at rest first
+    for order in 0..=count {
+        let (number, at) = if order == 0 { (count, 0) } else { (order - 1, order - 1) };
+        let around = Around::of(&touched.touches, at);
+        let drawn = renderer.frame_around(number as u32, around.as_ref(), &mut scratch)?;
+        let Some(image) = drawn.image else { continue };
+        let frame = CameraFrame::new(image.width, image.height, image.channels, &image.bytes);
+        let frame = frame.map_err(|fault| refused(format!("{fault:?}")))?;
+        let said = tracker.track(order as u64, &frame);
+        let [wrench, platform] = numbers(said, at_mm);
+        let seen: Vec<Option<(DVec2, DVec2)>> = said
+            .black_dots
+            .iter()
+            .map(|dot| {
+                let at_rest_px = dot.undeformed_px?;
+                Some((at_rest_px, dot.image_px? - at_rest_px))
+            })
+            .collect();
+        scratch.give_back(image);
+        let Some(tare) = &tare else {
+            let dots_px = seen.iter().map(|dot| dot.map(|(_, moved)| moved)).collect();
+            tare = Some(Tare { wrench, platform, dots_px });
+            continue;
+        };
+        let wrench = std::array::from_fn(|k| wrench[k] - tare.wrench[k]);
+        let platform = std::array::from_fn(|k| platform[k] - tare.platform[k]);
+        let seen: Vec<Option<SeenDot>> = seen
+            .iter()
+            .zip(&tare.dots_px)
+            .map(|(dot, rest)| {
+                let ((at_px, moved_px), rest_px) = (*dot).zip(*rest)?;
+                Some(SeenDot { at_px, moved_px: moved_px - rest_px })
+            })
+            .collect();
+        let travel_mm = match dataset.spec().readings.robot_travel_sd_mm {
+            Some(sd_mm) => video.travel_mm[at] + sd_mm * random.normal(),
+            None => f64::NAN,
+        };
+        let height = f64::from(dataset.design.sections().camera.height);
+        rows.push(row(touched.course.times_s[at], &wrench, &platform, travel_mm, &seen, f64::NAN, height));
+        dots.push(seen.into_iter().map(written).collect());
+    }
+    Ok(Readings { rows, dots })
+}
+
+/// Wrench and displacement of the platform; NaN where the tracker withholds them.
+fn numbers(said: &Tracked, at_mm: glam::DVec3) -> [[f64; 6]; 2] {
+    [
+        said.wrench.map_or([f64::NAN; 6], |wrench| wrench.to_array()),
+        said.pose.map_or([f64::NAN; 6], |pose| Displacement::of_pose(&pose, at_mm).to_array()),
+    ]
+}

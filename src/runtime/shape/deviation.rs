@@ -14,7 +14,7 @@ use super::normals::CellReading;
 
 /// Cells along the side of the smallest blocks, and how often these are doubled.
 const BLOCK: usize = 4;
-const LEVELS: usize = 4;
+const LEVELS: usize = 3;
 
 /// Share of a block's cells that must be read for it to count.
 const MIN_READ: f32 = 0.5;
@@ -23,8 +23,8 @@ const MIN_READ: f32 = 0.5;
 /// are means of two (by summation of the lattice's own spectrum).
 const OWN_CELL: f32 = 0.546;
 
-/// Slope that a skin may have besides, where it is filled in, rad: alike over a block.
-const FILLED_SLOPE: f32 = 0.05;
+/// Slope that a skin may have besides, where it is filled in, rad.
+const FILLED_SLOPE: f32 = 0.02;
 
 /// Part of the depth: what is not known of the light on a skin that is far from its place.
 const DEPTH_PART: f32 = 0.01;
@@ -78,12 +78,9 @@ pub(super) struct Deviations {
     /// Cells to the rim, for each of the smallest blocks, and the most of them.
     to_rim: Vec<f32>,
     farthest: f32,
-    /// Cells without readings on the way from the rim, where the skin is bonded: on the shortest in these.
+    /// Cells to the nearest reading.
     away: Vec<f32>,
 }
-
-/// Rounds of the walk: one more than the ways have turns back.
-const WALKS: usize = 3;
 
 impl Deviations {
     /// Takes a frame's readings; `left_mm` is what the solve leaves between a cell and the next one, across or down.
@@ -106,7 +103,8 @@ impl Deviations {
                     continue;
                 }
                 let block = &mut blocks[row / BLOCK * *columns + column / BLOCK];
-                let size_mm = [right, below].map(|next| view.surface_mm[next].distance(view.surface_mm[cell]));
+                let size_mm =
+                    [right, below].map(|next| view.surface_mm[next].distance(view.surface_mm[cell]));
                 block.cells += 1.0;
                 block.size_mm[0] += size_mm[0];
                 block.size_mm[1] += size_mm[1];
@@ -124,16 +122,8 @@ impl Deviations {
         self.add_up(cells.height.div_ceil(BLOCK));
         self.walk_to_rim();
         self.away.clear();
-        self.away.resize(cells.count(), f32::INFINITY);
-        for (cell, away) in self.away.iter_mut().enumerate().filter(|(cell, _)| is_dome(*cell)) {
-            let around = [cell + 1, cell + w, cell.wrapping_sub(1), cell.wrapping_sub(w)];
-            if !around.into_iter().all(is_dome) {
-                *away = 0.0;
-            }
-        }
-        for _ in 0..WALKS {
-            self.walk(w, |cell| if readings[cell].is_read { 0.0 } else { 1.0 }, is_dome);
-        }
+        self.away.extend(readings.iter().map(|reading| if reading.is_read { 0.0 } else { f32::INFINITY }));
+        self.walk(w, is_dome);
     }
 
     /// Makes the larger blocks of the smallest, and their factors.
@@ -162,9 +152,6 @@ impl Deviations {
             }
             let before = finer.last().map_or(1.0, |fine| fine.factor);
             level.factor = if count > 0.0 { sum / count } else { before };
-        }
-        if std::env::var_os("DBG").is_some() {
-            eprintln!("factors {:?}", self.levels.iter().map(|l| l.factor).collect::<Vec<_>>());
         }
     }
 
@@ -197,12 +184,12 @@ impl Deviations {
         self.farthest = self.to_rim.iter().fold(1.0, |far, way| far.max(*way));
     }
 
-    /// Costs of the way by two passes over the neighbours (G. Borgefors, Computer Vision 27, 1984).
-    fn walk(&mut self, w: usize, cost: impl Fn(usize) -> f32, is_dome: impl Fn(usize) -> bool) {
+    /// Cells to the nearest reading, by two passes over the neighbours (G. Borgefors, Computer Vision 27, 1984).
+    fn walk(&mut self, w: usize, is_dome: impl Fn(usize) -> bool) {
         let n = self.away.len();
         let near = |away: &[f32], i: usize, next: [Option<usize>; 2]| {
             let of = |next: Option<usize>| next.and_then(|k| away.get(k)).copied().unwrap_or(f32::INFINITY);
-            away[i].min(of(next[0]).min(of(next[1])) + cost(i))
+            away[i].min(of(next[0]).min(of(next[1])) + 1.0)
         };
         for i in (0..n).filter(|i| is_dome(*i)) {
             self.away[i] = near(&self.away, i, [i.checked_sub(1), i.checked_sub(w)]);
@@ -220,7 +207,8 @@ impl Deviations {
         // Of a round dome: the way that a place of a half-plane would have.
         let way = way * (2.0 - way / self.farthest);
         let octaves = way.max(1.0).log2();
-        let mut slopes = finest.variance(row, column, 0) * (OWN_CELL + std::f32::consts::LN_2 * octaves.min(3.0));
+        let mut slopes =
+            finest.variance(row, column, 0) * (OWN_CELL + std::f32::consts::LN_2 * octaves.min(3.0));
         let mut left = octaves - 3.0;
         for (k, level) in self.levels.iter().enumerate().skip(1) {
             let part = if k + 1 == LEVELS { left.max(0.0) } else { left.clamp(0.0, 1.0) };
@@ -230,7 +218,7 @@ impl Deviations {
         slopes /= std::f32::consts::TAU;
         let own = &finest.blocks[row * finest.columns + column];
         let size_mm = own.size_mm[0] / own.cells.max(1.0);
-        let filled = FILLED_SLOPE * size_mm * (BLOCK as f32 * self.away[cell].min(1e4)).sqrt();
+        let filled = FILLED_SLOPE * size_mm * self.away[cell].min(1e4);
         (slopes + filled * filled + (DEPTH_PART * height_mm).powi(2)).sqrt()
     }
 }

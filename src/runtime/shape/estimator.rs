@@ -224,7 +224,7 @@ impl ShapeFromColor {
         }
         status = self.system.go_on(&mut self.moved_mm, status, END_MM);
         let width = self.cells.width;
-        self.measure_deviations();
+        self.deviations.measure(&self.cells, &self.view, &self.readings);
         let sd_mm = |cell: usize, height_mm: f32| self.deviations.of(cell, width, height_mm);
         let skin = Skin { view: &self.view, moved_mm: &self.moved_mm, dome: self.optics.dome() };
         self.map.draw(&self.cells, &skin, sd_mm, &mut self.chart, status);
@@ -280,17 +280,6 @@ impl ShapeFromColor {
             }
         });
         self.readings = readings;
-    }
-
-    /// How far heights may be off, by what the normals leave over.
-    fn measure_deviations(&mut self) {
-        let (view, moved_mm) = (&self.view, &self.moved_mm);
-        let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * moved_mm[cell] as f32;
-        let left_mm = |cell: usize, next: usize| {
-            let normal = |i: usize| view.normal[i] + self.tilt[i].0;
-            0.5 * (normal(cell) + normal(next)).dot(point(next) - point(cell))
-        };
-        self.deviations.measure(&self.cells, view, &self.readings, left_mm);
     }
 
     /// Finds the skin that is perpendicular to the normals.

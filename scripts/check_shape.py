@@ -115,16 +115,14 @@ def photograph(picture, seed, jpeg=True, noise=NOISE_LEVELS):
     return cv2.imdecode(cv2.imencode(".jpg", codes, JPEG)[1], cv2.IMREAD_COLOR)
 
 
-def errors(truth, shape, dome):
-    """Height and normal errors with the angle of their places from the pole."""
+def errors(truth, shape, dome, number=0):
+    """Height and normal errors of a frame with the angle of their places from the pole."""
     surface = np.load(truth / "frame_0000.surface.npy").astype(float)
     normal = np.load(truth / "frame_0000.normal.npy").astype(float)
     from_center = surface - [0, 0, dome["center_z"]]
     true = np.linalg.norm(from_center, axis=2) - dome["radius"]
     polar = np.degrees(np.arctan2(np.linalg.norm(from_center[..., :2], axis=2), from_center[..., 2]))
-    found = np.load(shape / "frame_0000.height.npy")
-    sd = np.load(shape / "frame_0000.height_sd.npy")
-    own = np.load(shape / "frame_0000.normal.npy")
+    found, sd, own = (np.load(shape / f"frame_{number:04}.{kind}.npy") for kind in ("height", "height_sd", "normal"))
     cosine = np.clip((own * normal).sum(axis=2), -1, 1)
     return {"polar": polar, "true": true, "off": found - true, "sd": sd, "turned": np.degrees(np.arccos(cosine)),
             "known": np.isfinite(found) & np.isfinite(true)}

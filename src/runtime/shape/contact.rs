@@ -10,7 +10,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::cells::{Cells, View};
 use super::fill::{Pyramid, Weighted};
-use super::fourier;
+use super::fourier::Fourier;
 use domecast_optics::DomeShape;
 
 /// Places along each side of the chart.
@@ -56,7 +56,8 @@ pub struct SkinContact {
     pub curvatures_per_mm: Option<[f64; 2]>,
 }
 
-/// The chart of one touch.
+/// The chart of one touch, and room for it, kept between frames.
+#[derive(Debug, Clone, Default)]
 pub(super) struct Chart {
     center: Vec3A,
     side_x: Vec3A,
@@ -66,46 +67,42 @@ pub(super) struct Chart {
     center_mm: Vec3A,
     pressure: Vec<f32>,
     threshold: f32,
+    values: Vec<Weighted>,
+    pyramid: Pyramid,
+    fourier: Fourier,
 }
 
 impl Chart {
-    /// The pressure of a touch; `None` where nothing is pressed in. `depths` are signed distances, NaN beside the dome.
-    pub fn new(
+    /// Finds the pressure of a touch; false where nothing is pressed in. `depths` are signed distances, NaN beside the dome.
+    pub fn take(
+        &mut self,
         cells: &Cells,
         view: &View,
         points: &[Vec3A],
         depths: &[f32],
         sd_mm: f32,
         dome: &DomeShape,
-    ) -> Option<Self> {
-        let deepest = deepest(depths)?;
+    ) -> bool {
+        let Some(deepest) = deepest(depths) else { return false };
         if depths[deepest] > -MIN_DEPTH_MM.max(MIN_DEPTH_SDS * sd_mm) {
-            return None;
+            return false;
         }
-        let center_mm = dome.center_mm().as_vec3a();
-        let out = |cell: usize| (points[cell] - center_mm).normalize_or(Vec3A::Z);
+        self.center_mm = dome.center_mm().as_vec3a();
+        self.radius_mm = dome.radius_mm() as f32;
+        let out = |cell: usize| (points[cell] - self.center_mm).normalize_or(Vec3A::Z);
         let is_pressed = |cell: &usize| view.is_dome[*cell] && depths[*cell] < 0.2 * depths[deepest];
-        let pressed: Vec<usize> = (0..cells.count()).filter(is_pressed).collect();
-        let center = pressed.iter().map(|cell| out(*cell)).sum::<Vec3A>().normalize_or(out(deepest));
-        let side_x = center.any_orthonormal_vector();
-        let mut chart = Self {
-            center,
-            side_x,
-            side_y: center.cross(side_x),
-            step_mm: 1.0,
-            radius_mm: dome.radius_mm() as f32,
-            center_mm,
-            pressure: Vec::new(),
-            threshold: f32::INFINITY,
-        };
-        let far = pressed.iter().map(|cell| chart.flat(points[*cell]).length()).fold(0.0, f32::max);
+        let pressed = || (0..cells.count()).filter(is_pressed);
+        self.center = pressed().map(out).sum::<Vec3A>().normalize_or(out(deepest));
+        self.side_x = self.center.any_orthonormal_vector();
+        self.side_y = self.center.cross(self.side_x);
+        let far = pressed().map(|cell| self.flat(points[cell]).length()).fold(0.0, f32::max);
         // At least sixteen cells to each side: the edge of a small touch needs places around it.
         let near = (points[deepest] - points[(deepest + 1).min(points.len() - 1)]).length();
-        let reach = (REACH * far).max(16.0 * near.min(0.1 * chart.radius_mm)).min(1.5 * chart.radius_mm);
-        chart.step_mm = 2.0 * reach / SIDE as f32;
-        chart.pressure = chart.depth_map(cells, view, points, depths);
-        chart.find_pressure(near.min(reach));
-        Some(chart)
+        let reach = (REACH * far).max(16.0 * near.min(0.1 * self.radius_mm)).min(1.5 * self.radius_mm);
+        self.step_mm = 2.0 * reach / SIDE as f32;
+        self.lay_out(cells, view, points, depths);
+        self.find_pressure(near.min(reach));
+        true
     }
 
     /// Stereographic coordinates of a point of the skin, mm.
@@ -121,9 +118,11 @@ impl Chart {
         self.flat(point_mm) / self.step_mm + Vec2::splat(0.5 * SIDE as f32)
     }
 
-    /// The depths at the chart's places.
-    fn depth_map(&self, cells: &Cells, view: &View, points: &[Vec3A], depths: &[f32]) -> Vec<f32> {
-        let mut values: Vec<Weighted> = vec![(Vec3A::ZERO, 0.0); SIDE * SIDE];
+    /// Puts the depths at the chart's places.
+    fn lay_out(&mut self, cells: &Cells, view: &View, points: &[Vec3A], depths: &[f32]) {
+        let mut values = std::mem::take(&mut self.values);
+        values.clear();
+        values.resize(SIDE * SIDE, (Vec3A::ZERO, 0.0));
         for cell in (0..cells.count()).filter(|cell| view.is_dome[*cell]) {
             let at = self.place(points[cell]);
             let low = at.floor();
@@ -141,20 +140,23 @@ impl Chart {
         for place in &mut values {
             *place = if place.1 > 0.0 { (place.0 / place.1, place.1.min(1.0)) } else { (Vec3A::ZERO, 0.0) };
         }
-        Pyramid::default().fill(SIDE, &mut values);
+        self.pyramid.fill(SIDE, &mut values);
         // The square goes on periodically: its margin leads to zero.
         let fade = |i: usize| {
             let to_edge = i.min(SIDE - 1 - i) as f32 / (0.15 * SIDE as f32);
             if to_edge < 1.0 { 0.5 - 0.5 * (std::f32::consts::PI * to_edge).cos() } else { 1.0 }
         };
-        values.iter().enumerate().map(|(i, (v, _))| v.x * fade(i % SIDE) * fade(i / SIDE)).collect()
+        self.pressure.clear();
+        let faded = values.iter().enumerate().map(|(i, (v, _))| v.x * fade(i % SIDE) * fade(i / SIDE));
+        self.pressure.extend(faded);
+        self.values = values;
     }
 
     /// From depth to pressure over half the modulus, and the level at which it ends.
     fn find_pressure(&mut self, cell_mm: f32) {
         let per_mm = std::f32::consts::TAU / (SIDE as f32 * self.step_mm);
         let smooth = SMOOTHING_STEPS * std::f32::consts::TAU / SIDE as f32;
-        fourier::filter(&mut self.pressure, SIDE, |x, y| {
+        self.fourier.filter(&mut self.pressure, SIDE, |x, y| {
             let wave = (x * x + y * y).sqrt();
             -wave * per_mm * (-0.5 * (wave * smooth).powi(2)).exp()
         });

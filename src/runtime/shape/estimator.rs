@@ -3,13 +3,14 @@
 use glam::Vec3A;
 
 use super::cells::{Cells, View};
+use super::contact::Chart;
 use super::deviation::Deviations;
 use super::error::ShapeError;
 use super::fill::{Pyramid, Weighted};
 use super::lattice::Lattice;
 use super::levels::{self, Level};
 use super::light::ShapeLight;
-use super::map::ShapeMap;
+use super::map::{ShapeMap, Skin};
 use super::marks::Marks;
 use super::normals::{self, CellReading};
 use super::rest::RestMap;
@@ -38,8 +39,6 @@ const MAX_STRAIN: f32 = 0.5;
 /// Settings of a [`ShapeFromColor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeOptions {
-    /// Standard deviation of a pixel's value, levels of 255.
-    pub noise_levels: f64,
     /// Pixels along each side of a cell that is solved for, 1 to 16: half of the picture's resolution halves the noise, and colour
     /// comes no finer from a camera whose chroma is halved.
     pub cell_px: usize,
@@ -49,7 +48,7 @@ pub struct ShapeOptions {
 
 impl Default for ShapeOptions {
     fn default() -> Self {
-        Self { noise_levels: 2.0, cell_px: 2, max_passes: 3 }
+        Self { cell_px: 2, max_passes: 2 }
     }
 }
 
@@ -70,9 +69,15 @@ pub struct ShapeFromColor {
     pub(super) view: View,
     pub(super) levels: Vec<Level>,
     pub(super) covered: Vec<bool>,
+    /// Deviation of a pixel's light by noise, full scale 1.
+    pub(super) noise: Vec3A,
+    differences: Vec<f32>,
     pub(super) gain: Vec<Vec3A>,
     /// By how much a reading's normal turns where the point lies 1 mm further along its ray, for the same colours.
     turn_per_mm: Vec<Vec3A>,
+    turns: Lattice,
+    /// By how many cells a place of the dome is seen beside where it was at rest.
+    shifts: Lattice,
     readings: Vec<CellReading>,
     /// How far each cell had moved when it was read, mm, and whether it is to be read again.
     read_mm: Vec<f64>,
@@ -82,6 +87,7 @@ pub struct ShapeFromColor {
     deviations: Deviations,
     pyramid: Pyramid,
     system: System,
+    chart: Chart,
     /// How far each cell's point has moved along its ray, mm.
     pub(super) moved_mm: Vec<f64>,
     last_mm: Vec<f64>,
@@ -94,13 +100,6 @@ impl ShapeFromColor {
     /// # Errors
     /// [`ShapeError`] names the field of the constants that is missing or at fault.
     pub fn new(constants: &Constants, tracker: &Tracker, options: ShapeOptions) -> Result<Self, ShapeError> {
-        if !(options.noise_levels > 0.0 && options.noise_levels < 255.0) {
-            return Err(ShapeError::new(
-                "noise_levels",
-                "is no deviation of a pixel",
-                "give one above 0, below 255",
-            ));
-        }
         for (name, value) in [("cell_px", options.cell_px), ("max_passes", options.max_passes)] {
             if !(1..=16).contains(&value) {
                 return Err(ShapeError::new(name, format!("is {value}"), "give a number from 1 to 16"));
@@ -120,8 +119,12 @@ impl ShapeFromColor {
             view: View::default(),
             levels: Vec::new(),
             covered: vec![false; count],
+            noise: Vec3A::ZERO,
+            differences: Vec::new(),
             gain: Vec::new(),
             turn_per_mm: vec![Vec3A::ZERO; count],
+            turns: Lattice::default(),
+            shifts: Lattice::default(),
             tilt: vec![(Vec3A::ZERO, 0.0); count],
             readings: vec![CellReading::default(); count],
             read_mm: vec![0.0; count],
@@ -129,6 +132,7 @@ impl ShapeFromColor {
             deviations: Deviations::default(),
             pyramid: Pyramid::default(),
             system: System::new(cells.width, cells.height),
+            chart: Chart::default(),
             moved_mm: vec![0.0; count],
             last_mm: Vec::new(),
             map: ShapeMap::new(&cells, &optics),
@@ -148,7 +152,7 @@ impl ShapeFromColor {
             let problem = format!("has no pose: {}", tracked.status());
             return Err(ShapeError::new("rest", problem, "take a frame in which the white markers are seen"));
         }
-        let noise = self.options.noise_levels as f32 / 255.0 / self.cells.px as f32;
+        let noise = self.noise / self.cells.px as f32;
         let (levels, covered) = (&self.levels, &self.covered);
         self.rest = Some(RestMap::measured(levels, covered, &self.cells, &self.view, &self.light, noise)?);
         self.rest_seen = self.optics.clone();
@@ -179,6 +183,9 @@ impl ShapeFromColor {
         }
         levels::read(frame, &self.cells, &self.view, &self.light.linear, &mut self.levels);
         self.marks.cover(tracked, &self.cells, &mut self.covered);
+        let (is_dome, covered) = (&self.view.is_dome, &self.covered);
+        let is_bare = |cell: usize| is_dome[cell] && !covered[cell];
+        self.noise = levels::noise(frame, &self.cells, is_bare, &self.light.linear, &mut self.differences);
         Ok(true)
     }
 
@@ -199,7 +206,8 @@ impl ShapeFromColor {
             self.map.forget();
             return Ok(&self.map);
         }
-        rest.at_pose(&self.cells, &self.view, &self.rest_seen, self.is_rigid, &mut self.gain);
+        let (shifts, gain) = (&mut self.shifts, &mut self.gain);
+        rest.at_pose(&self.cells, &self.view, &self.rest_seen, shifts, self.is_rigid, gain);
         let mut status = SolveStatus::default();
         for pass in 0..self.options.max_passes {
             self.choose(pass == 0);
@@ -218,14 +226,15 @@ impl ShapeFromColor {
         let width = self.cells.width;
         self.deviations.measure(&self.cells, &self.view, &self.readings);
         let sd_mm = |cell: usize, height_mm: f32| self.deviations.of(cell, width, height_mm);
-        self.map.draw(&self.cells, &self.view, &self.moved_mm, sd_mm, self.optics.dome(), status);
+        let skin = Skin { view: &self.view, moved_mm: &self.moved_mm, dome: self.optics.dome() };
+        self.map.draw(&self.cells, &skin, sd_mm, &mut self.chart, status);
         Ok(&self.map)
     }
 
     /// How readings turn with depth, on the undeformed dome: with it the light need not be taken again and again.
     fn turn(&mut self) {
         let (light, view) = (&self.light, &self.view);
-        let turns = Lattice::new(&self.cells, view, |cell| {
+        self.turns.take(&self.cells, view, |cell| {
             let (at, ray, out) = (view.surface_mm[cell], view.ray[cell], view.normal[cell]);
             let here = light.at(at);
             let irradiance = here.base + here.direct(out);
@@ -236,7 +245,7 @@ impl ShapeFromColor {
         });
         for (row, span) in view.spans.iter().enumerate() {
             for column in span.clone() {
-                self.turn_per_mm[row * self.cells.width + column] = turns.at(column, row);
+                self.turn_per_mm[row * self.cells.width + column] = self.turns.at(column, row);
             }
         }
     }

@@ -8,16 +8,17 @@ use super::fill::{Pyramid, Weighted};
 /// Cells between two places of the lattice.
 const STEP: usize = 8;
 
-/// Values at every eighth cell, those beside the dome filled in from the dome.
-#[derive(Debug, Clone)]
+/// Values at every eighth cell, those beside the dome filled in from the dome; kept between frames.
+#[derive(Debug, Clone, Default)]
 pub(super) struct Lattice {
     columns: usize,
     values: Vec<Weighted>,
+    pyramid: Pyramid,
 }
 
 impl Lattice {
     /// Asks for the value of cells that look at the dome.
-    pub fn new(cells: &Cells, view: &View, value: impl Fn(usize) -> Option<Vec3A>) -> Self {
+    pub fn take(&mut self, cells: &Cells, view: &View, value: impl Fn(usize) -> Option<Vec3A>) {
         let (columns, rows) = (cells.width.div_ceil(STEP) + 1, cells.height.div_ceil(STEP) + 1);
         let at = |i: usize| {
             let column = (i % columns * STEP).min(cells.width - 1);
@@ -26,9 +27,10 @@ impl Lattice {
             let known = if view.is_dome[cell] { value(cell) } else { None };
             known.filter(|value| value.is_finite()).map_or((Vec3A::ZERO, 0.0), |value| (value, 1.0))
         };
-        let mut values: Vec<Weighted> = (0..columns * rows).map(at).collect();
-        Pyramid::default().fill(columns, &mut values);
-        Self { columns, values }
+        self.columns = columns;
+        self.values.clear();
+        self.values.extend((0..columns * rows).map(at));
+        self.pyramid.fill(columns, &mut self.values);
     }
 
     /// The value at a cell.

@@ -45,3 +45,51 @@ pub(super) fn read(
         }
     }
 }
+
+/// Cells between those at which noise is looked for.
+const NOISE_STEP: usize = 3;
+
+/// Noise is not taken for less, levels: JPEG hides a camera's from squares of four pixels, but not what it did to dark places.
+const MIN_NOISE: f32 = 2.0;
+
+/// Differences larger than so many times the middle one are no noise but edges.
+const EDGE: f32 = 4.0;
+
+/// Standard deviation of a pixel's light by noise, channel by channel, full scale 1: from what four pixels in a square have beside a
+/// plane, over the bare membrane. What a camera's JPEG does to larger blocks does not show in it.
+pub(super) fn noise(
+    frame: &CameraFrame<'_>,
+    cells: &Cells,
+    is_bare: impl Fn(usize) -> bool,
+    linear: &[f32],
+    found: &mut Vec<f32>,
+) -> Vec3A {
+    let (width, bytes, px) = (frame.width(), frame.bytes(), cells.px);
+    let mut sds = [0.0; 3];
+    for (channel, sd) in sds.iter_mut().enumerate() {
+        found.clear();
+        for row in (0..cells.height).step_by(NOISE_STEP) {
+            for column in
+                (0..cells.width).step_by(NOISE_STEP).filter(|column| is_bare(row * cells.width + column))
+            {
+                let start = 3 * (row * px * width + column * px) + channel;
+                let at = |i: usize| bytes.get(start + i).and_then(|code| linear.get(*code as usize)).copied();
+                if let (Some(a), Some(b), Some(c), Some(d)) = (at(0), at(3), at(3 * width), at(3 * width + 3))
+                {
+                    found.push((0.5 * (a - b - c + d)).abs());
+                }
+            }
+        }
+        let middle = found.len() / 2;
+        let least = MIN_NOISE / 255.0;
+        *sd = least;
+        if middle > 0 {
+            let most = EDGE * *found.select_nth_unstable_by(middle, f32::total_cmp).1 + least;
+            let (sum, count) =
+                found.iter().filter(|v| **v <= most).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+            // The mean of a normal number's size is sqrt(2 / pi) of its deviation.
+            *sd = (sum / count * (0.5 * std::f32::consts::PI).sqrt()).max(least);
+        }
+    }
+    Vec3A::from_array(sds)
+}

@@ -1,12 +1,20 @@
 //! The shape on the raw image's grid.
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec2, Vec3, Vec3A};
 
 use super::cells::{Cells, View};
 use super::contact::{Chart, SkinContact};
 use super::outline::outline;
 use super::system::SolveStatus;
 use domecast_optics::{DomeShape, SensorOptics};
+
+/// What a solve found.
+pub(super) struct Skin<'a> {
+    pub view: &'a View,
+    /// How far each cell's point has moved along its ray, mm.
+    pub moved_mm: &'a [f64],
+    pub dome: &'a DomeShape,
+}
 
 /// The skin as triangles between the cells of a [`ShapeMap`].
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -110,11 +118,17 @@ impl ShapeMap {
         surface
     }
 
-    /// Where each cell's skin is, sensor frame, mm; NaN where nothing is known.
+    /// The cells.
     #[cfg(feature = "traction")]
-    pub(crate) fn cell_points(&self) -> Vec<Vec3A> {
-        let known = self.cell_mm.iter().zip(&self.cell_point);
-        known.map(|(height, at)| if height.is_nan() { Vec3A::NAN } else { *at }).collect()
+    pub(crate) fn cell_count(&self) -> usize {
+        self.cell_mm.len()
+    }
+
+    /// Where a cell's skin is, sensor frame, mm; NaN where nothing is known.
+    #[cfg(feature = "traction")]
+    pub(crate) fn cell_point(&self, cell: usize) -> Vec3A {
+        let is_known = self.cell_mm.get(cell).is_some_and(|height| !height.is_nan());
+        self.cell_point.get(cell).copied().filter(|_| is_known).unwrap_or(Vec3A::NAN)
     }
 
     /// What the skin's own shape says of the pressure on a cell, over that at the edge of the touch; 0 where nothing touches.
@@ -125,8 +139,8 @@ impl ShapeMap {
 
     /// Area of the skin that a cell shows, mm^2; 0 at the dome's outline.
     #[cfg(feature = "traction")]
-    pub(crate) fn cell_area_mm2(&self, cell: usize, points: &[Vec3A]) -> f64 {
-        let beside = |step: usize| points.get(cell + step).copied().unwrap_or(Vec3A::NAN) - points[cell];
+    pub(crate) fn cell_area_mm2(&self, cell: usize) -> f64 {
+        let beside = |step: usize| self.cell_point(cell + step) - self.cell_point(cell);
         let area_mm2 = beside(1).cross(beside(self.cells_across)).length();
         if area_mm2.is_finite() { f64::from(area_mm2) } else { 0.0 }
     }
@@ -164,12 +178,13 @@ impl ShapeMap {
     pub(super) fn draw(
         &mut self,
         cells: &Cells,
-        view: &View,
-        moved_mm: &[f64],
+        Skin { view, moved_mm, dome }: &Skin<'_>,
         sd_mm: impl Fn(usize, f32) -> f32,
-        dome: &DomeShape,
+        chart: &mut Chart,
         status: SolveStatus,
     ) {
+        // The last frame's outline is written over.
+        let outline_px = self.contact.take().map_or_else(Vec::new, |contact| contact.outline_px);
         self.forget();
         self.status = Some(status);
         let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * moved_mm[cell] as f32;
@@ -192,13 +207,13 @@ impl ShapeMap {
                 self.cell_normal[cell] = if normal.dot(view.ray[cell]) < 0.0 { -normal } else { normal };
             }
         }
-        self.touch(cells, view, dome);
+        self.touch(cells, view, dome, chart);
         self.spread(cells, view);
-        self.draw_outline(cells);
+        self.draw_outline(cells, outline_px);
     }
 
     /// Finds the outline of the touch about its deepest place, or its middle, where an object's hole is deepest.
-    fn draw_outline(&mut self, cells: &Cells) {
+    fn draw_outline(&mut self, cells: &Cells, mut room: Vec<Vec2>) {
         let Some(contact) = &mut self.contact else { return };
         let known = self.cell_mm.iter().enumerate().filter(|(_, depth)| depth.is_finite());
         let touched = known.filter(|(cell, _)| self.cell_pressure[*cell] > 1.0);
@@ -211,15 +226,18 @@ impl ShapeMap {
         };
         let own = |k: usize| (k * cells.px) as i64;
         let from = (own(cell % cells.width), own(cell / cells.width));
-        contact.outline_px = outline(is_in, from, (width, height));
+        room.clear();
+        outline(is_in, from, (width, height), &mut room);
+        contact.outline_px = room;
     }
 
-    fn touch(&mut self, cells: &Cells, view: &View, dome: &DomeShape) {
+    fn touch(&mut self, cells: &Cells, view: &View, dome: &DomeShape, chart: &mut Chart) {
         self.cell_pressure.fill(0.0);
         let deepest = self.cell_mm.iter().zip(&self.cell_sd_mm).filter(|(depth, _)| depth.is_finite());
         let sd_mm = deepest.min_by(|a, b| a.0.total_cmp(b.0)).map_or(0.0, |(_, sd)| *sd);
-        let chart = Chart::new(cells, view, &self.cell_point, &self.cell_mm, sd_mm, dome);
-        let Some(chart) = chart else { return };
+        if !chart.take(cells, view, &self.cell_point, &self.cell_mm, sd_mm, dome) {
+            return;
+        }
         for cell in (0..cells.count()).filter(|cell| view.is_dome[*cell]) {
             self.cell_pressure[cell] = chart.at(self.cell_point[cell]);
         }

@@ -3,10 +3,16 @@
 use glam::Vec2;
 
 /// Corners of the edge of the patch that the pixel `from` belongs to, outside of it, in their order around it; pixels' centres are whole
-/// numbers, so the corners lie on halves. Straight runs have their ends only. Empty where the pixel is none of the patch.
-pub(super) fn outline(is_in: impl Fn(i64, i64) -> bool, (x, y): (i64, i64), size: (i64, i64)) -> Vec<Vec2> {
+/// numbers, so the corners lie on halves. Straight runs have their ends only. None where the pixel is none of the patch.
+/// They are put behind those that are in `corners`.
+pub(super) fn outline(
+    is_in: impl Fn(i64, i64) -> bool,
+    (x, y): (i64, i64),
+    size: (i64, i64),
+    corners: &mut Vec<Vec2>,
+) {
     if !is_in(x, y) {
-        return Vec::new();
+        return;
     }
     // Up from the pixel to a place above which there is none: its upper edge is one of an outline.
     let mut top = y;
@@ -19,7 +25,6 @@ pub(super) fn outline(is_in: impl Fn(i64, i64) -> bool, (x, y): (i64, i64), size
     // Of the four pixels about a corner, those ahead on the left and on the right of a step.
     let ahead = [[(0, -1), (0, 0)], [(0, 0), (-1, 0)], [(-1, 0), (-1, -1)], [(-1, -1), (0, -1)]];
     let (mut cx, mut cy, mut way) = start;
-    let mut corners = Vec::new();
     for _ in 0..4 * size.0 * size.1 {
         let (dx, dy) = steps[way];
         (cx, cy) = (cx + dx, cy + dy);
@@ -38,7 +43,6 @@ pub(super) fn outline(is_in: impl Fn(i64, i64) -> bool, (x, y): (i64, i64), size
             break;
         }
     }
-    corners
 }
 
 #[cfg(test)]
@@ -49,7 +53,8 @@ mod tests {
     fn an_outline_goes_round_its_patch_once() {
         // An L of five pixels.
         let pixels = [(2, 1), (2, 2), (2, 3), (3, 3), (4, 3)];
-        let found = outline(|x, y| pixels.contains(&(x, y)), (3, 3), (8, 8));
+        let mut found = Vec::new();
+        outline(|x, y| pixels.contains(&(x, y)), (3, 3), (8, 8), &mut found);
         let area: f32 = (0..found.len())
             .map(|i| {
                 let (a, b) = (found[i], found[(i + 1) % found.len()]);

@@ -70,14 +70,13 @@ impl ShapeFromColor {
     /// Irradiance of a cell by the picture, and one over its variance, by channel.
     #[inline]
     fn irradiance(&self, cell: usize) -> (Vec3A, Vec3A) {
-        let noise = self.options.noise_levels as f32 / 255.0;
-        let variance = noise * noise / (self.cells.px * self.cells.px) as f32;
+        let variance = self.noise * self.noise / (self.cells.px * self.cells.px) as f32;
         let (view, level) = (&self.view, &self.levels[cell]);
         let gain = self.light.passed(view.ray[cell].z) * self.gain[cell];
         let irradiance = (level.light - Vec3A::splat(self.light.stray)) / gain.max(Vec3A::splat(1e-12));
         // Where noise would be cut off at black its mean is not the light.
         let expected = gain * self.light.still(view.place[cell]);
-        let is_lit = Vec3A::select(expected.cmpgt(Vec3A::splat(2.0 * noise)), Vec3A::ONE, Vec3A::ZERO);
+        let is_lit = Vec3A::select(expected.cmpgt(2.0 * self.noise), Vec3A::ONE, Vec3A::ZERO);
         let off = (level.light + Vec3A::splat(level.light.max_element())) * LEVEL_ERROR;
         (irradiance, gain * gain * level.is_known * is_lit / (off * off + variance))
     }

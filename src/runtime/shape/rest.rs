@@ -105,7 +105,7 @@ impl RestMap {
         cells: &Cells,
         view: &View,
         light: &ShapeLight,
-        noise: f32,
+        noise: Vec3A,
     ) -> Result<Self, ShapeError> {
         let seen: Vec<Seen> = seen(levels, covered, view, light).collect();
         let medians = medians(&seen);
@@ -123,7 +123,7 @@ impl RestMap {
             sums = sums.map(|values| smooth(&values, cells.width));
         }
         let [products, squares] = &sums;
-        let prior = (Vec3A::splat(noise) / (medians * RATIO_SD)).powf(2.0);
+        let prior = (noise / (medians * RATIO_SD)).powf(2.0);
         let mut values: Vec<Weighted> = vec![(Vec3A::ZERO, 0.0); cells.count()];
         for one in &seen {
             let (product, square) = (products[one.cell], squares[one.cell]);
@@ -140,24 +140,27 @@ impl RestMap {
         cells: &Cells,
         view: &View,
         rest: &SensorOptics,
+        shifts: &mut Lattice,
         is_rigid: bool,
         out: &mut Vec<Vec3A>,
     ) {
         out.resize(cells.count(), Vec3A::ONE);
-        let shifts = (!is_rigid).then(|| {
-            Lattice::new(cells, view, |cell| {
+        if !is_rigid {
+            shifts.take(cells, view, |cell| {
                 let pixel = rest.project(view.surface_mm[cell].as_dvec3()).ok()?;
                 let own = DVec2::new((cell % cells.width) as f64, (cell / cells.width) as f64);
                 Some((cells.of_pixel(pixel) - own).extend(0.0).as_vec3a())
-            })
-        });
+            });
+        }
         for (row, span) in view.spans.iter().enumerate() {
             for column in span.clone() {
                 let cell = row * cells.width + column;
-                let gain = shifts.as_ref().map_or(self.gain[cell], |shifts| {
+                let gain = if is_rigid {
+                    self.gain[cell]
+                } else {
                     let shift = shifts.at(column, row);
                     self.between(cells, column as f32 + shift.x, row as f32 + shift.y)
-                });
+                };
                 out[cell] = gain * cells.cosine(cell).powf(self.falloff);
             }
         }

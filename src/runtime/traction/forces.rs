@@ -5,7 +5,8 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use super::active_set::{ActiveSet, Ended, Rows};
 use super::model::{AXES, ElasticModel};
 use super::posterior::{Posterior, USUAL_DOT_SD_PX};
-use super::result::{DotTraction, HeightSample, Heights, LocalForces, TractionStatus};
+use super::pressure::PressureRoom;
+use super::result::{DotTraction, LocalForces, TractionStatus};
 use crate::constants::Constants;
 use crate::shape::ShapeMap;
 use crate::track::TrackError;
@@ -60,6 +61,7 @@ pub struct ForceDistribution {
     /// Height of each node and one over its deviation, and the nodes that have one.
     pub(super) heights: Vec<(f64, f64)>,
     pub(super) measured: Vec<usize>,
+    pub(super) room: PressureRoom,
     softness: f64,
     /// Whether the dots have moved by more than noise.
     is_moved: bool,
@@ -120,6 +122,7 @@ impl ForceDistribution {
             node_sd_n_mm2: vec![0.0; n],
             heights: vec![(0.0, 0.0); n],
             measured: Vec::with_capacity(n),
+            room: PressureRoom::default(),
             softness: 1.0,
             is_moved: false,
             dots,
@@ -134,18 +137,18 @@ impl ForceDistribution {
         &self.result
     }
 
-    /// The forces in a frame; `heights` are measured places of the skin, if any are.
-    pub fn update(&mut self, tracked: &Tracked, heights: &[HeightSample]) -> &LocalForces {
-        self.find(tracked, &Heights::Samples(heights))
+    /// The forces in a frame, from its dots and wrench alone.
+    pub fn update(&mut self, tracked: &Tracked) -> &LocalForces {
+        self.find(tracked, None)
     }
 
     /// The forces in a frame whose skin is measured: they press where it is touched, and as deep as it is. `map` is the same
     /// frame's ([`ShapeFromColor`](crate::shape::ShapeFromColor)).
     pub fn update_with_shape(&mut self, tracked: &Tracked, map: &ShapeMap) -> &LocalForces {
-        self.find(tracked, &Heights::Map(map))
+        self.find(tracked, Some(map))
     }
 
-    fn find(&mut self, tracked: &Tracked, heights: &Heights<'_>) -> &LocalForces {
+    fn find(&mut self, tracked: &Tracked, map: Option<&ShapeMap>) -> &LocalForces {
         self.result.dots.clear();
         self.result.contact = None;
         (self.result.rms_px, self.result.compliance_factor) = (0.0, 1.0);
@@ -158,15 +161,15 @@ impl ForceDistribution {
         let mut ended = Ended::Solved;
         self.softness = 1.0;
         self.move_skin();
-        self.allow(heights);
-        self.take_heights(heights);
+        self.allow(map);
+        self.take_heights(map);
         let is_touched = self.is_moved || !self.measured.is_empty();
         if !is_touched {
             self.set.clear();
             self.move_skin();
         }
         for _ in 0..if is_touched { TURNS } else { 0 } {
-            self.take_heights(heights);
+            self.take_heights(map);
             self.fill(tracked, &pose);
             let rows = Rows {
                 columns: &self.columns,

@@ -3,11 +3,8 @@
 use glam::DVec3;
 
 use super::forces::ForceDistribution;
-use super::result::{HeightSample, Heights};
 use crate::shape::ShapeMap;
 
-/// A height counts for a node when it is measured nearer to it than this part of the nodes' distance.
-const HEIGHT_REACH: f64 = 0.15;
 /// Least deviation of a height, mm.
 const MIN_HEIGHT_SD_MM: f64 = 0.002;
 
@@ -20,11 +17,11 @@ const LOOKS: i32 = 3;
 const LOOK_STEP: f64 = 0.25;
 
 impl ForceDistribution {
-    /// Takes the heights of the nodes where they are now.
-    pub(super) fn take_heights(&mut self, heights: &Heights<'_>) {
-        match heights {
-            Heights::Samples(samples) => self.take_samples(samples),
-            Heights::Map(map) => self.take_map(map),
+    /// Takes the heights of the nodes where they are now; none without a map.
+    pub(super) fn take_heights(&mut self, map: Option<&ShapeMap>) {
+        self.measured.clear();
+        if let Some(map) = map {
+            self.take_map(map);
         }
     }
 
@@ -37,11 +34,8 @@ impl ForceDistribution {
     }
 
     /// The nodes about which the skin is touched may bear a pressure; all may where no touch is seen.
-    pub(super) fn allow(&mut self, heights: &Heights<'_>) {
-        let Heights::Map(map) = heights else { return self.set.allowed.fill(true) };
-        if map.contact.is_none() {
-            return self.set.allowed.fill(true);
-        }
+    pub(super) fn allow(&mut self, map: Option<&ShapeMap>) {
+        let Some(map) = map.filter(|map| map.contact.is_some()) else { return self.set.allowed.fill(true) };
         let step_mm = LOOK_STEP * self.model.compliance.grid.spacing_mm();
         for node in 0..self.model.nodes.len() {
             let own = &self.model.nodes[node];
@@ -71,7 +65,6 @@ impl ForceDistribution {
     }
 
     fn take_map(&mut self, map: &ShapeMap) {
-        self.measured.clear();
         for node in 0..self.model.nodes.len() {
             let moved_mm = self.nodes_moved_mm[node];
             let own = &self.model.nodes[node];
@@ -87,39 +80,6 @@ impl ForceDistribution {
             let higher_mm = 0.5 * aside_mm.length_squared() / self.radius_mm;
             self.heights[node] = (height_mm - higher_mm, 1.0 / sd_mm.max(MIN_HEIGHT_SD_MM));
             self.measured.push(node);
-        }
-    }
-
-    /// Means of the heights that lie about each node, with their deviations.
-    fn take_samples(&mut self, samples: &[HeightSample]) {
-        self.measured.clear();
-        if samples.is_empty() {
-            return;
-        }
-        self.heights.fill((0.0, 0.0));
-        let reach_mm = HEIGHT_REACH * self.model.compliance.grid.spacing_mm();
-        for sample in samples {
-            let sd_mm = sample.sd_mm.max(MIN_HEIGHT_SD_MM);
-            if !(sample.height_mm.is_finite() && sd_mm.is_finite() && sample.surface_mm.is_finite()) {
-                continue;
-            }
-            let near = self.model.about(sample.surface_mm).max_by(|a, b| a.1.total_cmp(&b.1));
-            let Some((node, _)) = near else { continue };
-            if self.model.nodes[node].at_mm.distance(sample.surface_mm) > reach_mm {
-                continue;
-            }
-            // Neighbouring pixels err alike: more of them make a mean no better than one.
-            let (sum, weight) = &mut self.heights[node];
-            let own = 1.0 / (sd_mm * sd_mm);
-            *sum += own * sample.height_mm;
-            *weight += own;
-            if own == *weight {
-                self.measured.push(node);
-            }
-        }
-        for &node in &self.measured {
-            let (sum, weight) = self.heights[node];
-            self.heights[node] = (sum / weight, weight.sqrt().min(1.0 / MIN_HEIGHT_SD_MM));
         }
     }
 }

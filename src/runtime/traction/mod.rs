@@ -13,7 +13,7 @@
 //! let mut forces = ForceDistribution::new(&constants, None)?;
 //! let bytes = std::fs::read("frame.rgb")?;
 //! let tracked = tracker.track(0, &CameraFrame::new(640, 480, 3, &bytes)?);
-//! for dot in &forces.update(tracked, &[]).dots {
+//! for dot in &forces.update(tracked).dots {
 //!     println!("{} N/mm2 at {}", dot.traction_n_mm2, dot.surface_mm);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -42,5 +42,5 @@ mod write;
 
 pub use forces::ForceDistribution;
 pub use pressure::PressureMap;
-pub use result::{ContactEstimate, DotTraction, HeightSample, LocalForces, TractionStatus};
+pub use result::{ContactEstimate, DotTraction, LocalForces, TractionStatus};
 pub use write::write_json_forces;

@@ -1,6 +1,6 @@
 //! The pressure at every pixel of a height map.
 
-use glam::{DVec3, Vec3A};
+use glam::DVec3;
 
 use super::forces::ForceDistribution;
 use crate::shape::ShapeMap;
@@ -21,7 +21,18 @@ pub struct PressureMap {
 /// What the skin's own shape may be off between nodes, as a part of the pressure.
 const SHAPE_PART: f64 = 0.2;
 
+/// Room for a frame's pressures, kept between frames.
+#[derive(Debug, Clone, Default)]
+pub(super) struct PressureRoom {
+    borne: Vec<Borne>,
+    /// By node: what the skin's own shape says of the pressure about it.
+    touched: Vec<f64>,
+    /// By cell: pressure and its deviation.
+    values: [Vec<f32>; 2],
+}
+
 /// A cell of the height map, with the nodes that bear on it and their shares.
+#[derive(Debug, Clone, Copy)]
 struct Borne {
     cell: usize,
     area_mm2: f64,
@@ -49,10 +60,12 @@ impl ForceDistribution {
             let sd = self.posterior.sd_of(std::iter::once((node, 1.0))).unwrap_or(alone);
             self.node_sd_n_mm2[node] = if self.set.allowed[node] { sd } else { 0.0 };
         }
-        let points = map.cell_points();
-        let borne = self.borne(map, &points);
-        let (mut touched, mut own_sum) = (vec![0.0; count], 0.0);
-        for one in &borne {
+        let mut room = std::mem::take(&mut self.room);
+        self.find_borne(map, &mut room.borne);
+        room.touched.clear();
+        room.touched.resize(count, 0.0);
+        let (borne, touched, mut own_sum) = (&room.borne, &mut room.touched, 0.0);
+        for one in borne {
             own_sum += one.own * one.area_mm2;
             one.nodes.iter().for_each(|(node, hat)| touched[*node] += hat * one.own);
         }
@@ -60,25 +73,30 @@ impl ForceDistribution {
         let pooled_n: f64 =
             pooled.map(|node| self.set.tractions[node] * self.model.nodes[node].area_mm2).sum();
         let scale = if own_sum > 0.0 { pooled_n / own_sum } else { 0.0 };
-        let mut values = [vec![f32::NAN; points.len()], vec![f32::NAN; points.len()]];
-        for one in &borne {
+        for list in &mut room.values {
+            list.clear();
+            list.resize(map.cell_count(), f32::NAN);
+        }
+        for one in borne {
             let (mut pressure, mut sd) = (one.own * scale, 0.0);
             for (node, hat) in one.nodes {
                 let hat = hat / self.stretch[node];
                 pressure += if touched[node] > 0.0 { 0.0 } else { hat * self.set.tractions[node] };
                 sd += hat * self.node_sd_n_mm2[node];
             }
-            values[0][one.cell] = pressure as f32;
-            values[1][one.cell] = sd.hypot(SHAPE_PART * pressure) as f32;
+            room.values[0][one.cell] = pressure as f32;
+            room.values[1][one.cell] = sd.hypot(SHAPE_PART * pressure) as f32;
         }
-        map.draw_cells(&values[0], &mut out.pressure_n_mm2);
-        map.draw_cells(&values[1], &mut out.pressure_sd_n_mm2);
+        map.draw_cells(&room.values[0], &mut out.pressure_n_mm2);
+        map.draw_cells(&room.values[1], &mut out.pressure_sd_n_mm2);
+        self.room = room;
     }
 
-    /// The cells that show the skin, with the nodes that bear on them.
-    fn borne(&self, map: &ShapeMap, points: &[Vec3A]) -> Vec<Borne> {
+    /// Finds the cells that show the skin, with the nodes that bear on them.
+    fn find_borne(&self, map: &ShapeMap, found: &mut Vec<Borne>) {
         let dome = *self.optics.dome();
-        let shown = points.iter().enumerate().filter(|(_, point)| point.is_finite());
+        let points = (0..map.cell_count()).map(|cell| (cell, map.cell_point(cell)));
+        let shown = points.filter(|(_, point)| point.is_finite());
         let borne = shown.map(|(cell, point)| {
             let at_mm = dome.nearest_mm(point.as_dvec3());
             let is_loaded = self.model.about(at_mm).any(|(node, _)| self.set.tractions[node] > 0.0);
@@ -87,9 +105,10 @@ impl ForceDistribution {
             let own_mm = if is_loaded { at_mm - moved.sum::<DVec3>() } else { at_mm };
             let mut nodes = [(0, 0.0); 4];
             nodes.iter_mut().zip(self.model.about(own_mm)).for_each(|(to, from)| *to = from);
-            let area_mm2 = map.cell_area_mm2(cell, points);
+            let area_mm2 = map.cell_area_mm2(cell);
             Borne { cell, area_mm2, nodes, own: f64::from(map.own_pressure(cell)) }
         });
-        borne.collect()
+        found.clear();
+        found.extend(borne);
     }
 }

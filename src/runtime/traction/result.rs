@@ -2,14 +2,6 @@
 
 use glam::DVec3;
 
-use crate::shape::ShapeMap;
-
-/// Where heights of the skin come from.
-pub(super) enum Heights<'a> {
-    Samples(&'a [HeightSample]),
-    Map(&'a ShapeMap),
-}
-
 /// How the search for the forces on the skin ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TractionStatus {
@@ -80,15 +72,4 @@ pub struct LocalForces {
     pub rms_px: f64,
     /// How much softer than the constants say the dome shows itself where springs say the force; 1 on a rigid mount.
     pub compliance_factor: f64,
-}
-
-/// How far a place of the skin has moved, measured by other means (shape from colour).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeightSample {
-    /// The place on the undeformed dome, sensor frame, mm.
-    pub surface_mm: DVec3,
-    /// Its motion along the outward normal there, mm: inwards is negative.
-    pub height_mm: f64,
-    /// The standard deviation of that, mm.
-    pub sd_mm: f64,
 }

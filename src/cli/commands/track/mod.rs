@@ -82,7 +82,7 @@ fn forces_of(
 fn press(forces: &mut ForceDistribution, tracked: &Tracked, skin: Option<&ShapeMap>) {
     match skin {
         Some(skin) => forces.update_with_shape(tracked, skin),
-        None => forces.update(tracked, &[]),
+        None => forces.update(tracked),
     };
 }
 

@@ -10,6 +10,7 @@ use crate::{assert_none, crates, members, short, text, workspace};
 /// The crates from the ground up; each may depend on those named beside it and on no others of ours.
 const CRATES: [(&str, &[&str]); 15] = [
     ("files", &[]),
+    ("hardness", &[]),
     ("optics", &[]),
     ("mesh", &[]),
     ("light", &["optics"]),

@@ -95,7 +95,7 @@ CALLS = {
     "Tracker.skip": (lambda a: TRACKER.skip(time=a[0], number=a[1]), some.tuples(words, words)),
     "Tracker": (lambda a: domecast.Tracker(SENSOR, channel=a[0], reference=a[1], search_every=a[2], max_residual_px=a[3], camera_turned_deg=a[4]),
                 some.tuples(words, anything, some.one_of(some.just(30), words), some.one_of(some.just(2.0), numbers), words)),
-    "Shape": (lambda a: domecast.Shape(SENSOR, TRACKER, noise_levels=a[0], cell_px=a[1], max_passes=a[2]), some.tuples(numbers, numbers, numbers)),
+    "Shape": (lambda a: domecast.Shape(SENSOR, TRACKER, cell_px=a[0], max_passes=a[1]), some.tuples(numbers, numbers)),
     "Shape.set_rest": (lambda a: SHAPE.set_rest(a[0], rgb=a[1]), some.tuples(frames, words)),
     "Shape.update": (lambda a: SHAPE.update(a[0], a[1], rgb=True), some.tuples(frames, some.one_of(some.just(READING), anything))),
     "Traction.update": (lambda a: TRACTION.update(a[0], shape=a[1]), some.tuples(some.one_of(some.just(READING), anything), words)),

@@ -20,16 +20,15 @@ pub(crate) struct PyShape {
 #[pymethods]
 impl PyShape {
     #[new]
-    #[pyo3(signature = (sensor, tracker, *, noise_levels = 2.0, cell_px = 2, max_passes = 3))]
+    #[pyo3(signature = (sensor, tracker, *, cell_px = 2, max_passes = 2))]
     fn new(
         py: Python<'_>,
         sensor: &PySensor,
         tracker: &PyTracker,
-        noise_levels: f64,
         cell_px: usize,
         max_passes: usize,
     ) -> PyResult<Self> {
-        let options = ShapeOptions { noise_levels, cell_px, max_passes };
+        let options = ShapeOptions { cell_px, max_passes };
         let (constants, at_rest) = (sensor.constants(), tracker.fresh());
         let made = py.detach(|| ShapeFromColor::new(&constants, &at_rest, options)).map_err(Fault::from)?;
         Ok(Self { shape: made, at_rest })

@@ -47,7 +47,7 @@ impl PyTraction {
         let forces = py.detach(|| {
             let found = match shape {
                 Some(map) => self.forces.update_with_shape(tracked, map.map()),
-                None => self.forces.update(tracked, &[]),
+                None => self.forces.update(tracked),
             };
             found.clone()
         });

@@ -199,7 +199,7 @@ class Shape:
     """Reads the skin's shape from the colours of frames, against one of the untouched sensor. One thread at a time."""
 
     def __new__(
-        cls, sensor: Sensor, tracker: Tracker, *, noise_levels: float = 2.0, cell_px: int = 2, max_passes: int = 3
+        cls, sensor: Sensor, tracker: Tracker, *, cell_px: int = 2, max_passes: int = 2
     ) -> Shape: ...
     def set_rest(self, frame: Bytes, *, rgb: bool) -> None:
         """Takes a frame of the untouched sensor. One whose colours fit only when two are swapped is refused."""

@@ -22,10 +22,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.records import Chunk, Message
-from mcap.stream_reader import StreamReader
+from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 REPOSITORY = Path(__file__).resolve().parent.parent
@@ -57,7 +58,7 @@ def messages_of(path):
             expect(schema.encoding == "ros2msg", f"{schema.name}: encoding {schema.encoding}")
             for name, definition in get_types_from_msg(schema.data.decode(), schema.name).items():
                 ours = [(field, kind) for field, kind in definition[1]]
-                theirs = [(field, kind) for field, kind in STORE.FIELDDEFS[name][1]]
+                theirs = [(field, kind) for field, kind in STORE.fielddefs[name][1]]
                 expect(ours == theirs, f"{name}: the file defines {ours}, rosbags {theirs}")
         last = 0
         for schema, channel, message in reader.iter_messages(log_time_order=False):
@@ -152,13 +153,8 @@ def whole_chunks(data):
         kind, length = data[at], struct.unpack_from("<Q", data, at + 1)[0]
         at += 9 + length
         if kind == 0x06:
-            chunk = Chunk.read(__import__("mcap.data_stream", fromlist=["ReadDataStream"]).ReadDataStream(
-                io.BytesIO(data[at - length:at])))
-            inner = StreamReader(io.BytesIO(chunk.data), skip_magic=True)
-            try:
-                count += sum(isinstance(record, Message) for record in inner.records)
-            except McapError:
-                pass  # a chunk has no end of a file
+            chunk = Chunk.read(ReadDataStream(io.BytesIO(data[at - length:at])))
+            count += sum(isinstance(record, Message) for record in breakup_chunk(chunk))
             ends.append((at, count))
         if kind == 0x0F:
             break

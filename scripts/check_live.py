@@ -87,7 +87,7 @@ class Live:
 
 
 def file_of(number, files):
-    """The player goes to and fro."""
+    """The player goes back and forth."""
     last = len(files) - 1
     at = number % (2 * last)
     return files[min(at, 2 * last - at)]

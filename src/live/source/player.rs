@@ -88,7 +88,7 @@ impl Player {
         Ok((bytes, decoded))
     }
 
-    /// The file of a frame: to and fro, so that nothing jumps.
+    /// The file of a frame: back and forth, so that nothing jumps.
     fn index(&self, number: u64) -> usize {
         let last = self.files.len() as u64 - 1;
         if last == 0 {

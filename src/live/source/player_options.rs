@@ -7,7 +7,7 @@ use std::path::PathBuf;
 pub struct PlayerOptions {
     /// Frames a second.
     pub rate_hz: f64,
-    /// How many frames are played, to and fro through the folder; `None`: once through it.
+    /// How many frames are played, back and forth through the folder; `None`: once through it.
     pub frames: Option<u64>,
     /// Share of frames that never come.
     pub drop: f64,

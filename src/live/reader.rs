@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::source::{ArrivedFrame, FrameSource, SourceInfo};
+use crate::source::{ArrivedFrame, LiveSource, SourceInfo};
 
 /// Between two tries to open a device that is gone: five in the second that it may take to be back.
 const RETRY: Duration = Duration::from_millis(200);
@@ -74,7 +74,7 @@ impl LiveReader {
     ///
     /// # Errors
     /// The system has no thread.
-    pub fn start(mut source: Box<dyn FrameSource>, max_frames: usize) -> std::io::Result<Self> {
+    pub fn start(mut source: Box<dyn LiveSource>, max_frames: usize) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let of_thread = Arc::clone(&shared);
         thread::Builder::new().name("frames".into()).spawn(move || {
@@ -118,7 +118,7 @@ impl Drop for LiveReader {
     }
 }
 
-fn read(source: &mut dyn FrameSource, shared: &Shared, max_frames: usize) {
+fn read(source: &mut dyn LiveSource, shared: &Shared, max_frames: usize) {
     while !shared.is_stopped.load(Ordering::Relaxed) {
         match source.next_frame() {
             Ok(Some(frame)) => shared.push(LiveEvent::Frame(frame, 0), max_frames),
@@ -152,7 +152,7 @@ mod tests {
         info: SourceInfo,
     }
 
-    impl FrameSource for Burst {
+    impl LiveSource for Burst {
         fn info(&self) -> &SourceInfo {
             &self.info
         }

@@ -19,55 +19,21 @@ mod latest;
 mod painter;
 mod request;
 mod server;
+mod shared;
 
-use std::collections::VecDeque;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
 use std::thread;
 
-use crate::decode::Picture;
 use domecast_optics::numeric::Rigid;
 use domecast_runtime::shape::ShapeFromColor;
-use domecast_runtime::track::Tracked;
-use latest::Latest;
 use painter::paint;
 use server::serve;
+use shared::{MAX_SAMPLES, Shared};
 
-/// Wrenches at most between two pictures: 10 s at 60 Hz.
-const MAX_SAMPLES: usize = 600;
-
-/// A reading as the page shows it.
-#[derive(Debug, Clone)]
-pub struct LiveReading {
-    /// The frame; `None` where it could not be read.
-    pub picture: Option<Arc<Picture>>,
-    /// What is tracked in it.
-    pub tracked: Tracked,
-    /// How old the reading was, ms.
-    pub age_ms: f64,
-    /// Frames a second, lately.
-    pub rate_hz: f64,
-    /// Frames that were pushed out of the queue so far.
-    pub dropped: u64,
-    /// What the device is: `ok`, `unplugged`, or what is wrong with all frames.
-    pub device: &'static str,
-}
-
-/// A wrench with its time, s.
-type Sample = (f64, Option<[f64; 6]>);
-
-/// What the program, the painter and the browsers' threads share.
-#[derive(Default)]
-struct Shared {
-    reading: Latest<LiveReading>,
-    samples: Mutex<VecDeque<Sample>>,
-    /// The newest picture, as the text of an event.
-    event: Latest<Arc<str>>,
-    browsers: AtomicUsize,
-    is_stopped: AtomicBool,
-}
+pub use shared::LiveReading;
 
 /// The page and its server.
 pub struct LivePage {

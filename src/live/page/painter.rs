@@ -10,7 +10,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::{LiveReading, Sample, Shared};
+use super::shared::{LiveReading, Sample, Shared};
 use crate::decode::Picture;
 use domecast_optics::numeric::Rigid;
 use domecast_runtime::overlay::{depth_range_mm, viridis};

@@ -7,8 +7,8 @@ use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::Duration;
 
-use super::Shared;
 use super::request::{MAX_HEAD_BYTES, Refusal, Route, route};
+use super::shared::Shared;
 
 /// Connections at one time.
 const MAX_CONNECTIONS: usize = 16;

@@ -1,4 +1,4 @@
-//! Where live frames come from: a camera, a player of recorded frames, a stream. All stand behind [`FrameSource`].
+//! Where live frames come from: a camera, a player of recorded frames, a stream. All stand behind [`LiveSource`].
 //!
 //! ```
 //! use domecast_live::source::PlayerOptions;
@@ -110,14 +110,14 @@ impl fmt::Display for SourceLost {
 impl std::error::Error for SourceLost {}
 
 /// Something that gives frames as they come.
-pub trait FrameSource: Send {
+pub trait LiveSource: Send {
     /// What it is.
     fn info(&self) -> &SourceInfo;
 
     /// Waits for the next frame; `None` at the end of a source that has one.
     ///
     /// # Errors
-    /// [`SourceLost`]: the device is gone; [`FrameSource::reopen`] may bring it back.
+    /// [`SourceLost`]: the device is gone; [`LiveSource::reopen`] may bring it back.
     fn next_frame(&mut self) -> Result<Option<ArrivedFrame>, SourceLost>;
 
     /// Tries once to open it again, with the same settings.

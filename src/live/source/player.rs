@@ -6,7 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::player_options::PlayerOptions;
-use super::{ArrivedFrame, FrameData, FrameSource, SourceInfo, SourceLost};
+use super::{ArrivedFrame, FrameData, LiveSource, SourceInfo, SourceLost};
 use crate::decode::{Picture, PictureFormat, picture};
 use crate::frame_files::{numbered, pictures_in, read_whole};
 use domecast_optics::numeric::SeededRandom;
@@ -137,7 +137,7 @@ fn sleep_until(due: Instant) {
     }
 }
 
-impl FrameSource for Player {
+impl LiveSource for Player {
     fn info(&self) -> &SourceInfo {
         &self.info
     }

@@ -4,7 +4,7 @@ use std::io::Read;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{ArrivedFrame, FrameData, FrameSource, SourceInfo, SourceLost};
+use super::{ArrivedFrame, FrameData, LiveSource, SourceInfo, SourceLost};
 use crate::decode::pnm;
 
 /// PGM or PPM pictures one after the other, each complete when its last byte is read.
@@ -23,7 +23,7 @@ impl<R: Read + Send> PictureStream<R> {
     }
 }
 
-impl<R: Read + Send> FrameSource for PictureStream<R> {
+impl<R: Read + Send> LiveSource for PictureStream<R> {
     fn info(&self) -> &SourceInfo {
         &self.info
     }

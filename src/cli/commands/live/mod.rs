@@ -16,7 +16,7 @@ use domecast_files::StopWish;
 use domecast_live::decode::picture;
 use domecast_live::frame_files::read_whole;
 use domecast_live::page::LivePage;
-use domecast_live::source::{CameraRequest, FrameSource, PictureStream, Player, PlayerOptions, open_camera};
+use domecast_live::source::{CameraRequest, LiveSource, PictureStream, Player, PlayerOptions, open_camera};
 use domecast_live::{LiveEvent, LiveReader};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeFromColor, ShapeOptions};
@@ -34,7 +34,7 @@ const STALLED: Duration = Duration::from_secs(1);
 
 const DEVICES: &str = "a camera such as /dev/video0, - for PPM pictures, or player:FOLDER";
 
-fn open_source(arguments: &LiveArguments, constants: &Constants) -> Result<Box<dyn FrameSource>, Failure> {
+fn open_source(arguments: &LiveArguments, constants: &Constants) -> Result<Box<dyn LiveSource>, Failure> {
     let device = arguments.device.as_str();
     let fault = |problem: String| input_fault(Path::new(device), problem, DEVICES);
     if device == "-" {
@@ -52,7 +52,7 @@ fn open_source(arguments: &LiveArguments, constants: &Constants) -> Result<Box<d
 
 /// Frames of another size say nothing, and never will.
 fn check_size(
-    source: &dyn FrameSource,
+    source: &dyn LiveSource,
     arguments: &LiveArguments,
     constants: &Constants,
 ) -> Result<(), Failure> {

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::arguments::LiveArguments;
 use super::health::Health;
-use super::terminal::{Around, TerminalView};
+use super::terminal::{TerminalView, ViewedReading};
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
 use crate::commands::recording::{Recording, recorded};
@@ -221,7 +221,7 @@ impl<'a> Session<'a> {
         }
         let Some(view) = &mut self.view else { return Ok(()) };
         let quantile = |share| self.ages.quantile_ms(share).unwrap_or(0.0);
-        let around = Around {
+        let around = ViewedReading {
             head: &self.head,
             device,
             rate_hz,

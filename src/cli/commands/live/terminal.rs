@@ -9,8 +9,8 @@ use domecast_runtime::track::{MarkState, Tracked};
 /// From view to view: what can be read.
 const STEP: Duration = Duration::from_millis(100);
 
-/// What stands beside a reading.
-pub struct Around<'a> {
+/// What the view shows beside what is tracked.
+pub struct ViewedReading<'a> {
     /// Device, size, format, controls, page, recording.
     pub head: &'a str,
     /// The device's status, or what is wrong with all frames.
@@ -31,7 +31,7 @@ pub struct TerminalView {
 
 impl TerminalView {
     /// Shows a reading, if the last view has stood long enough.
-    pub fn show(&mut self, tracked: &Tracked, around: &Around<'_>) -> io::Result<()> {
+    pub fn show(&mut self, tracked: &Tracked, around: &ViewedReading<'_>) -> io::Result<()> {
         if self.last.is_some_and(|last| last.elapsed() < STEP) {
             return Ok(());
         }
@@ -66,12 +66,12 @@ fn six(values: Option<[f64; 6]>, sds: Option<[f64; 6]>, from: usize, places: usi
     text.trim_end().to_owned()
 }
 
-fn view(tracked: &Tracked, around: &Around<'_>) -> String {
+fn view(tracked: &Tracked, around: &ViewedReading<'_>) -> String {
     let problems: Vec<&str> = tracked.problems.iter().map(|problem| problem.as_str()).collect();
     let status = if problems.is_empty() { "ok".to_owned() } else { problems.join(", ") };
     let (wrench, sd) = (tracked.wrench.map(|w| w.to_array()), tracked.wrench_sd.map(|w| w.to_array()));
     let markers = tracked.white_markers.iter().filter(|m| m.state == MarkState::Ok).count();
-    let Around { head, device, rate_hz, age_ms, age_p50_ms, age_p99_ms, dropped } = around;
+    let ViewedReading { head, device, rate_hz, age_ms, age_p50_ms, age_p99_ms, dropped } = around;
     format!(
         "{head}\n\
          device  {device}\n\

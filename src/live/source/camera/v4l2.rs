@@ -9,9 +9,9 @@ use linuxvideo::format::{FrameSizes, PixFormat, PixelFormat};
 use linuxvideo::stream::ReadStream;
 use linuxvideo::{BufType, CapabilityFlags, Device, Fract};
 
-use super::CameraRequest;
+use super::request::CameraRequest;
 use crate::source::controls::{CameraControls, ControlId, ControlRange, lock_controls};
-use crate::source::{ArrivedFrame, FrameData, FrameSource, SourceInfo, SourceLost};
+use crate::source::{ArrivedFrame, FrameData, LiveSource, SourceInfo, SourceLost};
 
 /// A rate that is this much of the wanted one is it.
 const ENOUGH_RATE: f64 = 0.9;
@@ -194,7 +194,7 @@ impl CameraControls for Controls {
     }
 }
 
-impl FrameSource for V4l2Camera {
+impl LiveSource for V4l2Camera {
     fn info(&self) -> &SourceInfo {
         &self.info
     }

@@ -127,10 +127,15 @@ fn check(spec: &DatasetSpec) -> Result<(), DesignError> {
     }
     let frames = &spec.frames;
     range("frames.duration_s", frames.duration_s, 1e-3, 1e4)?;
-    let [fewest, most] = frames.before_contact;
-    if fewest < 1 || fewest > most || most + 1 >= frames.count {
-        let allowed = "[fewest, most] from 1, with two frames left for the contact";
-        return Err(fault("frames.before_contact", json!([fewest, most]), "no such numbers", allowed));
+    let [min_count, max_count] = frames.before_contact;
+    if min_count < 1 || min_count > max_count || max_count + 1 >= frames.count {
+        let allowed = "[min, max] from 1, with two frames left for the contact";
+        return Err(fault(
+            "frames.before_contact",
+            json!([min_count, max_count]),
+            "no such numbers",
+            allowed,
+        ));
     }
     match (&spec.hardness.classes, spec.hardness.young_mpa) {
         (Some([one, other]), None) => {

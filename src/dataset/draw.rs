@@ -149,8 +149,8 @@ impl Dataset {
         let turn = DQuat::from_scaled_axis(DVec3::from_array(family.turn_deg.map(f64::to_radians)));
         let rotation = tilt * spin * DQuat::from_rotation_arc(DVec3::Z, normal) * turn;
         let dome = self.design.optics().dome();
-        let [fewest, most] = spec.frames.before_contact;
-        let before_contact = fewest + (random.uniform() * f64::from(most - fewest + 1)) as u32;
+        let [min_count, max_count] = spec.frames.before_contact;
+        let before_contact = min_count + (random.uniform() * f64::from(max_count - min_count + 1)) as u32;
         PairDraw {
             pair,
             sensor,
@@ -166,7 +166,7 @@ impl Dataset {
             friction: even(random, spec.friction),
             peak_force_n: self.peak_force(split, random),
             ramp: [even(random, press.ramp_exponent), even(random, press.hold_part)],
-            before_contact: before_contact.min(most),
+            before_contact: before_contact.min(max_count),
             duration_s: log_even(random, spec.frames.duration_s),
             approach_mm_s: even(random, press.approach_mm_s),
             power: even(random, spec.light.power),

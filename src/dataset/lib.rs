@@ -18,6 +18,7 @@ mod readings;
 mod record;
 mod scene;
 mod sensor;
+mod sensor_draw;
 pub mod spec;
 mod splits;
 mod tar;

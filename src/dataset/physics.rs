@@ -100,7 +100,7 @@ pub struct Hardness {
 }
 
 /// A row of readings in the order of [`COLUMNS`].
-pub type Row = [f64; COLUMNS.len()];
+pub type ReadingRow = [f64; COLUMNS.len()];
 
 /// A frame in contact.
 struct Pressed {
@@ -110,7 +110,7 @@ struct Pressed {
 }
 
 /// Hardness of what is pressed on in the frames of a video.
-pub fn hardness(rows: &[Row], dome: &Dome, prior: &Prior) -> Hardness {
+pub fn hardness(rows: &[ReadingRow], dome: &Dome, prior: &Prior) -> Hardness {
     let places = log_places(prior);
     let pressed: Vec<Pressed> = rows.iter().filter_map(|row| pressed(row, dome)).collect();
     let Some((yields, sd)) = yields(&pressed, dome, prior.travel_sd_mm) else {
@@ -163,7 +163,7 @@ fn weighed(places: &[f64], weights: &[f64]) -> Hardness {
 }
 
 /// Force, approach and contact's radius of a frame; `None` where nothing touches or a number is missing.
-fn pressed(row: &Row, dome: &Dome) -> Option<Pressed> {
+fn pressed(row: &ReadingRow, dome: &Dome) -> Option<Pressed> {
     let vector = |at: usize| DVec3::new(row[at], row[at + 1], row[at + 2]);
     let (force, moment, shift, turn) = (vector(1), vector(4), vector(7), vector(10));
     let (travel_mm, radius_mm) = (row[13], row[17]);
@@ -236,7 +236,7 @@ mod tests {
     const PRIOR: Prior = Prior { young_mpa: [0.01, 10.0], poisson: 0.47, travel_sd_mm: 0.005 };
 
     /// A ball by Hertz, pressed on the pole of a dome on springs of 8.4 N/mm.
-    fn ball(young_mpa: f64, radius_mm: f64) -> Vec<Row> {
+    fn ball(young_mpa: f64, radius_mm: f64) -> Vec<ReadingRow> {
         let yields = (1.0 - 0.49_f64.powi(2)) / 0.56 + (1.0 - 0.47_f64.powi(2)) / young_mpa;
         let modulus = 1.0 / yields;
         let curved = 1.0 / (1.0 / radius_mm + 0.1);

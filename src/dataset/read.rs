@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::index::{FORMAT, INDEX_NAME};
-use crate::physics::{Dome, Row};
+use crate::physics::{Dome, ReadingRow};
 use crate::readings::COLUMNS;
 use domecast_design::DesignError;
 
@@ -26,7 +26,7 @@ pub struct StoredVideo {
     /// Its label.
     pub label: Value,
     /// Its readings.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ReadingRow>,
 }
 
 fn fault(path: &Path, field: &str, problem: impl Into<String>, allowed: &str) -> DesignError {
@@ -86,7 +86,7 @@ impl StoredSet {
         for path in &self.files {
             let bytes = std::fs::read(path)
                 .map_err(|error| fault(path, "", format!("cannot be read ({error})"), "a readable file"))?;
-            let mut rows: Option<(String, Vec<Row>)> = None;
+            let mut rows: Option<(String, Vec<ReadingRow>)> = None;
             for (name, content) in
                 entries(&bytes).map_err(|problem| fault(path, "", problem, "a whole shard"))?
             {
@@ -132,7 +132,7 @@ fn entries(bytes: &[u8]) -> Result<Vec<(&str, &[u8])>, String> {
 }
 
 /// Rows of a float32 array of NumPy's form 1.0.
-fn readings(bytes: &[u8]) -> Result<Vec<Row>, String> {
+fn readings(bytes: &[u8]) -> Result<Vec<ReadingRow>, String> {
     let length = bytes.get(8..10).ok_or("no header")?;
     let begin = 10 + usize::from(u16::from_le_bytes([length[0], length[1]]));
     let header =

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::check::Dataset;
 use crate::draw::PairDraw;
-use crate::sensor::SensorDraw;
+use crate::sensor_draw::SensorDraw;
 use domecast_sim::scene::SceneFile;
 use domecast_sim::scene::electronics::{ElectronicsSection, FocusSection, NoiseSection};
 use domecast_sim::scene::file::{

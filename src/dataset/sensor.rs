@@ -3,12 +3,12 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::check::Dataset;
+use crate::sensor_draw::SensorDraw;
 use domecast_contact::{Contact, Level};
 use domecast_design::sections::{DesignFile, IndexRgb, IndexValue};
 use domecast_design::{Design, DesignError};
 use domecast_optics::numeric::SeededRandom;
 use domecast_sim::scene::SceneFile;
-use domecast_sim::scene::slow_gel::SlowGelTerm;
 use domecast_sim::{Plan, Scene, SimError, elastomer_of};
 
 /// Streams of the sensors' random numbers.
@@ -40,23 +40,6 @@ pub struct FullSensor {
     pub scene: Scene,
     /// As [`BuiltSensor::plan`].
     pub plan: Plan,
-}
-
-/// What is drawn for a sensor and is no field of its design.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SensorDraw {
-    /// Its number.
-    pub sensor: u32,
-    /// Brightness of each light.
-    pub each: Vec<f64>,
-    /// Distance at which the lens is sharp, mm.
-    pub focus_mm: f64,
-    /// What a channel takes of the neighbouring colour.
-    pub crosstalk: f64,
-    /// How the springs' calibration is off, a factor of the wrench.
-    pub spring_gain: f64,
-    /// Terms of a gel that yields slowly; none of an elastic one.
-    pub gel: Vec<SlowGelTerm>,
 }
 
 /// Normal numbers that end at [`MAX_SD`].

@@ -8,9 +8,8 @@ use crate::tokens::tokens;
 use crate::{assert_none, crates, members, short, text, workspace};
 
 /// The crates from the ground up; each may depend on those named beside it and on no others of ours.
-const CRATES: [(&str, &[&str]); 16] = [
+const CRATES: [(&str, &[&str]); 15] = [
     ("files", &[]),
-    ("hardness", &[]),
     ("optics", &[]),
     ("mesh", &[]),
     ("light", &["optics"]),

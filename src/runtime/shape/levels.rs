@@ -81,14 +81,14 @@ pub(super) fn noise(
             }
         }
         let middle = found.len() / 2;
-        let least = MIN_NOISE / 255.0;
-        *sd = least;
+        let min_sd = MIN_NOISE / 255.0;
+        *sd = min_sd;
         if middle > 0 {
-            let most = EDGE * *found.select_nth_unstable_by(middle, f32::total_cmp).1 + least;
+            let max_step = EDGE * *found.select_nth_unstable_by(middle, f32::total_cmp).1 + min_sd;
             let (sum, count) =
-                found.iter().filter(|v| **v <= most).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+                found.iter().filter(|v| **v <= max_step).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
             // The mean of a normal number's size is sqrt(2 / pi) of its deviation.
-            *sd = (sum / count * (0.5 * std::f32::consts::PI).sqrt()).max(least);
+            *sd = (sum / count * (0.5 * std::f32::consts::PI).sqrt()).max(min_sd);
         }
     }
     Vec3A::from_array(sds)

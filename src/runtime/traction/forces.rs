@@ -5,7 +5,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use super::active_set::{ActiveSet, Ended, Rows};
 use super::model::{AXES, ElasticModel};
 use super::posterior::{Posterior, USUAL_DOT_SD_PX};
-use super::pressure::PressureRoom;
+use super::pressure_room::PressureRoom;
 use super::result::{DotTraction, LocalForces, TractionStatus};
 use crate::constants::Constants;
 use crate::shape::ShapeMap;

@@ -37,6 +37,7 @@ mod heights;
 mod model;
 mod posterior;
 mod pressure;
+mod pressure_room;
 mod result;
 mod write;
 

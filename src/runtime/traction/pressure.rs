@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::forces::ForceDistribution;
+use super::pressure_room::Borne;
 use crate::shape::ShapeMap;
 
 /// Pressure on the skin over the raw image, row by row; NaN where a height map has nothing, or nothing is known of the forces.
@@ -20,26 +21,6 @@ pub struct PressureMap {
 
 /// What the skin's own shape may be off between nodes, as a part of the pressure.
 const SHAPE_PART: f64 = 0.2;
-
-/// Room for a frame's pressures, kept between frames.
-#[derive(Debug, Clone, Default)]
-pub(super) struct PressureRoom {
-    borne: Vec<Borne>,
-    /// By node: what the skin's own shape says of the pressure about it.
-    touched: Vec<f64>,
-    /// By cell: pressure and its deviation.
-    values: [Vec<f32>; 2],
-}
-
-/// A cell of the height map, with the nodes that bear on it and their shares.
-#[derive(Debug, Clone, Copy)]
-struct Borne {
-    cell: usize,
-    area_mm2: f64,
-    nodes: [(usize, f64); 4],
-    /// What the skin's own shape says of the pressure, of no unit.
-    own: f64,
-}
 
 impl ForceDistribution {
     /// Draws the last frame's pressures onto the grid of its height map. Where the skin is seen to be touched, the forces of the

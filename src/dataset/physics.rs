@@ -260,7 +260,12 @@ mod tests {
                 let found = hardness(&ball(young_mpa, radius_mm), &DOME, &PRIOR);
                 let [low, high] = found.interval;
                 assert!((low..=high).contains(&young_mpa.log10()), "{young_mpa} {radius_mm}: {found:?}");
-                assert!((found.log10_young - young_mpa.log10()).abs() < 0.12, "{young_mpa}: {found:?}");
+                // what is saturated promises its interval alone
+                if found.status != HardnessStatus::Saturated {
+                    assert!((found.log10_young - young_mpa.log10()).abs() < 0.12, "{young_mpa}: {found:?}");
+                } else {
+                    assert!(young_mpa > DOME.young_mpa, "{young_mpa}: {found:?}");
+                }
             }
         }
     }

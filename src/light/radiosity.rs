@@ -53,6 +53,26 @@ impl Rings {
         self.face.place(azimuth, z)
     }
 
+    /// The four patches about a place and their weights: linear between rings and patches, level beyond the first and last
+    /// ring.
+    pub fn around(&self, place: DVec3) -> [(usize, f64); 4] {
+        let Self { rings, patches, face } = *self;
+        let share = (place.z - face.rim) / (1.0 - face.rim);
+        let ring = (share * rings as f64 - 0.5).clamp(0.0, rings as f64 - 1.0);
+        let turn = place.y.atan2(place.x) / std::f64::consts::TAU;
+        let patch = (turn * patches as f64 - 0.5).rem_euclid(patches as f64);
+        let low = (ring as usize).min(rings.saturating_sub(2));
+        let (up, along) = (ring - low as f64, patch - patch.floor());
+        let at = |ring: usize, patch: usize| ring * patches + patch % patches;
+        let first = (patch as usize) % patches;
+        [
+            (at(low, first), (1.0 - up) * (1.0 - along)),
+            (at(low, first + 1), (1.0 - up) * along),
+            (at(low + 1, first), up * (1.0 - along)),
+            (at(low + 1, first + 1), up * along),
+        ]
+    }
+
     /// How many patches in all; patch `p` of ring `r` is number `r * patches + p`.
     pub fn count(&self) -> usize {
         self.rings * self.patches

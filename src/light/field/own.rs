@@ -41,19 +41,7 @@ impl OwnLight {
 
     /// Linear between rings and patches; level beyond the first and last ring.
     pub fn at(&self, direction: DVec3) -> [f64; 3] {
-        let Rings { rings, patches, face } = self.rings;
-        let share = (direction.z - face.rim) / (1.0 - face.rim);
-        let ring = (share * rings as f64 - 0.5).clamp(0.0, rings as f64 - 1.0);
-        let turn = direction.y.atan2(direction.x) / std::f64::consts::TAU;
-        let patch = (turn * patches as f64 - 0.5).rem_euclid(patches as f64);
-        let low = (ring as usize).min(rings - 2);
-        let (up, along) = (ring - low as f64, patch - patch.floor());
-        let first = (patch as usize) % patches;
-        let at = |ring: usize, patch: usize| self.indirect[ring * patches + patch % patches];
-        let corners = [at(low, first), at(low, first + 1), at(low + 1, first), at(low + 1, first + 1)];
-        std::array::from_fn(|c| {
-            let mix = |a: f64, b: f64, part: f64| a + (b - a) * part;
-            mix(mix(corners[0][c], corners[1][c], along), mix(corners[2][c], corners[3][c], along), up)
-        })
+        let around = self.rings.around(direction);
+        std::array::from_fn(|c| around.iter().map(|(patch, weight)| weight * self.indirect[*patch][c]).sum())
     }
 }

@@ -1,7 +1,7 @@
 //! `domecast track FRAMES --constants FILE`
 
 mod arguments;
-mod decode;
+pub(super) mod decode;
 mod pictures;
 mod results;
 mod shape;

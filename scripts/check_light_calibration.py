@@ -1,0 +1,244 @@
+"""Judges `calibrate-light` by sensors whose lights are off, drawn by `simulate`, photographed and measured here.
+
+    python3 scripts/check_light_calibration.py DOMECAST [--quick] [--keep FOLDER] [--only DESIGN] [--sensors N]
+
+Each sensor's fluxes are off by up to 20 %, places by 0.2 mm, axes by 2 degrees; tape, membrane, crosstalk and stray light differ
+too, all drawn with seeds. One scene has the frame at rest, presses of a ball, and held-out presses of other objects, each with a
+frame in between without touch. Noise (2 levels) and JPEG (quality 90, 4:2:2) are added with numpy and OpenCV. Three judgements:
+heights of held-out presses with the calibrated light are at most 1.5 times as far off as with the true one; the fitted numbers are
+off by what their deviations promise; and what cannot be calibrated is refused by name.
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import cv2
+import numpy as np
+
+import check_light_off as off
+import check_shape as judge
+
+check = judge.check
+AWAY_MM = 6.0
+
+
+def changes(design, seed):
+    """What differs of a sensor, drawn evenly within what the constants' tolerances take for one deviation."""
+    draw = np.random.default_rng([seed, len(design)])
+    part = lambda most: float(draw.uniform(-most, most))
+    angle = draw.uniform(0, 2 * np.pi)
+    size = 0.2 * np.sqrt(draw.uniform(0, 1))
+    return {"name": f"lit-{seed}", "flux": {c: 1 + part(0.2) for c in "rgb"}, "radius_mm": size * np.cos(angle), "z_mm": size * np.sin(angle),
+            "tilt_deg": part(2.0), "azimuth_deg": [part(1.0) for _ in range(8)], "lambert": part(0.15), "width": 1 + part(0.15),
+            "membrane": 1 + part(0.1), "crosstalk": 0.08 + part(0.02), "stray": 0.005 + part(0.003)}
+
+
+def place(polar_deg, azimuth_deg, distance_mm, dome):
+    polar, azimuth = np.radians([polar_deg, azimuth_deg])
+    way = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    return np.array([0, 0, dome["center_z"]]) + way * distance_mm
+
+
+def presses_of(dome):
+    """Presses of the ball: polar angle, azimuth, depth over a tenth of the dome's radius."""
+    steep = min(1.0, 0.8 * np.degrees(np.arccos(-dome["center_z"] / dome["radius"])) / 45)
+    ring = [(0, 0), (22, 0), (22, 120), (22, 240), (38, 60), (38, 180), (38, 300), (45, 20)]
+    return [(polar * steep, azimuth, 0.4) for polar, azimuth in ring]
+
+
+def scene(file, design, level, change, dome, radius, presses, held_out):
+    """One scene of all presses: even frames are untouched, the first is the one at rest."""
+    light = json.loads((judge.ROOT / "designs/scenes/lit.json").read_text())["light"]
+    light["leds"] |= {"level_per_mw_mm2": level, "crosstalk": change["crosstalk"], "stray_level": change["stray"]}
+    scale, paths, objects, frame = dome["radius"] / 10, [], [], 1
+    for polar, azimuth, depth in presses:
+        paths += [(frame - 1, place(polar, azimuth, dome["radius"] + radius + AWAY_MM, dome)),
+                  (frame, place(polar, azimuth, dome["radius"] + radius - depth * scale, dome))]
+        paths += [(frame + 0.5, place(polar, azimuth, dome["radius"] + radius + AWAY_MM, dome))]
+        frame += 2
+    ball = {"name": "ball", "shape": {"kind": "sphere", "radius_mm": radius},
+            "path": [{"time_s": t, "position_mm": p.tolist()} for t, p in paths]}
+    objects.append(ball)
+    for name, made in held_out.items():
+        touch = made["path"][0]
+        lifted = touch | {"position_mm": (np.array(touch["position_mm"]) + [0, 0, 2.5 * AWAY_MM]).tolist()}
+        made["path"] = [lifted | {"time_s": frame - 1}, touch | {"time_s": frame}, lifted | {"time_s": frame + 0.5}]
+        made["name"] = name
+        objects.append(made)
+        frame += 2
+    tree = {"version": 1, "name": file.stem, "design": str(design), "frames": {"count": frame, "rate_hz": 1},
+            "tolerance": {"px": 0.02, "grey": 0.5}, "light": light, "objects": objects,
+            "contact": {"level": "linear", "element_mm": 0.5 * scale}}
+    file.write_text(json.dumps(tree))
+
+
+def photographs(folder, picked, out, first_seed, make=lambda picture, k: picture):
+    """What a camera makes of some of a scene's frames; the first is the one at rest."""
+    out.mkdir(exist_ok=True)
+    for k, frame in enumerate(picked):
+        picture = cv2.imread(str(folder / f"frame_{frame:04}.png"), cv2.IMREAD_COLOR).astype(float)
+        cv2.imwrite(str(out / f"f{k:02}.png"), judge.photograph(make(picture, k), first_seed + k))
+    return out
+
+
+def errors(folder, frame, shape, dome):
+    for kind in ("surface", "normal", "pressure"):
+        link = shape / f"truth/frame_0000.{kind}.npy"
+        link.parent.mkdir(exist_ok=True)
+        link.write_bytes((folder / f"frame_{frame:04}.{kind}.npy").read_bytes())
+    return judge.errors(shape / "truth", shape, dome)
+
+
+def calibrate(domecast, frames, constants, out, radius, *words):
+    line = [domecast, "calibrate-light", frames, constants, "--ball-radius-mm", radius, "--out", out, "--json", "--force", *words]
+    return subprocess.run([str(w) for w in line], capture_output=True, text=True)
+
+
+def sds_off(true, fitted):
+    """By how many of its deviations each number of the light is off, by name."""
+    sd, found = fitted["sd"], {}
+    for i, (led, own, open_) in enumerate(zip(true["leds"], fitted["leds"], sd["leds"], strict=True)):
+        found[f"flux {i}"] = (own["flux"] - led["flux"]) / open_["flux"]
+        for k in range(3):
+            found[f"place {i}.{k}"] = (own["position_mm"][k] - led["position_mm"][k]) / open_["position_mm"][k]
+        outward = np.array([*own["position_mm"][:2], 0]) / np.linalg.norm(own["position_mm"][:2])
+        along = np.cross([0, 0, 1], outward)
+        turn = np.cross(led["axis"], own["axis"])
+        found[f"tilt {i}"] = turn @ along / open_["axis_rad"][0]
+        found[f"turn {i}"] = turn @ np.cross(led["axis"], along) / open_["axis_rad"][1]
+    tape, own, open_ = true["leds"][0]["lobe"].get("diffuser"), fitted["leds"][0]["lobe"].get("diffuser"), sd["leds"][0]["lobe"]
+    for key in ("lambert_fraction", "lobe_width_rad"):
+        found[key] = (own[key] - tape[key]) / open_[key]
+    for c in range(3):
+        found[f"reflectance {c}"] = (fitted["reflectance"][c] - true["reflectance"][c]) / sd["reflectance"][c]
+        for k in range(3):
+            if k != c:
+                found[f"crosstalk {c}{k}"] = (fitted["crosstalk"][c][k] - true["crosstalk"][c][k]) / sd["crosstalk"][c][k]
+    found["stray"] = (fitted["stray"] - true["stray"]) / sd["stray"]
+    return found
+
+
+def sensor(domecast, work, design, constants, seed):
+    """Draws one sensor, calibrates it, judges held-out presses; the numbers' errors, and what refusals need."""
+    change = changes(design, seed)
+    file = off.off_design(design, change, work)
+    true_file = off.true_constants(file, constants, work / f"{file.stem}-true.json")
+    true = json.loads(true_file.read_text())
+    true["light"]["crosstalk"] = [[1.0 if c == k else change["crosstalk"] for k in range(3)] for c in range(3)]
+    true["light"]["stray"] = change["stray"]
+    true_file.write_text(json.dumps(true))
+    level = 0.85 * json.loads((work / design / "report/light.json").read_text())["level_per_mw_mm2"]
+    dome = {"radius": true["optics"]["dome_radius_mm"], "center_z": true["optics"].get("dome_center_z_mm", 0.0)}
+    scale, presses = dome["radius"] / 10, presses_of(dome)
+    radius = 4 * scale
+    held_out = {"other ball": judge.ball(2.5 * scale, 30 * presses[-1][0] / 45, 215, 0.3 * scale, dome)[0], "edge": judge.edge(0.3 * scale, dome)[0],
+                "nut": judge.nut(0.3 * scale, dome)[0]}
+    folder = work / file.stem
+    if not (folder / "truth.jsonl").exists():
+        scene(folder.with_suffix(".scene.json"), file, level, change, dome, radius, presses, held_out)
+        judge.run(domecast, "simulate", folder.with_suffix(".scene.json"), "--out", folder, "--depth", "--quiet")
+    touched = [2 * k + 1 for k in range(len(presses))]
+    frames = photographs(folder, [0, *touched], work / f"{file.stem}-frames", 100 * seed)
+    label, measured = f"{design}, sensor {seed}", work / f"{file.stem}-measured.json"
+    done = calibrate(domecast, frames, constants, measured, radius)
+    check(f"{label}: calibrates", done.returncode == 0, done.stderr.strip()[-200:])
+    if done.returncode:
+        return {}, None
+    result = json.loads(done.stdout)
+    by_presses, sd = result["radius_by_presses_mm"]
+    sees = ", ".join(result["not_observed"])
+    print(f"     {result['rms_levels'][0]:.2f} to {result['rms_levels'][1]:.2f} levels, {result['iterations']} steps, radius {by_presses:.3f} +- {sd:.3f} of "
+          f"{radius}; not observed: {len(result['not_observed'])} of {len(result['parameters'])}: {sees}")
+    for k, name in enumerate(held_out):
+        frame, shot = 2 * len(presses) + 1 + 2 * k, work / f"{file.stem}-{name.replace(' ', '-')}"
+        photographs(folder, [frame], shot, 100 * seed + 50 + k)
+        rms = {}
+        for kind, path in {"true": true_file, "design's": constants, "measured": measured}.items():
+            out = shot / f"shape-{kind[0]}"
+            judge.track(domecast, shot / "f00.png", frames / "f00.png", path, out)
+            e = errors(folder, frame, out, dome)
+            here = e["known"] & (e["polar"] <= 45)
+            rms[kind] = np.sqrt(np.mean(e["off"][here] ** 2))
+        check(f"{label}, {name}: height to 45 deg", rms["measured"] <= 1.5 * rms["true"],
+              "rms " + ", ".join(f"with the {kind} light {value:.4f}" for kind, value in rms.items()) + " mm")
+    fitted = json.loads(measured.read_text())["light"]
+    check(f"{label}: constants say measured", fitted["source"] == "measured" and len(fitted["uncertainty"]["covariance"]) == len(result["parameters"]))
+    return sds_off(true["light"], fitted), {"folder": folder, "constants": constants, "radius": radius, "touched": touched, "file": file,
+                                             "level": level, "work": work, "dome": dome}
+
+
+def refusals(domecast, it):
+    """What cannot be calibrated, each by its name."""
+    folder, work, touched = it["folder"], it["work"], it["touched"]
+    all_frames = [0, *touched]
+
+    def refused(what, word, picked=all_frames, make=lambda picture, k: picture, constants=it["constants"], radius=it["radius"], words=()):
+        frames = photographs(folder, picked, work / f"refused-{what.replace(' ', '-')}", 7, make)
+        done = calibrate(domecast, frames, constants, work / "refused.json", radius, *words)
+        ok = done.returncode == 1 and word in done.stderr and not (work / "refused.json").exists()
+        check(f"refused: {what}", ok, " ".join(done.stderr.split())[:400])
+        (work / "refused.json").unlink(missing_ok=True)
+
+    refused("red and blue swapped", "red and blue swapped", make=lambda picture, k: picture[..., ::-1])
+    refused("a ball of another radius", "does not fit the presses", radius=1.25 * it["radius"])
+    refused("a smaller ball", "does not fit the presses", radius=0.8 * it["radius"])
+    moved = json.loads(it["constants"].read_text())
+    moved["camera"]["camera_from_sensor"][0][3] += 0.6
+    (work / "moved.json").write_text(json.dumps(moved))
+    refused("a camera that has moved", "the camera has moved", constants=work / "moved.json")
+    refused("exposure left on", "automatic exposure", make=lambda picture, k: picture * (1.0 if k == 0 else 1 + 0.03 * (-1) ** k))
+    refused("white balance left on", "automatic white balance", make=lambda picture, k: picture * (1.0 if k != 3 else np.array([1.05, 1.0, 0.97])))
+    refused("too few presses", "frames of presses", picked=all_frames[:4])
+    refused("presses alike", "too similar", picked=[0] + 5 * touched[:1])
+    refused("presses on one line", "too similar", picked=[0] + [touched[k] for k in (0, 1, 0, 1, 0, 1)])
+    refused("frames cut off", "cut off at full scale", make=lambda picture, k: picture * 2.5)
+    refused("a frame without touch", "no touch", picked=[*all_frames[:4], 2, *all_frames[4:]])
+    refused("a touched frame at rest", "is touched", picked=[touched[1], *touched])
+    refused("a radius of 0", "radius", radius=0)
+    tree = json.loads(it["file"].read_text())
+    colors = [led["color"] for led in tree["leds"]["list"]]
+    if colors.count("green") > 1:
+        dark = work / f"{it['file'].stem}-dark.json"
+        del tree["leds"]["list"][colors.index("green")]
+        dark.write_text(json.dumps(tree))
+        rest = judge.draw(domecast, work / f"{it['file'].stem}-dark-rest", dark, it["level"], None)
+        picture = judge.drawn(rest)
+        refused("one of two lights out", "that light is out", make=lambda own, k: picture if k == 0 else own)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("domecast", type=pathlib.Path)
+    parser.add_argument("--quick", action="store_true", help="one sensor of thumb24")
+    parser.add_argument("--keep", type=pathlib.Path, help="folder that simulated frames are kept in")
+    parser.add_argument("--only", help="a design")
+    parser.add_argument("--sensors", type=int, default=2, help="sensors of each design")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        work = (arguments.keep or pathlib.Path(scratch)).resolve()
+        work.mkdir(parents=True, exist_ok=True)
+        all_off = []
+        for design in ("thumb24",) if arguments.quick else ("thumb24", "digit-rigid"):
+            if arguments.only not in (None, design):
+                continue
+            built = work / design
+            if not built.exists():
+                judge.run(arguments.domecast, "build", judge.ROOT / f"designs/{design}.json", "--out", built, "--quiet")
+            for seed in range(1, 2 if arguments.quick else 1 + arguments.sensors):
+                found, it = sensor(arguments.domecast, work, design, built / "constants/constants.json", seed)
+                worst = sorted(found, key=lambda name: -abs(found[name]))[:4]
+                print("     farthest: " + ", ".join(f"{name} {found[name]:+.1f}" for name in worst))
+                all_off += list(found.values())
+                if seed == 1 and design == "thumb24" and it:
+                    refusals(arguments.domecast, it)
+        shares = [np.mean(np.abs(all_off) <= k) for k in (1, 2, 3)]
+        holds = all(found >= wanted - 0.04 for found, wanted in zip(shares, (0.683, 0.954, 0.997)))
+        check("numbers are off by what their sd promise", holds, f"{len(all_off)} numbers within 1, 2, 3: " + " ".join(f"{s:.2f}" for s in shares))
+    sys.exit(1 if judge.failed else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -69,7 +69,7 @@ def scene(file, design, level, change, dome, radius, presses, held_out):
         made["name"] = name
         objects.append(made)
         frame += 2
-    tree = {"version": 1, "name": file.stem, "design": str(design), "frames": {"count": frame, "rate_hz": 1},
+    tree = {"version": 1, "name": file.name.split(".")[0], "design": str(design), "frames": {"count": frame, "rate_hz": 1},
             "tolerance": {"px": 0.02, "grey": 0.5}, "light": light, "objects": objects,
             "contact": {"level": "linear", "element_mm": 0.5 * scale}}
     file.write_text(json.dumps(tree))

@@ -41,7 +41,8 @@ pub struct LightArguments {
 
 /// Fits the light to frames and writes measured constants.
 pub fn run(output: &Output, arguments: &LightArguments) -> Result<(), Failure> {
-    let LightArguments { frames, constants: constants_path, ball_radius_mm, rest, out, noise_levels } = arguments;
+    let LightArguments { frames, constants: constants_path, ball_radius_mm, rest, out, noise_levels } =
+        arguments;
     let constants = read_constants(constants_path)?;
     let path = out.clone().unwrap_or_else(|| measured_beside(constants_path));
     let mut file = StagedFile::new(&path, "calibrate-light", &output.rules(&[frames, constants_path]))?;
@@ -118,11 +119,16 @@ fn frames_of(folder: &Path, rest: Option<&Path>) -> Result<Vec<PathBuf>, Failure
     };
     let is_rest = |path: &Path| {
         rest.is_some_and(|rest| {
-            path == rest || std::fs::canonicalize(path).ok().is_some_and(|own| std::fs::canonicalize(rest).ok() == Some(own))
+            path == rest
+                || std::fs::canonicalize(path)
+                    .ok()
+                    .is_some_and(|own| std::fs::canonicalize(rest).ok() == Some(own))
         })
     };
-    let mut frames: Vec<PathBuf> =
-        entries.filter_map(|e| Some(e.ok()?.path())).filter(|path| is_frame(path) && !is_rest(path)).collect();
+    let mut frames: Vec<PathBuf> = entries
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(|path| is_frame(path) && !is_rest(path))
+        .collect();
     frames.sort();
     if frames.is_empty() {
         return Err(input_fault(folder, "holds no PNG or JPEG frame", FRAMES));

@@ -104,8 +104,13 @@ pub(super) fn exposure(frame: usize, untouched: &[&SeenCell], stray: f64) -> Res
         let lit = untouched.iter().filter(|cell| cell.is_known && cell.at_rest[c] > 0.2 * brightest[c]);
         let mut ratios: Vec<f64> = lit.map(|cell| (cell.level[c] - stray) / cell.at_rest[c]).collect();
         if ratios.len() < MIN_UNTOUCHED {
-            let problem = format!("shows {} places of the untouched dome, {MIN_UNTOUCHED} are needed", ratios.len());
-            return Err(LightFitError::in_frame(frame, problem, "touch the dome with the ball alone, less deep"));
+            let problem =
+                format!("shows {} places of the untouched dome, {MIN_UNTOUCHED} are needed", ratios.len());
+            return Err(LightFitError::in_frame(
+                frame,
+                problem,
+                "touch the dome with the ball alone, less deep",
+            ));
         }
         ratios.sort_by(f64::total_cmp);
         let at = |part: f64| ratios[((ratios.len() - 1) as f64 * part) as usize];
@@ -132,7 +137,11 @@ pub(super) fn exposure(frame: usize, untouched: &[&SeenCell], stray: f64) -> Res
 }
 
 /// Whether presses lie far enough from each other; else where to press next.
-pub(super) fn spread(presses: &[SeenPress], dome_center_mm: DVec3, rim_deg: f64) -> Result<(), LightFitError> {
+pub(super) fn spread(
+    presses: &[SeenPress],
+    dome_center_mm: DVec3,
+    rim_deg: f64,
+) -> Result<(), LightFitError> {
     let ways: Vec<DVec3> =
         presses.iter().map(|press| (press.center_mm - dome_center_mm).normalize_or(DVec3::Z)).collect();
     let middle = ways.iter().sum::<DVec3>().normalize_or(DVec3::Z);
@@ -148,7 +157,9 @@ pub(super) fn spread(presses: &[SeenPress], dome_center_mm: DVec3, rim_deg: f64)
         return Ok(());
     }
     let [polar, azimuth] = farthest(&ways, REACH_DEG.min(0.8 * rim_deg));
-    let problem = format!("the presses are too similar: they reach {least:.0} degrees across the dome, {MIN_SPREAD_DEG:.0} are needed");
+    let problem = format!(
+        "the presses are too similar: they reach {least:.0} degrees across the dome, {MIN_SPREAD_DEG:.0} are needed"
+    );
     let cure = format!("press also at {polar:.0} degrees from the pole, azimuth {azimuth:.0}");
     Err(LightFitError::new(problem, cure))
 }
@@ -158,7 +169,8 @@ pub(super) fn farthest(ways: &[DVec3], reach_deg: f64) -> [f64; 2] {
     let mut best = (f64::INFINITY, DVec3::Z);
     for ring in 0..=5 {
         for turn in 0..24 {
-            let (polar, azimuth) = ((reach_deg * f64::from(ring) / 5.0).to_radians(), (15.0 * f64::from(turn)).to_radians());
+            let (polar, azimuth) =
+                ((reach_deg * f64::from(ring) / 5.0).to_radians(), (15.0 * f64::from(turn)).to_radians());
             let way = DVec3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos());
             let nearest = ways.iter().map(|other| other.dot(way)).fold(-1.0, f64::max);
             if nearest < best.0 {

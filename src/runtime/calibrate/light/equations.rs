@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::model::{LightModel, Number};
 use super::observed::{CapPlace, Observed};
-use super::physics::{CapFlux, CapShape, OwnLight, Physics, SourceFlux, cap_shape, own_patches, seen_flux};
+use super::physics::{CapFlux, CapShape, Physics, SourceFlux, Table, cap_shape, seen_flux};
 use crate::constants::LightConstants;
 
 /// Huber's threshold in standard deviations: specks, dots that were not found.
@@ -44,6 +44,9 @@ pub(super) struct Problem<'a> {
     pub start_stray: f64,
 }
 
+/// For each number, the lights that it reshapes and what a step of it changes of them.
+pub(super) type Slopes = Vec<Vec<(usize, Table)>>;
+
 /// Normal equations in whitened numbers.
 pub(super) struct Equations {
     pub matrix: DMatrix<f64>,
@@ -61,7 +64,6 @@ pub(super) struct Residuals {
 pub(super) struct Lit {
     pub light: LightConstants,
     pub fluxes: Vec<SourceFlux>,
-    pub own: OwnLight,
     shape: CapShape,
     /// Depths that the caps' fluxes were taken at.
     at_mm: Vec<f64>,
@@ -113,7 +115,7 @@ impl Problem<'_> {
         let flux = |source| self.physics.flux(&ways, source, self.seen, &shape, per_mm);
         let fluxes = (0..light.leds.len()).map(flux).collect();
         let at_mm = shape.iter().map(|cap| cap.map_or(0.0, |(depth, _)| depth)).collect();
-        Some(Lit { own: self.physics.own_light(&light)?, light, fluxes, shape, at_mm })
+        Some(Lit { light, fluxes, shape, at_mm })
     }
 
     /// Levels that the camera would have at every place: at rest, then the caps. `None` for a cap that the ball misses.
@@ -122,11 +124,10 @@ impl Problem<'_> {
         values: &Values,
         light: &LightConstants,
         fluxes: &[&SourceFlux],
-        own: &OwnLight,
         lit: &Lit,
     ) -> Vec<Option<DVec3>> {
         let seen_mw = seen_flux(light);
-        let patches = own_patches(own, fluxes, &seen_mw);
+        let patches = self.physics.own_patches(light, fluxes, &seen_mw);
         let own_at = |point_mm: DVec3| {
             DVec3::from_array(std::array::from_fn(|c| self.physics.own_at(&patches[c], point_mm)))
         };
@@ -145,7 +146,14 @@ impl Problem<'_> {
             let (depth_mm, normal) = lit.shape[i]?;
             let of = |flux: &SourceFlux| flux.caps[i];
             let own = own_at(place.point_mm);
-            Some(self.cap_level(place, &mut fluxes.iter().map(|f| of(f)), &seen_mw, own, (depth_mm - lit.at_mm[i], normal), stray))
+            Some(self.cap_level(
+                place,
+                &mut fluxes.iter().map(|f| of(f)),
+                &seen_mw,
+                own,
+                (depth_mm - lit.at_mm[i], normal),
+                stray,
+            ))
         });
         still.chain(caps).collect()
     }
@@ -174,7 +182,7 @@ impl Problem<'_> {
     /// Residuals of a light as it stands.
     pub fn residuals(&self, values: &Values, lit: &Lit) -> Residuals {
         let fluxes: Vec<&SourceFlux> = lit.fluxes.iter().collect();
-        let levels = self.predict(values, &lit.light, &fluxes, &lit.own, lit);
+        let levels = self.predict(values, &lit.light, &fluxes, lit);
         let measured = self.seen.still.iter().map(|p| p.level).chain(self.seen.caps.iter().map(|p| p.level));
         let first_cap = self.seen.still.len();
         let brightest = self.seen.caps.iter().map(|p| p.at_rest).fold(DVec3::ZERO, DVec3::max);
@@ -189,7 +197,8 @@ impl Problem<'_> {
                 own = DVec3::select(dark, DVec3::splat(1e6), own);
             }
             let left = level.map_or(DVec3::ZERO, |level| measured - level);
-            cost += left.to_array().iter().zip(own.to_array()).map(|(off, sd)| huber(off / sd).0).sum::<f64>();
+            cost +=
+                left.to_array().iter().zip(own.to_array()).map(|(off, sd)| huber(off / sd).0).sum::<f64>();
             off.push(left);
             sd.push(own);
         }
@@ -204,13 +213,13 @@ impl Problem<'_> {
     }
 
     /// The normal equations at some values; the light there has its changes along the rays.
-    pub fn equations(&self, values: &Values, lit: &Lit, residuals: &Residuals) -> Option<Equations> {
+    pub fn equations(&self, values: &Values, lit: &Lit, residuals: &Residuals, slopes: &Slopes) -> Equations {
         let n = self.unknowns();
         let fluxes: Vec<&SourceFlux> = lit.fluxes.iter().collect();
-        let base = self.predict(values, &lit.light, &fluxes, &lit.own, lit);
+        let base = self.predict(values, &lit.light, &fluxes, lit);
         let mut columns: Vec<Vec<DVec3>> = Vec::with_capacity(n);
-        for (k, number) in self.model.numbers.iter().enumerate() {
-            let column = self.column(values, lit, k, *number)?;
+        for k in 0..self.model.count() {
+            let column = self.column(values, lit, k, slopes);
             let slope = |(after, before): (&Option<DVec3>, &Option<DVec3>)| match (after, before) {
                 (Some(after), Some(before)) => (*after - *before) / STEP,
                 _ => DVec3::ZERO,
@@ -234,7 +243,7 @@ impl Problem<'_> {
             matrix[(k, k)] += 1.0;
             right[k] -= value;
         }
-        Some(Equations { matrix, right })
+        Equations { matrix, right }
     }
 
     fn whitened(&self, values: &Values) -> Vec<f64> {
@@ -244,24 +253,38 @@ impl Problem<'_> {
     }
 
     /// Levels after a step of one of the light's numbers.
-    fn column(&self, values: &Values, lit: &Lit, k: usize, number: Number) -> Option<Vec<Option<DVec3>>> {
+    fn column(&self, values: &Values, lit: &Lit, k: usize, slopes: &Slopes) -> Vec<Option<DVec3>> {
         let mut after = values.clone();
         after.numbers[k] += STEP;
         let light = self.model.light(&after.numbers);
-        let reshaped = self.model.reshaped(number);
-        let mut changed: Vec<(usize, SourceFlux)> = Vec::new();
-        if !reshaped.is_empty() {
-            let ways = self.physics.ways(&light).ok()?;
-            let of = |i: usize| (i, self.physics.flux(&ways, i, self.seen, &lit.shape, false));
-            changed = reshaped.iter().copied().map(of).collect();
-        }
-        let pick = |i: usize| changed.iter().find(|(at, _)| *at == i).map_or(&lit.fluxes[i], |(_, flux)| flux);
+        let of = |(i, table): &(usize, Table)| (*i, self.physics.changed(&lit.fluxes[*i], table, self.seen));
+        let changed: Vec<(usize, SourceFlux)> = slopes[k].iter().map(of).collect();
+        let pick =
+            |i: usize| changed.iter().find(|(at, _)| *at == i).map_or(&lit.fluxes[i], |(_, flux)| flux);
         let fluxes: Vec<&SourceFlux> = (0..lit.fluxes.len()).map(pick).collect();
-        if matches!(number, Number::Reflectance(_)) {
-            let own = self.physics.own_light(&light)?;
-            return Some(self.predict(&after, &light, &fluxes, &own, lit));
-        }
-        Some(self.predict(&after, &light, &fluxes, &lit.own, lit))
+        self.predict(&after, &light, &fluxes, lit)
+    }
+
+    /// What a step of each number changes of the lights that it reshapes.
+    pub fn slopes(&self, values: &Values) -> Option<Slopes> {
+        let before = self.physics.ways(&self.model.light(&values.numbers)).ok()?;
+        let tables: Vec<Table> = (0..before.sources.len()).map(|i| self.physics.table(&before, i)).collect();
+        let of = |(k, number): (usize, &Number)| {
+            let reshaped = self.model.reshaped(*number);
+            if reshaped.is_empty() {
+                return Some(Vec::new());
+            }
+            let mut after = values.numbers.clone();
+            after[k] += STEP;
+            let ways = self.physics.ways(&self.model.light(&after)).ok()?;
+            let change = |i: usize| {
+                let table = self.physics.table(&ways, i);
+                let less = |(a, b): (&[f64; 3], &[f64; 3])| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+                (i, table.iter().zip(&tables[i]).map(less).collect())
+            };
+            Some(reshaped.iter().copied().map(change).collect())
+        };
+        self.model.numbers.iter().enumerate().map(of).collect()
     }
 
     /// Columns of the balls' centres and of their radius.
@@ -270,13 +293,15 @@ impl Problem<'_> {
         let mut columns = vec![vec![DVec3::ZERO; base.len()]; 3 * count + 1];
         let (seen_mw, centers_mm) = (seen_flux(&lit.light), self.centers_mm(values));
         let fluxes: Vec<&SourceFlux> = lit.fluxes.iter().collect();
-        let patches = own_patches(&lit.own, &fluxes, &seen_mw);
+        let patches = self.physics.own_patches(&lit.light, &fluxes, &seen_mw);
         let radius_mm = self.radius_mm * values.radius.exp();
         for (i, place) in self.seen.caps.iter().enumerate() {
             let Some(before) = base.get(first + i).copied().flatten() else { continue };
-            let own = DVec3::from_array(std::array::from_fn(|c| self.physics.own_at(&patches[c], place.point_mm)));
+            let own =
+                DVec3::from_array(std::array::from_fn(|c| self.physics.own_at(&patches[c], place.point_mm)));
             let level = |center_mm: DVec3, radius_mm: f64| {
-                let depth_mm = super::observed::depth_on_ball(place.point_mm, place.ray, center_mm, radius_mm)?;
+                let depth_mm =
+                    super::observed::depth_on_ball(place.point_mm, place.ray, center_mm, radius_mm)?;
                 let normal = (center_mm - place.point_mm - place.ray * depth_mm) / radius_mm;
                 let further = (depth_mm - lit.at_mm[i], normal);
                 let of = &mut fluxes.iter().map(|flux| flux.caps[i]);

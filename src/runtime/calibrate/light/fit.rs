@@ -8,7 +8,7 @@ use super::equations::{Problem, Values};
 use super::frames::Bench;
 use super::measured::measured_light;
 use super::model::LightModel;
-use super::observed::{Observed, StillPlace, still_places};
+use super::observed::{Observed, still_places};
 use super::physics::Physics;
 use super::solve::{Solved, rms_of, solve};
 use super::types::{BallPress, LightFit, LightFitError, LightFitOptions, place_deg};
@@ -23,8 +23,6 @@ const MIN_PART: f64 = 0.002;
 /// Deviation of the radius' logarithm where the ball's is taken for true, and where it is left free.
 const KNOWN_RADIUS: f64 = 1e-5;
 const FREE_RADIUS: f64 = 0.5;
-/// Deviations by which the radius must be off, at a first look, to be fitted.
-const LOOK_AGAIN: f64 = 3.0;
 
 /// Fits the light of a sensor to a frame at rest and presses of one ball.
 ///
@@ -39,7 +37,10 @@ pub fn fit(
     checks::input(presses.len(), options.ball_radius_mm)?;
     let mut bench = Bench::new(constants, options)?;
     let Some(nominal) = &constants.light else {
-        return Err(LightFitError::new("these constants have no light", "build the design again with this release"));
+        return Err(LightFitError::new(
+            "these constants have no light",
+            "build the design again with this release",
+        ));
     };
     let tracked = bench.track(rest);
     checks::marks_at_rest(constants, &tracked)?;
@@ -81,7 +82,11 @@ pub fn fit(
     }
     let rim_deg = known.optics().dome().meridian_end_rad().to_degrees();
     checks::spread(&seen.presses, physics.dome().0, rim_deg)?;
-    values = Values { numbers: at_rest.values.numbers, centers: vec![DVec3::ZERO; seen.presses.len()], radius: 0.0 };
+    values = Values {
+        numbers: at_rest.values.numbers,
+        centers: vec![DVec3::ZERO; seen.presses.len()],
+        radius: 0.0,
+    };
     let (_, once) = start(values, &seen, (KNOWN_RADIUS, first.stray))?;
     seen.parts = parts_left(&seen, &once);
     let (rms, solved) = start(once.values.clone(), &seen, (KNOWN_RADIUS, first.stray))?;
@@ -90,7 +95,15 @@ pub fn fit(
     let radius = [free.values.radius, FREE_RADIUS * free.covariance[(last, last)].max(0.0).sqrt()];
     verdict::radius(options.ball_radius_mm, radius)?;
     verdict::lights(&model, &solved.values.numbers)?;
-    let fit = Fitted { constants, model: &model, physics: &physics, seen: &seen, options, gain, stray: first.stray };
+    let fit = Fitted {
+        constants,
+        model: &model,
+        physics: &physics,
+        seen: &seen,
+        options,
+        gain,
+        stray: first.stray,
+    };
     Ok(fit.result(&solved, [once.rms[0][1], rms[1]], radius, at_rest.steps + once.steps + solved.steps))
 }
 
@@ -102,7 +115,8 @@ fn with_light(constants: &Constants, light: LightConstants) -> Constants {
 fn start_gain(cells: &[SeenCell], stray: f64) -> DVec3 {
     DVec3::from_array(std::array::from_fn(|c| {
         let known = cells.iter().filter(|cell| cell.is_known && cell.passed[c] * cell.still[c] > 0.0);
-        let mut all: Vec<f64> = known.map(|cell| (cell.level[c] - stray) / (cell.passed[c] * cell.still[c])).collect();
+        let mut all: Vec<f64> =
+            known.map(|cell| (cell.level[c] - stray) / (cell.passed[c] * cell.still[c])).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied().unwrap_or(1.0).max(1e-12)
     }))

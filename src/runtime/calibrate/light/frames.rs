@@ -9,14 +9,14 @@ use crate::constants::Constants;
 use crate::shape::{SeenCell, ShapeFromColor, ShapeMap, ShapeOptions};
 use crate::track::{CameraFrame, TrackOptions, Tracked, Tracker};
 
-/// Pixels along a cell: four times those of a shape's cells, for a quarter of the noise.
-const CELL_PX: usize = 4;
+/// Pixels along a cell: as a shape's, so that little of a cap between two dots is lost.
+const CELL_PX: usize = 2;
 /// Part of the touch's radius in which the skin surely lies on the ball.
 const SAFE_PART: f64 = 0.7;
 /// Radii of the touch beyond which the skin counts as untouched.
 const FAR_PARTS: f64 = 3.5;
 /// Cells of a cap that are fitted: more add time and little else.
-const MAX_CAP_CELLS: usize = 60;
+const MAX_CAP_CELLS: usize = 80;
 /// Cells of a cap below which it says too little.
 const MIN_CAP_CELLS: usize = 8;
 /// Deviation of the first estimate along the dome's normal, mm: that of a shape read with lights that are off.
@@ -59,7 +59,11 @@ impl Bench {
     }
 
     /// Takes the frame at rest; its bare cells.
-    pub fn rest(&mut self, frame: &CameraFrame<'_>, tracked: &Tracked) -> Result<Vec<SeenCell>, LightFitError> {
+    pub fn rest(
+        &mut self,
+        frame: &CameraFrame<'_>,
+        tracked: &Tracked,
+    ) -> Result<Vec<SeenCell>, LightFitError> {
         self.shape.set_rest(frame, tracked).map_err(|e| LightFitError::of_shape(Some(0), &e))?;
         Ok(self.shape.seen_cells())
     }
@@ -95,7 +99,8 @@ impl Bench {
         let on_ball = |cell: &SeenCell| {
             let depth_mm = depth_on_ball(cell.point_mm, cell.ray, center_mm, radius_mm)?;
             let at = cell.point_mm + cell.ray * depth_mm;
-            let is_inside = aside(at) < SAFE_PART * touch_mm && depth_mm < 0.0 && (at - dome_center_mm).dot(out) > 0.0;
+            let is_inside =
+                aside(at) < SAFE_PART * touch_mm && depth_mm < 0.0 && (at - dome_center_mm).dot(out) > 0.0;
             (is_inside && cell.is_known).then_some(())
         };
         let cap: Vec<&SeenCell> = cells.iter().filter(|cell| on_ball(cell).is_some()).collect();

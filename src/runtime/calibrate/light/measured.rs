@@ -6,19 +6,14 @@ use nalgebra::{DMatrix, DVector};
 use super::model::{LightModel, Number, directions};
 use super::solve::Solved;
 use super::verdict::parameters;
-use crate::constants::{
-    LedDeviations, LightConstants, LightDeviations, LightUncertainty, LobeDeviations,
-};
+use crate::constants::{LedDeviations, LightConstants, LightDeviations, LightUncertainty, LobeDeviations};
 
 /// The nominal light with what was fitted, deviations and covariance.
 pub(super) fn measured_light(model: &LightModel, solved: &Solved) -> LightConstants {
     let mut light = model.light(&solved.values.numbers);
     let all = parameters(model, solved);
-    let units: Vec<f64> = all
-        .iter()
-        .enumerate()
-        .map(|(k, p)| p.sd / solved.covariance[(k, k)].max(1e-300).sqrt())
-        .collect();
+    let units: Vec<f64> =
+        all.iter().enumerate().map(|(k, p)| p.sd / solved.covariance[(k, k)].max(1e-300).sqrt()).collect();
     let n = model.count();
     let covariance = DMatrix::from_fn(n, n, |i, j| {
         0.5 * (solved.covariance[(i, j)] + solved.covariance[(j, i)]) * units[i] * units[j]

@@ -29,3 +29,6 @@ mod verdict;
 
 pub use fit::fit;
 pub use types::{BallPress, LightFit, LightFitError, LightFitOptions, LightPair, LightParameter};
+
+#[cfg(test)]
+mod tests;

@@ -48,7 +48,10 @@ pub(super) struct LightModel {
 }
 
 /// Lists of lights that have something in common.
-fn grouped(leds: &[LedConstants], is_alike: impl Fn(&LedConstants, &LedConstants) -> bool) -> Vec<Vec<usize>> {
+fn grouped(
+    leds: &[LedConstants],
+    is_alike: impl Fn(&LedConstants, &LedConstants) -> bool,
+) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, led) in leds.iter().enumerate() {
         match groups.iter_mut().find(|group| group.first().is_some_and(|k| is_alike(&leds[*k], led))) {
@@ -167,7 +170,8 @@ impl LightModel {
             let axis = (rotation * DVec3::from_array(led.axis)).normalize_or(DVec3::Z);
             let across = rotation * DVec3::from_array(led.across);
             led.axis = axis.to_array();
-            led.across = (across - axis * axis.dot(across)).normalize_or(axis.any_orthonormal_vector()).to_array();
+            led.across =
+                (across - axis * axis.dot(across)).normalize_or(axis.any_orthonormal_vector()).to_array();
         }
         light
     }

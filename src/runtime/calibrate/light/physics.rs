@@ -1,18 +1,23 @@
 //! What the light of the model gives at the places that were seen.
 
 use glam::DVec3;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::observed::{Observed, depth_on_ball};
 use crate::constants::LightConstants;
 use domecast_light::direct::EmitterRule;
-use domecast_light::dome_map::DomeFace;
+use domecast_light::dome_map::{DomeFace, DomeGrid, bicubic};
 use domecast_light::radiosity::{DomeRoom, Rings, Underside};
 use domecast_light::tables::Ways;
 use domecast_optics::SensorOptics;
 
 /// Places across a light, each way: the rule's error is far below a camera's noise.
 const PLACES: usize = 3;
+/// Cells across the dome of the tables that derivatives are taken from.
+const CELLS: usize = 16;
+/// Rounds of the dome's own light, and the change at which they end, a part of the direct light.
+const MAX_ROUNDS: usize = 400;
+const ROUNDS_END: f64 = 1e-7;
 /// Rings and patches of the dome as a room: a third of those that frames are drawn with, and within a thousandth of their light.
 const RINGS: usize = 10;
 const PATCHES: usize = 24;
@@ -42,14 +47,15 @@ pub(super) struct Physics {
     optics: SensorOptics,
     rule: EmitterRule,
     rings: Rings,
+    grid: DomeGrid,
     /// Irradiance of each patch by an exitance of one of each, by channel.
     mutual: Vec<DMatrix<f64>>,
     dome_center_mm: DVec3,
     dome_mm: f64,
 }
 
-/// The dome's own light at its patches by their direct light, by channel.
-pub(super) type OwnLight = [DMatrix<f64>; 3];
+/// A light's vector irradiance at the nodes of a coarse grid over the dome.
+pub(super) type Table = Vec<[f64; 3]>;
 
 /// Where the caps' skin lies: mm along the ray, and its outward normal.
 pub(super) type CapShape = Vec<Option<(f64, DVec3)>>;
@@ -78,6 +84,7 @@ impl Physics {
             optics: optics.clone(),
             rule: EmitterRule::with_places(PLACES),
             rings,
+            grid: DomeGrid::with_cells(CELLS).over(rings.face),
             mutual: mutual.collect(),
             dome_center_mm: dome.center_mm(),
             dome_mm: dome.radius_mm(),
@@ -97,14 +104,71 @@ impl Physics {
         (self.dome_center_mm, self.dome_mm)
     }
 
-    /// What the dome gives itself: `a (1 - a K)^-1 K` for a reflectance a.
-    pub fn own_light(&self, light: &LightConstants) -> Option<OwnLight> {
-        let of = |c: usize| -> Option<DMatrix<f64>> {
-            let (albedo, mutual) = (light.mean_reflectance[c], self.mutual.get(c)?);
-            let left = DMatrix::identity(mutual.nrows(), mutual.ncols()) - mutual * albedo;
-            left.lu().solve(&(mutual * albedo))
+    /// A light over the dome, coarsely, for a flux of one: what its derivatives are taken from.
+    pub fn table(&self, ways: &Ways, source: usize) -> Table {
+        let Some(source) = ways.sources.get(source) else { return Table::new() };
+        self.grid.fill_in_parallel(|place| {
+            let flux = ways.flux(source, ways.point(place, 1.0), &self.rule);
+            if flux.is_finite() { flux.to_array() } else { [0.0; 3] }
+        })
+    }
+
+    /// What a table says at a point of the dome or inside it.
+    fn look_up(&self, table: &Table, point_mm: DVec3) -> DVec3 {
+        let place = (point_mm - self.dome_center_mm) / self.dome_mm;
+        DVec3::from_array(bicubic(&self.grid, table, self.grid.coordinates(place)))
+    }
+
+    /// A light at all places after a change that a table has.
+    pub fn changed(&self, flux: &SourceFlux, change: &Table, seen: &Observed) -> SourceFlux {
+        let more = |point_mm: DVec3| self.look_up(change, point_mm);
+        let still = seen.still.iter().zip(&flux.still);
+        let caps = seen.caps.iter().zip(&flux.caps);
+        let patch = |(i, flux): (usize, &f64)| {
+            let place = self.rings.place(i / self.rings.patches, i % self.rings.patches);
+            let more = DVec3::from_array(bicubic(&self.grid, change, self.grid.coordinates(place)));
+            (flux + more.dot(self.rings.face.normal(place))).max(0.0)
         };
-        Some([of(0)?, of(1)?, of(2)?])
+        SourceFlux {
+            still: still.map(|(at, flux)| (flux + more(at.point_mm).dot(at.normal)).max(0.0)).collect(),
+            patches: flux.patches.iter().enumerate().map(patch).collect(),
+            caps: caps
+                .map(|(at, flux)| {
+                    let more = more(at.point_mm);
+                    CapFlux {
+                        undeformed: flux.undeformed + more.dot(at.normal),
+                        vector: flux.vector + more,
+                        per_mm: flux.per_mm,
+                    }
+                })
+                .collect(),
+        }
+    }
+
+    /// The dome's own light at its patches for all channels: `B = a (E + K B)`, summed up.
+    pub fn own_patches(
+        &self,
+        light: &LightConstants,
+        fluxes: &[&SourceFlux],
+        seen: &[DVec3],
+    ) -> [Vec<f64>; 3] {
+        std::array::from_fn(|c| {
+            let mut direct = DVector::zeros(self.rings.count());
+            for (flux, seen) in fluxes.iter().zip(seen) {
+                direct.iter_mut().zip(&flux.patches).for_each(|(sum, value)| *sum += seen[c] * value);
+            }
+            let (albedo, mutual) = (light.mean_reflectance[c], &self.mutual[c]);
+            let mut own: DVector<f64> = DVector::zeros(direct.len());
+            for _ in 0..MAX_ROUNDS {
+                let next = mutual * ((&direct + &own) * albedo);
+                let change = (&next - &own).amax();
+                own = next;
+                if change <= ROUNDS_END * direct.amax() {
+                    break;
+                }
+            }
+            own.iter().copied().collect()
+        })
     }
 
     /// The dome's own light of a channel at a place, from that of its patches.
@@ -114,7 +178,14 @@ impl Physics {
     }
 
     /// One light at all places; with `per_mm` also how it changes along the rays of the caps.
-    pub fn flux(&self, ways: &Ways, source: usize, seen: &Observed, shape: &CapShape, per_mm: bool) -> SourceFlux {
+    pub fn flux(
+        &self,
+        ways: &Ways,
+        source: usize,
+        seen: &Observed,
+        shape: &CapShape,
+        per_mm: bool,
+    ) -> SourceFlux {
         let Some(source) = ways.sources.get(source) else { return SourceFlux::default() };
         let at = |point_mm: DVec3| {
             let flux = ways.flux(source, point_mm, &self.rule);
@@ -161,17 +232,4 @@ pub(super) fn seen_flux(light: &LightConstants) -> Vec<DVec3> {
         DVec3::from_array(light.crosstalk.map(|row| row[color])) * led.flux
     };
     light.leds.iter().map(column).collect()
-}
-
-/// The dome's own light at its patches, for all channels.
-pub(super) fn own_patches(own: &OwnLight, fluxes: &[&SourceFlux], seen: &[DVec3]) -> [Vec<f64>; 3] {
-    std::array::from_fn(|c| {
-        let mut direct = nalgebra::DVector::zeros(own[c].ncols());
-        for (flux, seen) in fluxes.iter().zip(seen) {
-            for (sum, value) in direct.iter_mut().zip(&flux.patches) {
-                *sum += seen[c] * value;
-            }
-        }
-        (&own[c] * direct).iter().copied().collect()
-    })
 }

@@ -30,7 +30,10 @@ fn not_positive() -> LightFitError {
 }
 
 fn out_of_range() -> LightFitError {
-    LightFitError::new("the light of these constants cannot be computed", "give constants written by `domecast build`")
+    LightFitError::new(
+        "the light of these constants cannot be computed",
+        "give constants written by `domecast build`",
+    )
 }
 
 /// Root mean squares at rest and in the caps; places that say nothing are left out.
@@ -52,9 +55,11 @@ pub(super) fn solve(problem: &Problem<'_>, start: Values) -> Result<Solved, Ligh
     let mut values = start;
     let mut lit = problem.lit(&values, true).ok_or_else(out_of_range)?;
     let mut residuals = problem.residuals(&values, &lit);
+    // The lights' shapes change little on the way: their derivatives are taken once.
+    let slopes = problem.slopes(&values).ok_or_else(out_of_range)?;
     let before = rms_of(problem, &residuals);
     let (mut damping, mut steps, mut is_done) = (FIRST_DAMPING, 0, false);
-    let mut equations: Equations = problem.equations(&values, &lit, &residuals).ok_or_else(out_of_range)?;
+    let mut equations: Equations = problem.equations(&values, &lit, &residuals, &slopes);
     while steps < MAX_STEPS && !is_done {
         steps += 1;
         let mut damped = equations.matrix.clone();
@@ -67,7 +72,7 @@ pub(super) fn solve(problem: &Problem<'_>, start: Values) -> Result<Solved, Ligh
                 is_done = residuals.cost - after.cost <= END * (1.0 + residuals.cost);
                 (values, lit, residuals) = (next, next_lit, after);
                 damping = (0.1 * damping).max(1e-9);
-                equations = problem.equations(&values, &lit, &residuals).ok_or_else(out_of_range)?;
+                equations = problem.equations(&values, &lit, &residuals, &slopes);
             }
             // No step that is small beside what is known of the numbers lowers the cost any further.
             None if damping < MAX_DAMPING && step.amax() > 1e-3 => damping = (10.0 * damping).max(1e-3),

@@ -20,7 +20,7 @@ const UNSEEN: f64 = 0.7;
 const ALIKE: f64 = 0.95;
 /// By how much the colours of a place at rest may be off the light's, a part, and cells beyond it that are a touch.
 const MAX_CHROMA: f64 = 0.1;
-const MIN_TOUCHED: usize = 12;
+const MIN_TOUCHED: usize = 40;
 /// How far from the pole touches at rest are looked for, degrees: beyond, lights have their shadows.
 const LOOK_DEG: f64 = 60.0;
 
@@ -57,7 +57,11 @@ pub(super) fn lights(model: &LightModel, values: &[f64]) -> Result<(), LightFitE
 }
 
 /// Whether the frame at rest has the colours of a touch anywhere: its bare cells, beside the light that was fitted to them.
-pub(super) fn touched_at_rest(cells: &[SeenCell], dome_center_mm: DVec3, stray: f64) -> Result<(), LightFitError> {
+pub(super) fn touched_at_rest(
+    cells: &[SeenCell],
+    dome_center_mm: DVec3,
+    stray: f64,
+) -> Result<(), LightFitError> {
     let brightest = cells.iter().map(|cell| cell.passed * cell.still).fold(DVec3::ZERO, DVec3::max);
     let seen = |cell: &&SeenCell| {
         let expected = cell.passed * cell.still;
@@ -77,8 +81,9 @@ pub(super) fn touched_at_rest(cells: &[SeenCell], dome_center_mm: DVec3, stray: 
         let own = ratio / medians;
         (own / (own.element_sum() / 3.0).max(1e-6) - DVec3::ONE).abs().max_element()
     };
-    let off: Vec<&SeenCell> = seen.iter().filter(|(_, r)| chroma(*r) > MAX_CHROMA).map(|(cell, _)| *cell).collect();
-    let near = |a: &SeenCell, b: &SeenCell| a.column.abs_diff(b.column) <= 4 && a.row.abs_diff(b.row) <= 4;
+    let off: Vec<&SeenCell> =
+        seen.iter().filter(|(_, r)| chroma(*r) > MAX_CHROMA).map(|(cell, _)| *cell).collect();
+    let near = |a: &SeenCell, b: &SeenCell| a.column.abs_diff(b.column) <= 8 && a.row.abs_diff(b.row) <= 8;
     let most = off.iter().map(|cell| (off.iter().filter(|other| near(cell, other)).count(), *cell));
     match most.max_by_key(|(count, _)| *count) {
         Some((count, cell)) if count >= MIN_TOUCHED => {
@@ -86,7 +91,11 @@ pub(super) fn touched_at_rest(cells: &[SeenCell], dome_center_mm: DVec3, stray: 
             let problem = format!(
                 "has the colours of a dent at {polar:.0} degrees from the pole, azimuth {azimuth:.0}: it is touched, or stained there"
             );
-            Err(LightFitError::in_frame(0, problem, "give a frame of the clean, untouched sensor as the one at rest"))
+            Err(LightFitError::in_frame(
+                0,
+                problem,
+                "give a frame of the clean, untouched sensor as the one at rest",
+            ))
         }
         _ => Ok(()),
     }
@@ -101,7 +110,10 @@ pub(super) fn radius(given_mm: f64, free: [f64; 2]) -> Result<(), LightFitError>
             "a ball of {given_mm} mm radius does not fit the presses: one of {fits:.2} mm does, +- {:.2}",
             fits * sd
         );
-        return Err(LightFitError::new(problem, "give the radius (not the diameter) of the ball that was pressed"));
+        return Err(LightFitError::new(
+            problem,
+            "give the radius (not the diameter) of the ball that was pressed",
+        ));
     }
     Ok(())
 }
@@ -112,7 +124,9 @@ pub(super) fn name(model: &LightModel, number: Number) -> String {
     let first = |body: usize| model.bodies.get(body).and_then(|list| list.first()).copied().unwrap_or(0);
     let lobe = |i: usize| if model.lobes.len() == 1 { "lobe".to_owned() } else { format!("lobes[{i}]") };
     match number {
-        Number::Place(body, axis) => format!("leds[{}].{}", first(body), ["out_mm", "along_mm", "up_mm"][axis]),
+        Number::Place(body, axis) => {
+            format!("leds[{}].{}", first(body), ["out_mm", "along_mm", "up_mm"][axis])
+        }
         Number::Axis(body, axis) => format!("leds[{}].{}", first(body), ["tilt_rad", "turn_rad"][axis]),
         Number::Flux(led) => format!("leds[{led}].flux"),
         Number::Lambert(i) => format!("{}.lambert_fraction", lobe(i)),

@@ -93,7 +93,7 @@ def bring_presses(run, folder):
         way = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
         path += [{"time_s": time, "position_mm": (away * way).tolist()} for time, away in ((frame - 1, 20), (frame, 13.6), (frame + 0.5, 20))]
         frame += 2
-    scene |= {"name": "presses", "frames": {"count": frame, "rate_hz": 1}, "contact": {"level": "linear", "element_mm": 0.5},
+    scene |= {"name": "presses", "frames": {"count": frame, "rate_hz": 1}, "contact": {"level": "closed_form"},
               "objects": [{"name": "ball", "shape": {"kind": "sphere", "radius_mm": 4}, "path": path}]}
     (folder / "designs/scenes/presses.json").write_text(json.dumps(scene))
     run("simulate", "designs/scenes/presses.json", "--out", "simulated-presses")

@@ -50,7 +50,11 @@ def presses_of(dome):
 
 
 def scene(file, design, level, change, dome, radius, presses, held_out):
-    """One scene of all presses: even frames are untouched, the first is the one at rest."""
+    """One scene of presses: even frames are untouched, the first is the one at rest.
+
+    Under the ball of a calibration the skin is a sphere (Hertz), which elements of a twentieth of the radius are not: their normals are
+    off by 2 to 6 degrees there. Held-out presses need their elements.
+    """
     light = json.loads((judge.ROOT / "designs/scenes/lit.json").read_text())["light"]
     light["leds"] |= {"level_per_mw_mm2": level, "crosstalk": change["crosstalk"], "stray_level": change["stray"]}
     scale, paths, objects, frame = dome["radius"] / 10, [], [], 1
@@ -61,7 +65,8 @@ def scene(file, design, level, change, dome, radius, presses, held_out):
         frame += 2
     ball = {"name": "ball", "shape": {"kind": "sphere", "radius_mm": radius},
             "path": [{"time_s": t, "position_mm": p.tolist()} for t, p in paths]}
-    objects.append(ball)
+    if presses:
+        objects.append(ball)
     for name, made in held_out.items():
         touch = made["path"][0]
         lifted = touch | {"position_mm": (np.array(touch["position_mm"]) + [0, 0, 2.5 * AWAY_MM]).tolist()}
@@ -71,7 +76,7 @@ def scene(file, design, level, change, dome, radius, presses, held_out):
         frame += 2
     tree = {"version": 1, "name": file.name.split(".")[0], "design": str(design), "frames": {"count": frame, "rate_hz": 1},
             "tolerance": {"px": 0.02, "grey": 0.5}, "light": light, "objects": objects,
-            "contact": {"level": "linear", "element_mm": 0.5 * scale}}
+            "contact": {"level": "linear", "element_mm": 0.5 * scale} if held_out else {"level": "closed_form"}}
     file.write_text(json.dumps(tree))
 
 
@@ -138,8 +143,10 @@ def sensor(domecast, work, design, constants, seed):
                 "nut": judge.nut(0.3 * scale, dome)[0]}
     folder = work / file.stem
     if not (folder / "truth.jsonl").exists():
-        scene(folder.with_suffix(".scene.json"), file, level, change, dome, radius, presses, held_out)
-        judge.run(domecast, "simulate", folder.with_suffix(".scene.json"), "--out", folder, "--depth", "--quiet")
+        for into, of_ball, others in ((folder, presses, {}), (work / f"{file.stem}-others", [], held_out)):
+            tree = into.with_suffix(".scene.json")
+            scene(tree, file, level, change, dome, radius, of_ball, others)
+            judge.run(domecast, "simulate", tree, "--out", into, "--depth", "--quiet")
     touched = [2 * k + 1 for k in range(len(presses))]
     frames = photographs(folder, [0, *touched], work / f"{file.stem}-frames", 100 * seed)
     label, measured = f"{design}, sensor {seed}", work / f"{file.stem}-measured.json"
@@ -153,13 +160,14 @@ def sensor(domecast, work, design, constants, seed):
     print(f"     {result['rms_levels'][0]:.2f} to {result['rms_levels'][1]:.2f} levels, {result['iterations']} steps, radius {by_presses:.3f} +- {sd:.3f} of "
           f"{radius}; not observed: {len(result['not_observed'])} of {len(result['parameters'])}: {sees}")
     for k, name in enumerate(held_out):
-        frame, shot = 2 * len(presses) + 1 + 2 * k, work / f"{file.stem}-{name.replace(' ', '-')}"
-        photographs(folder, [frame], shot, 100 * seed + 50 + k)
+        frame, shot = 1 + 2 * k, work / f"{file.stem}-{name.replace(' ', '-')}"
+        others = work / f"{file.stem}-others"
+        photographs(others, [frame], shot, 100 * seed + 50 + k)
         rms = {}
         for kind, path in {"true": true_file, "design's": constants, "measured": measured}.items():
             out = shot / f"shape-{kind[0]}"
             judge.track(domecast, shot / "f00.png", frames / "f00.png", path, out)
-            e = errors(folder, frame, out, dome)
+            e = errors(others, frame, out, dome)
             here = e["known"] & (e["polar"] <= 45)
             rms[kind] = np.sqrt(np.mean(e["off"][here] ** 2))
         check(f"{label}, {name}: height to 45 deg", rms["measured"] <= 1.5 * rms["true"],

@@ -1,9 +1,18 @@
 //! Convolution of a map, as tiles of four pixels by eight channels that stay in registers.
 
+use glam::Vec4;
+
 use super::Map;
 
+/// Channels of a tile: two of the registers that every machine has.
 const LANES: usize = 8;
 const PIXELS: usize = 4;
+
+type Lanes = [Vec4; 2];
+
+fn lanes(values: [f32; LANES]) -> Lanes {
+    [Vec4::from_slice(&values), Vec4::from_slice(&values[4..])]
+}
 
 /// A convolution with square kernel, ready to run.
 #[derive(Debug, Clone)]
@@ -16,8 +25,8 @@ pub(crate) struct Conv {
     input_stride: usize,
     channels: usize,
     /// For each eight output channels, each row of the patch and each number in it: eight weights.
-    weights: Vec<[f32; LANES]>,
-    bias: Vec<[f32; LANES]>,
+    weights: Vec<Lanes>,
+    bias: Vec<Lanes>,
     pub(crate) relu: bool,
 }
 
@@ -58,8 +67,8 @@ impl Conv {
             span,
             input_stride: input.stride(),
             channels: output.channels,
-            weights: packed,
-            bias: padded,
+            weights: packed.into_iter().map(lanes).collect(),
+            bias: padded.into_iter().map(lanes).collect(),
             relu: false,
         }
     }
@@ -81,6 +90,7 @@ impl Conv {
                 let sums = self.tile(input, from, weights, *bias);
                 for ((_, to), sum) in tile.iter().zip(&sums) {
                     let out = &mut output[to + first..to + first + lanes];
+                    let sum = sum.iter().flat_map(Vec4::as_ref);
                     out.iter_mut().zip(sum).for_each(|(out, sum)| *out = sum.max(floor));
                 }
             }
@@ -88,25 +98,18 @@ impl Conv {
     }
 
     #[inline(always)]
-    fn tile(
-        &self,
-        input: &[f32],
-        from: [usize; PIXELS],
-        weights: &[[f32; LANES]],
-        bias: [f32; LANES],
-    ) -> [[f32; LANES]; PIXELS] {
-        let mut sums = [bias; PIXELS];
+    fn tile(&self, input: &[f32], from: [usize; PIXELS], weights: &[Lanes], bias: Lanes) -> [Lanes; PIXELS] {
+        let [mut a, mut b, mut c, mut d] = [bias; PIXELS];
         for (row, weights) in weights.chunks_exact(self.span).enumerate() {
             let patches = from.map(|from| &input[from + row * self.input_stride..][..weights.len()]);
-            for (i, weights) in weights.iter().enumerate() {
-                for (sum, patch) in sums.iter_mut().zip(&patches) {
-                    let value = patch[i];
-                    for (sum, weight) in sum.iter_mut().zip(weights) {
-                        *sum += value * weight;
-                    }
-                }
+            let [at_a, at_b, at_c, at_d] = patches.map(|patch| patch.iter());
+            for ((((weights, va), vb), vc), vd) in weights.iter().zip(at_a).zip(at_b).zip(at_c).zip(at_d) {
+                a = [a[0] + weights[0] * *va, a[1] + weights[1] * *va];
+                b = [b[0] + weights[0] * *vb, b[1] + weights[1] * *vb];
+                c = [c[0] + weights[0] * *vc, c[1] + weights[1] * *vc];
+                d = [d[0] + weights[0] * *vd, d[1] + weights[1] * *vd];
             }
         }
-        sums
+        [a, b, c, d]
     }
 }

@@ -30,6 +30,18 @@ pub struct Reading {
     pub range: [f64; 2],
 }
 
+impl Reading {
+    /// Whether a value is near the range: a quarter of the range beyond it, but no nearer to zero than half of its end. A
+    /// push that is never less than 0.4 N in the training is then not looked for below 0.2 N.
+    pub fn allows(&self, value: f64) -> bool {
+        let [low, high] = self.range;
+        let margin = 0.25 * (high - low);
+        let low = if low > 0.0 { (low - margin).max(0.5 * low) } else { low - margin };
+        let high = if high < 0.0 { (high + margin).min(0.5 * high) } else { high + margin };
+        (low..=high).contains(&value)
+    }
+}
+
 /// The limits of what a model was trained on, and the scale of its errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -10,7 +10,7 @@ use crate::picture::{FrameView, Shrinker};
 
 /// Bytes of a model's file at most.
 const MAX_FILE_BYTES: u64 = 300 << 20;
-/// How far beyond the range that was trained with a reading or a modulus may be, in parts of the range.
+/// How far beyond the range that was trained with a modulus may be, in parts of the range.
 const RANGE_MARGIN: f64 = 0.05;
 
 /// Why no hardness is stated.
@@ -146,8 +146,7 @@ impl HardnessReader {
         if all.clone().any(|value| !value.is_finite()) {
             return Err(Unsure::NotFinite);
         }
-        let ranges = self.metadata.readings.iter().map(|reading| reading.range);
-        if let Some(at) = readings.iter().zip(ranges).position(|(value, range)| outside(*value, range)) {
+        if let Some(at) = readings.iter().zip(&self.metadata.readings).position(|(value, r)| !r.allows(*value)) {
             return Err(Unsure::Reading(at));
         }
         let novelty = numbers("novelty").iter().zip(&self.metadata.novelty_limits);

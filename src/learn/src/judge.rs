@@ -99,10 +99,8 @@ fn share(right: usize, count: usize) -> Value {
 pub fn is_familiar(row: &Row, video: &Video, metadata: &Metadata) -> bool {
     let near = row.third.iter().zip(&metadata.novelty_limits).all(|(value, limit)| f64::from(*value) <= *limit);
     let first = video.readings.len() - metadata.readings.len();
-    near && video.readings[first..].iter().zip(&metadata.readings).all(|(value, reading)| {
-        let margin = 0.05 * (reading.range[1] - reading.range[0]);
-        (reading.range[0] - margin..=reading.range[1] + margin).contains(&f64::from(*value))
-    })
+    let readings = video.readings[first..].iter().zip(&metadata.readings);
+    near && readings.into_iter().all(|(value, reading)| reading.allows(f64::from(*value)))
 }
 
 fn reliability(rows: &[Row], videos: &[&Video]) -> (Vec<Value>, f64) {

@@ -31,6 +31,8 @@ enum ChannelName {
 
 /// Arguments of `domecast track`.
 #[derive(Debug, clap::Args)]
+#[group(skip)]
+#[command(group = clap::ArgGroup::new("read_against_rest").multiple(true))]
 pub struct TrackArguments {
     /// A folder of PNG or JPEG frames, frames, a video (through ffmpeg), a file of raw frames (with --raw), or `-` for
     /// standard input (PGM or PPM pictures one after the other, or raw with --raw).
@@ -68,11 +70,19 @@ pub struct TrackArguments {
     /// Read the skin's shape from each frame's colours, into this folder: `frame_NNNN.height.npy` (mm from its shape at
     /// rest, negative where it is pressed in), `.height_sd.npy`, `.normal.npy` and `.contact.npy`, all on the raw image's grid;
     /// `.height.png` (16 bits) and `.ply` (the skin as triangles).
-    #[arg(long, requires = "rest")]
+    #[arg(long, requires = "rest", group = "read_against_rest")]
     pub shape: Option<PathBuf>,
-    /// A frame of the untouched sensor, which the shape is read against.
-    #[arg(long, requires = "shape", value_name = "FRAME")]
+    /// A frame of the untouched sensor, which the shape and the hardness are read against.
+    #[arg(long, requires = "read_against_rest", value_name = "FRAME")]
     pub rest: Option<PathBuf>,
+    /// State the hardness of what is touched as well, by this model (ONNX, of `domecast-learn`): class, log10 of Young's modulus
+    /// with a 90 % interval, or that it is unsure.
+    #[arg(long, requires = "rest", value_name = "MODEL", group = "read_against_rest")]
+    pub hardness: Option<PathBuf>,
+    /// The hardness is read from every so many frames: the model's window then spans as long a press as those that it was
+    /// trained with.
+    #[arg(long, requires = "hardness", default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub hardness_every: u64,
     /// Raw frames of this size: WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb.
     #[arg(long)]
     pub raw: Option<RawSize>,

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod decode;
+mod hardness;
 mod pictures;
 mod results;
 mod shape;
@@ -60,7 +61,7 @@ fn warn_without_key(output: &Output, arguments: &TrackArguments, constants: &Con
 /// The files that are read: none may be written.
 fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
     let named =
-        arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times).chain(&arguments.rest);
+        arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times).chain(&arguments.rest).chain(&arguments.hardness);
     named.map(PathBuf::as_path).collect()
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::arguments::{Format, TrackArguments};
+use super::hardness::HardnessLines;
 use super::pictures::Pictures;
 use super::shape::ShapeFiles;
 use crate::commands::output::{Failure, Output};
@@ -81,6 +82,7 @@ pub(super) struct Results {
     sink: Sink,
     pictures: Pictures,
     shape: Option<ShapeFiles>,
+    hardness: Option<HardnessLines>,
     page: Option<(StagedFile, TrackReport)>,
     at_mm: DVec3,
     line: Vec<u8>,
@@ -97,6 +99,7 @@ impl Results {
         let at_mm = tracker.springs().map_or(DVec3::ZERO, Springs::at_mm);
         let pictures = Pictures::new(arguments, rules, constants, tracker)?;
         let shape = ShapeFiles::open(arguments, rules, constants, tracker)?;
+        let hardness = HardnessLines::open(arguments, tracker, at_mm)?;
         let sink = Sink::new(arguments.out.as_deref(), rules)?;
         let page = match &arguments.report {
             Some(path) => {
@@ -106,7 +109,7 @@ impl Results {
             }
             None => None,
         };
-        Ok(Self { sink, pictures, shape, page, at_mm, line: Vec::new() })
+        Ok(Self { sink, pictures, shape, hardness, page, at_mm, line: Vec::new() })
     }
 
     /// Writes what stands before the lines.
@@ -139,6 +142,10 @@ impl Results {
         if let (Some(_), Some(shape)) = (frame, &mut self.shape) {
             let line = (arguments.format == Format::Jsonl).then_some(&mut self.line);
             shape.write(number, line, forces.as_deref_mut())?;
+        }
+        if let Some(hardness) = &mut self.hardness {
+            let line = (arguments.format == Format::Jsonl).then_some(&mut self.line);
+            hardness.write(frame, tracked, line);
         }
         self.sink.put(&self.line)?;
         let skin = frame.and(self.shape.as_ref()).map(ShapeFiles::map);

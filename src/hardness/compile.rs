@@ -46,7 +46,11 @@ impl<'a> Compiler<'a> {
         self.numbers = self.numbers.saturating_add(shape.len());
         if self.numbers > MAX_NUMBERS || shape.len() == 0 {
             let allowed = format!("1 to {MAX_NUMBERS} numbers in all values together");
-            return Err(ModelError::new("the graph", format!("has a value of {} numbers", shape.len()), allowed));
+            return Err(ModelError::new(
+                "the graph",
+                format!("has a value of {} numbers", shape.len()),
+                allowed,
+            ));
         }
         self.network.buffers.push(vec![0.0; shape.len()]);
         Ok(self.network.buffers.len() - 1)
@@ -67,7 +71,11 @@ impl<'a> Compiler<'a> {
     /// Names a value; a name is given once.
     pub(crate) fn name(&mut self, name: &'a str, value: Value) -> Result<(), ModelError> {
         if name.is_empty() || self.constants.contains_key(name) || self.values.insert(name, value).is_some() {
-            return Err(ModelError::new(format!("value \"{name}\""), "is made twice", "one node that makes it"));
+            return Err(ModelError::new(
+                format!("value \"{name}\""),
+                "is made twice",
+                "one node that makes it",
+            ));
         }
         Ok(())
     }
@@ -134,11 +142,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// A value as the window has it: a row of a frame becomes as many rows as the window has frames.
-    pub(crate) fn of_window(
-        &mut self,
-        node: &'a Node,
-        at: usize,
-    ) -> Result<(Slot, Vec<usize>), ModelError> {
+    pub(crate) fn of_window(&mut self, node: &'a Node, at: usize) -> Result<(Slot, Vec<usize>), ModelError> {
         let value = self.value(node, at)?;
         match value.shape {
             Shape::Window(sides) => Ok((value.slot, sides)),
@@ -230,7 +234,11 @@ impl<'a> Compiler<'a> {
             let sides = port.dims.iter().chain([&64]).try_fold(1_usize, |all, side| all.checked_mul(*side));
             if sides.is_none_or(|sides| sides / 64 > MAX_NUMBERS) {
                 let problem = format!("has the sides {:?}", port.dims);
-                return Err(ModelError::new("the picture", problem, format!("at most {MAX_NUMBERS} numbers")));
+                return Err(ModelError::new(
+                    "the picture",
+                    problem,
+                    format!("at most {MAX_NUMBERS} numbers"),
+                ));
             }
             let slot = self.buffer(&shape)?;
             match &shape {
@@ -247,7 +255,11 @@ impl<'a> Compiler<'a> {
             let value = self.values.get(port.name.as_str());
             let Some(value) = value.filter(|value| value.shape == Shape::Window(port.dims.clone())) else {
                 let problem = "is made by no node, or is of one frame, or has other sides than it says";
-                return Err(ModelError::new(format!("output \"{}\"", port.name), problem, "a value of the window"));
+                return Err(ModelError::new(
+                    format!("output \"{}\"", port.name),
+                    problem,
+                    "a value of the window",
+                ));
             };
             self.network.outputs.push((port.name.clone(), value.slot));
         }

@@ -101,7 +101,12 @@ impl Metadata {
             ("classes", self.classes.len(), width("probability"), "one for each number of `probability`"),
             ("log10_e", 2, width("log10_e"), "an output `log10_e` of mean and ln deviation"),
             ("readings", self.readings.len(), network.readings_count(), "one for each number of `readings`"),
-            ("novelty_limits", self.novelty_limits.len(), width("novelty"), "one for each number of `novelty`"),
+            (
+                "novelty_limits",
+                self.novelty_limits.len(),
+                width("novelty"),
+                "one for each number of `novelty`",
+            ),
             ("novelty_names", self.novelty_names.len(), width("novelty"), "one for each number of `novelty`"),
         ];
         for (member, count, wanted, allowed) in of_network {
@@ -115,7 +120,11 @@ impl Metadata {
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         let ranges = self.readings.iter().map(|r| r.range).chain([self.log10_e_range]);
         if ranges.clone().any(|range| !finite(&range) || range[0] > range[1]) {
-            return fault("range", "is not finite or runs backwards".into(), "the smallest value, then the largest");
+            return fault(
+                "range",
+                "is not finite or runs backwards".into(),
+                "the smallest value, then the largest",
+            );
         }
         let positive = |values: &[f64]| finite(values) && values.iter().all(|value| *value >= 0.0);
         if !positive(&self.novelty_limits) || !positive(&[self.interval_quantile]) {

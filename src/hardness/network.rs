@@ -38,7 +38,12 @@ pub(crate) enum Step {
     Linear(Linear, Slot, Slot),
     Gru(Box<Gru>, Slot, Slot),
     /// Values of two maps (of their own borders) are added.
-    AddMaps { maps: [Map; 3], from: [Slot; 2], to: Slot, relu: bool },
+    AddMaps {
+        maps: [Map; 3],
+        from: [Slot; 2],
+        to: Slot,
+        relu: bool,
+    },
     Relu(Slot, Slot),
     /// Lists one after the other.
     Concat(Vec<Slot>, Slot),

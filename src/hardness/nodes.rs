@@ -34,7 +34,9 @@ impl<'a> Compiler<'a> {
             "Reshape" => self.reshape(node),
             "ReduceSumSquare" => self.sum_of_squares(node),
             "Softmax" => self.softmax(node),
-            other => Err(ModelError::new(format!("node \"{other}\""), "is of a kind that is not known", KNOWN)),
+            other => {
+                Err(ModelError::new(format!("node \"{other}\""), "is of a kind that is not known", KNOWN))
+            }
         }
     }
 
@@ -77,7 +79,8 @@ impl<'a> Compiler<'a> {
         }
         let sides = [map.height, map.width].map(|side| swept(side, kernel, stride, pad));
         let (true, [Some(height), Some(width)]) = (2 * pad <= kernel, sides) else {
-            let problem = format!("sweeps {kernel} pixels with {pad} more over {} x {}", map.width, map.height);
+            let problem =
+                format!("sweeps {kernel} pixels with {pad} more over {} x {}", map.width, map.height);
             return Err(settings.error(problem, "a kernel within the picture, at most half of it outside"));
         };
         settings.end()?;
@@ -266,7 +269,9 @@ impl<'a> Compiler<'a> {
         let end = |at: i64| if at < 0 { at.saturating_add(rows) } else { at.min(rows) };
         let (first, last) = (end(one(1)?), end(one(2)?));
         if one(3)? != 0 || step != 1 || first < 0 || first >= last {
-            return Err(settings.error(format!("cuts {first}..{last} in steps of {step}"), "rows, one by one"));
+            return Err(
+                settings.error(format!("cuts {first}..{last} in steps of {step}"), "rows, one by one")
+            );
         }
         settings.end()?;
         sides[0] = (last - first) as usize;

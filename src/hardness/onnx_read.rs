@@ -109,7 +109,11 @@ fn attribute(bytes: &[u8]) -> Result<(String, Attribute), ModelError> {
             20 => kind = wire.int("an attribute's type")?,
             other => {
                 let allowed = "numbers, lists of integers, texts";
-                return Err(ModelError::new(format!("attribute \"{name}\""), format!("has field {other}"), allowed));
+                return Err(ModelError::new(
+                    format!("attribute \"{name}\""),
+                    format!("has field {other}"),
+                    allowed,
+                ));
             }
         }
     }

@@ -146,7 +146,9 @@ impl HardnessReader {
         if all.clone().any(|value| !value.is_finite()) {
             return Err(Unsure::NotFinite);
         }
-        if let Some(at) = readings.iter().zip(&self.metadata.readings).position(|(value, r)| !r.allows(*value)) {
+        if let Some(at) =
+            readings.iter().zip(&self.metadata.readings).position(|(value, r)| !r.allows(*value))
+        {
             return Err(Unsure::Reading(at));
         }
         let novelty = numbers("novelty").iter().zip(&self.metadata.novelty_limits);

@@ -43,7 +43,8 @@ impl Conv {
         let pixels = (0..output.height).flat_map(|row| (0..output.width).map(move |column| (row, column)));
         let pixels = pixels
             .map(|(row, column)| {
-                let from = (row * stride + inset) * input.stride() + (column * stride + inset) * input.channels;
+                let from =
+                    (row * stride + inset) * input.stride() + (column * stride + inset) * input.channels;
                 (from, output.at(row, column))
             })
             .collect();

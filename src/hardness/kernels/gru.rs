@@ -27,12 +27,7 @@ fn sigmoid(value: f32) -> f32 {
 
 impl Gru {
     /// `input` `[2][3 hidden][inputs]`, `recurrent` `[2][3 hidden][hidden]`, `bias` `[2][6 hidden]`, as ONNX has them.
-    pub(crate) fn new(
-        [inputs, hidden]: [usize; 2],
-        input: &[f32],
-        recurrent: &[f32],
-        bias: &[f32],
-    ) -> Self {
+    pub(crate) fn new([inputs, hidden]: [usize; 2], input: &[f32], recurrent: &[f32], bias: &[f32]) -> Self {
         let gates = 3 * hidden;
         let directions = [0, 1].map(|way| Direction {
             input: Linear::new(
@@ -49,7 +44,14 @@ impl Gru {
             ),
         });
         let zeros = |count| vec![0.0; count];
-        Self { inputs, hidden, directions, state: zeros(hidden), from_input: zeros(gates), from_state: zeros(gates) }
+        Self {
+            inputs,
+            hidden,
+            directions,
+            state: zeros(hidden),
+            from_input: zeros(gates),
+            from_state: zeros(gates),
+        }
     }
 
     /// Multiplications for one step of the sequence.

@@ -99,7 +99,8 @@ pub fn metadata(set: &DataSet, train: &[&Video], val: &[&Video], rows: &[Row], t
         f64::from((row.log10_e[0] - video.log10_e).abs()) / f64::from(row.log10_e[1]).exp()
     };
     let distances = rows.first().map_or(0, |row| row.third.len());
-    let limit = |at: usize| quantile(rows.iter().map(|row| f64::from(row.third[at])).collect(), FAMILIAR_PART);
+    let limit =
+        |at: usize| quantile(rows.iter().map(|row| f64::from(row.third[at])).collect(), FAMILIAR_PART);
     Metadata {
         version: 1,
         classes: set.classes.iter().enumerate().map(class).collect(),
@@ -124,12 +125,15 @@ mod tests {
     #[test]
     fn distances_are_one_on_average_and_grow_across_the_spread() {
         // two numbers that go together, and one that never changes
-        let rows: Vec<Vec<f32>> =
-            (0..200).map(|i| ((i % 20) as f32 - 9.5, (i / 20) as f32)).map(|(a, b)| vec![a, a + 0.1 * b, 3.0]).collect();
+        let rows: Vec<Vec<f32>> = (0..200)
+            .map(|i| ((i % 20) as f32 - 9.5, (i / 20) as f32))
+            .map(|(a, b)| vec![a, a + 0.1 * b, 3.0])
+            .collect();
         let near = familiar(&rows);
         let distance = |row: &[f32]| -> f32 {
             let off: Vec<f32> = row.iter().zip(&near.mean).map(|(a, b)| a - b).collect();
-            let turned = near.whiten.chunks_exact(3).map(|w| w.iter().zip(&off).map(|(a, b)| a * b).sum::<f32>());
+            let turned =
+                near.whiten.chunks_exact(3).map(|w| w.iter().zip(&off).map(|(a, b)| a * b).sum::<f32>());
             turned.map(|value| value * value).sum()
         };
         let mean = rows.iter().map(|row| distance(row)).sum::<f32>() / 200.0;

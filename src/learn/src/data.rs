@@ -13,7 +13,8 @@ use crate::tar::{Problem, members, npy};
 pub const LEVEL_PARTS: f32 = 64.0;
 /// Readings that tell the wrench and the platform's motion, and those of the dots.
 const WRENCH: [&str; 12] = [
-    "fx_n", "fy_n", "fz_n", "mx_nmm", "my_nmm", "mz_nmm", "tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad",
+    "fx_n", "fy_n", "fz_n", "mx_nmm", "my_nmm", "mz_nmm", "tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad",
+    "rz_rad",
 ];
 const DOTS: [&str; 3] = ["dots_mean_px", "dots_radial_px", "dots_divergence"];
 
@@ -92,10 +93,15 @@ struct Layout {
 }
 
 impl Layout {
-    fn video(&self, key: &str, parts: &HashMap<String, Vec<u8>>) -> Result<Result<Video, &'static str>, Problem> {
+    fn video(
+        &self,
+        key: &str,
+        parts: &HashMap<String, Vec<u8>>,
+    ) -> Result<Result<Video, &'static str>, Problem> {
         let at = |name: &str| format!("video {key}, {name}");
         let part = |name: &str| parts.get(name).ok_or_else(|| format!("{} is missing", at(name)));
-        let json: Value = serde_json::from_slice(part("json")?).map_err(|e| format!("{}: {e}", at("json")))?;
+        let json: Value =
+            serde_json::from_slice(part("json")?).map_err(|e| format!("{}: {e}", at("json")))?;
         let number = |name: &str| {
             let value = json.get(name).and_then(Value::as_f64);
             value.ok_or_else(|| format!("{}: no number `{name}`", at("json")))
@@ -119,18 +125,24 @@ impl Layout {
         let last = if self.leak == Leak::BeforeContact { first_contact - 1 } else { usize::MAX };
         let shown: Vec<usize> = (0..self.frames).map(|frame| frame.min(last)).collect();
 
-        let (sides, content) = npy(part("readings.npy")?, "<f4", 4).map_err(|e| format!("{} {e}", at("readings.npy")))?;
+        let (sides, content) =
+            npy(part("readings.npy")?, "<f4", 4).map_err(|e| format!("{} {e}", at("readings.npy")))?;
         if sides != [self.frames, self.columns] {
             return Err(format!("{} has the shape {sides:?}", at("readings.npy")));
         }
-        let table: Vec<f32> = content.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-        let readings: Vec<f32> =
-            shown.iter().flat_map(|f| self.used.iter().map(move |c| (f, c))).map(|(f, c)| table[f * self.columns + c]).collect();
+        let table: Vec<f32> =
+            content.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        let readings: Vec<f32> = shown
+            .iter()
+            .flat_map(|f| self.used.iter().map(move |c| (f, c)))
+            .map(|(f, c)| table[f * self.columns + c])
+            .collect();
         if readings.iter().any(|value| !value.is_finite()) || !log10_e.is_finite() {
             return Ok(Err("a reading is missing"));
         }
         let picture = match self.picture {
-            Some(picture) => self.picture(picture, &shown, part("frames.npy")?, part("rest.npy")?)
+            Some(picture) => self
+                .picture(picture, &shown, part("frames.npy")?, part("rest.npy")?)
                 .map_err(|e| format!("video {key}, frames or rest: {e}"))?,
             None => Vec::new(),
         };
@@ -138,7 +150,13 @@ impl Layout {
         Ok(Ok(Video { key: key.into(), split, label, log10_e, picture, readings, shape }))
     }
 
-    fn picture(&self, to: [usize; 2], shown: &[usize], frames: &[u8], rest: &[u8]) -> Result<Vec<i16>, Problem> {
+    fn picture(
+        &self,
+        to: [usize; 2],
+        shown: &[usize],
+        frames: &[u8],
+        rest: &[u8],
+    ) -> Result<Vec<i16>, Problem> {
         let [height, width] = self.size;
         let ((sides, frames), (rest_sides, rest)) = (npy(frames, "|u1", 1)?, npy(rest, "|u1", 1)?);
         if sides != [self.frames, height, width, 3] || rest_sides != [height, width, 3] {
@@ -154,7 +172,9 @@ impl Layout {
         let mut picture = Vec::with_capacity(self.frames * rest.len());
         for frame in shown {
             let levels = shrunk(&frames[frame * height * width * 3..][..height * width * 3]);
-            picture.extend(levels.iter().zip(&rest).map(|(level, rest)| ((level - rest) * LEVEL_PARTS).round() as i16));
+            picture.extend(
+                levels.iter().zip(&rest).map(|(level, rest)| ((level - rest) * LEVEL_PARTS).round() as i16),
+            );
         }
         Ok(picture)
     }
@@ -180,19 +200,23 @@ pub fn load(folder: &Path, options: &Options) -> Result<DataSet, Problem> {
     if set.get("format").and_then(Value::as_str) != Some("domecast-dataset") || count("version")? != 1 {
         return Err(fault("is no data set of version 1".into()));
     }
-    let columns = text_list(set.pointer("/readings/columns")).ok_or_else(|| fault("no `readings.columns`".into()))?;
+    let columns =
+        text_list(set.pointer("/readings/columns")).ok_or_else(|| fault("no `readings.columns`".into()))?;
     let wanted = WRENCH.iter().filter(|_| options.wrench).chain(DOTS.iter().filter(|_| options.dots));
     let used: Result<Vec<usize>, Problem> = wanted
-        .map(|name| columns.iter().position(|c| c == name).ok_or_else(|| fault(format!("no column `{name}`"))))
+        .map(|name| {
+            columns.iter().position(|c| c == name).ok_or_else(|| fault(format!("no column `{name}`")))
+        })
         .collect();
     let used = used?;
     let size = [count("height")?, count("width")?];
     // the nearest height of the same shape that halves four times
     let height = ((options.width * size[0]) as f64 / (16 * size[1]) as f64).round().max(1.0) as usize * 16;
     let classes = text_list(set.get("classes"));
-    let range = set.get("label_range_mpa").and_then(Value::as_array).map(|range| {
-        range.iter().filter_map(Value::as_f64).map(|e| e.log10() as f32).collect::<Vec<_>>()
-    });
+    let range = set
+        .get("label_range_mpa")
+        .and_then(Value::as_array)
+        .map(|range| range.iter().filter_map(Value::as_f64).map(|e| e.log10() as f32).collect::<Vec<_>>());
     let middle_log10 = match (&classes, range.as_deref()) {
         (Some(_), _) => None,
         (None, Some([low, high])) => Some((low + high) / 2.0),
@@ -225,7 +249,9 @@ pub fn load(folder: &Path, options: &Options) -> Result<DataSet, Problem> {
     for shard in shards {
         let file = shard.get("file").and_then(Value::as_str).unwrap_or("");
         if shard.get("sha256").is_none_or(Value::is_null) {
-            return Err(fault(format!("the shard \"{file}\" is not made yet: run `domecast dataset` to its end")));
+            return Err(fault(format!(
+                "the shard \"{file}\" is not made yet: run `domecast dataset` to its end"
+            )));
         }
         read_shard(&folder.join(file), &layout, options, &mut result)?;
     }
@@ -260,7 +286,12 @@ fn read_shard(path: &Path, layout: &Layout, options: &Options, result: &mut Data
 
 fn check(set: &DataSet) -> Result<(), Problem> {
     if let Some(video) = set.videos.iter().find(|video| video.label >= set.classes.len()) {
-        return Err(format!("video {} has the label {} of {} classes", video.key, video.label, set.classes.len()));
+        return Err(format!(
+            "video {} has the label {} of {} classes",
+            video.key,
+            video.label,
+            set.classes.len()
+        ));
     }
     for (split, least) in [(Split::Train, 8), (Split::Val, 4), (Split::Test, 1)] {
         let count = set.part(split).len();

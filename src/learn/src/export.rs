@@ -68,9 +68,11 @@ impl Writer {
             .collect();
         let one: usize = dims[1..].iter().product();
         let weights = numbers(layer.conv.weight.val());
-        let weights = weights.iter().enumerate().map(|(at, w)| (f64::from(*w) * scale[at / one]) as f32).collect();
+        let weights =
+            weights.iter().enumerate().map(|(at, w)| (f64::from(*w) * scale[at / one]) as f32).collect();
         let bias = beta.iter().zip(&mean).zip(&scale);
-        let bias = bias.map(|((beta, mean), scale)| (f64::from(*beta) - f64::from(*mean) * scale) as f32).collect();
+        let bias =
+            bias.map(|((beta, mean), scale)| (f64::from(*beta) - f64::from(*mean) * scale) as f32).collect();
         let (name, offset) = (self.name(), self.name());
         self.graph.floats(&name, &dims, weights);
         self.graph.floats(&offset, &[dims[0]], bias);
@@ -186,7 +188,11 @@ fn direction(gru: &Gru, input: &mut Vec<f32>, recurrent: &mut Vec<f32>, bias: &m
 }
 
 /// Scales of a layer's outputs, then offsets, worked into the layer.
-fn scaled(layer: &Linear, scale: impl Fn(usize) -> f32, offset: impl Fn(usize) -> f32) -> (Vec<f32>, Vec<f32>) {
+fn scaled(
+    layer: &Linear,
+    scale: impl Fn(usize) -> f32,
+    offset: impl Fn(usize) -> f32,
+) -> (Vec<f32>, Vec<f32>) {
     let (mut weights, mut bias) = parts(layer);
     let outputs = bias.len();
     weights.iter_mut().enumerate().for_each(|(at, weight)| *weight *= scale(at % outputs));
@@ -240,8 +246,7 @@ pub fn graph(net: &Net, scales: &Scales, familiar: &[Familiar]) -> Graph {
     writer.graph.node("Softmax", &[&value], "probability", &[("axis", Attribute::Int(1))]);
     let [middle, deviation] = scales.log10_e;
     let offset = [middle, deviation.ln()];
-    let (weights, bias) =
-        scaled(&net.modulus, |at| if at == 0 { deviation } else { 1.0 }, |at| offset[at]);
+    let (weights, bias) = scaled(&net.modulus, |at| if at == 0 { deviation } else { 1.0 }, |at| offset[at]);
     writer.gemm(&state, weights, bias, Some("log10_e"));
     let mut outputs = vec![("probability", classes), ("log10_e", 2)];
     if familiar.is_empty() {

@@ -40,7 +40,10 @@ pub fn outputs(graph: &Graph, set: &DataSet, videos: &[&Video]) -> Result<Vec<Ro
         for frame in 0..set.frames {
             if pixels > 0 {
                 let levels = &video.picture[frame * pixels..][..pixels];
-                picture.iter_mut().zip(levels).for_each(|(to, level)| *to = f32::from(*level) / (LEVEL_PARTS * 255.0));
+                picture
+                    .iter_mut()
+                    .zip(levels)
+                    .for_each(|(to, level)| *to = f32::from(*level) / (LEVEL_PARTS * 255.0));
             }
             network.push(&picture, &video.readings[frame * count..][..count]);
         }
@@ -97,7 +100,8 @@ fn share(right: usize, count: usize) -> Value {
 
 /// Whether a video is of the kind that was trained with, by the model's own limits.
 pub fn is_familiar(row: &Row, video: &Video, metadata: &Metadata) -> bool {
-    let near = row.third.iter().zip(&metadata.novelty_limits).all(|(value, limit)| f64::from(*value) <= *limit);
+    let near =
+        row.third.iter().zip(&metadata.novelty_limits).all(|(value, limit)| f64::from(*value) <= *limit);
     let first = video.readings.len() - metadata.readings.len();
     let readings = video.readings[first..].iter().zip(&metadata.readings);
     near && readings.into_iter().all(|(value, reading)| reading.allows(f64::from(*value)))
@@ -123,7 +127,8 @@ fn modulus(rows: &[Row], videos: &[&Video], quantile: f64) -> Value {
     let count = videos.len().max(1) as f64;
     let mean = videos.iter().map(|video| f64::from(video.log10_e)).sum::<f64>() / count;
     let spread: f64 = videos.iter().map(|video| (f64::from(video.log10_e) - mean).powi(2)).sum();
-    let errors: Vec<f64> = rows.iter().zip(videos).map(|(row, v)| f64::from(row.log10_e[0] - v.log10_e)).collect();
+    let errors: Vec<f64> =
+        rows.iter().zip(videos).map(|(row, v)| f64::from(row.log10_e[0] - v.log10_e)).collect();
     let squares: f64 = errors.iter().map(|e| e * e).sum();
     let halves = rows.iter().map(|row| quantile * f64::from(row.log10_e[1]).exp());
     let inside = errors.iter().zip(halves.clone()).filter(|(e, half)| e.abs() <= *half).count();

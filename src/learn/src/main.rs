@@ -46,12 +46,19 @@ fn setup(set: &DataSet, options: &Options, net: &Net) -> serde_json::Value {
 }
 
 /// Calibrates, judges and writes what came out.
-fn finish(set: &DataSet, options: &Options, scales: &Scales, net: &Net, curve: &[Epoch]) -> Result<(), Problem> {
+fn finish(
+    set: &DataSet,
+    options: &Options,
+    scales: &Scales,
+    net: &Net,
+    curve: &[Epoch],
+) -> Result<(), Problem> {
     let [train, val, test] = [Split::Train, Split::Val, Split::Test].map(|split| set.part(split));
     let plain = graph(net, scales, &[]);
     let of_val = judge::outputs(&plain, set, &val)?;
     let scales = Scales { temperature: calibrate::temperature(&of_val, &val), ..scales.clone() };
-    let states: Vec<Vec<f32>> = judge::outputs(&plain, set, &train)?.into_iter().map(|row| row.third).collect();
+    let states: Vec<Vec<f32>> =
+        judge::outputs(&plain, set, &train)?.into_iter().map(|row| row.third).collect();
     let mut familiar = vec![calibrate::familiar(&states)];
     if !set.readings.is_empty() {
         familiar.push(calibrate::familiar(&calibrate::last_readings(&train, set.readings.len())));
@@ -80,8 +87,11 @@ fn finish(set: &DataSet, options: &Options, scales: &Scales, net: &Net, curve: &
     folder.write("model.onnx", &bytes).map_err(|e| e.to_string())?;
     folder.write("metrics.json", text.as_bytes()).map_err(|e| e.to_string())?;
     folder.commit().map_err(|e| e.to_string())?;
-    println!("{}", json!({ "out": options.out, "test": metrics["test"]["accuracy"], "modulus": metrics["test"]["modulus"],
-                           "unsure": metrics["test"]["unsure"], "model_sha256": metrics["model_sha256"] }));
+    println!(
+        "{}",
+        json!({ "out": options.out, "test": metrics["test"]["accuracy"], "modulus": metrics["test"]["modulus"],
+                           "unsure": metrics["test"]["unsure"], "model_sha256": metrics["model_sha256"] })
+    );
     Ok(())
 }
 

@@ -31,7 +31,10 @@ impl ConvNorm {
             .with_stride([stride, stride])
             .with_padding(PaddingConfig2d::Explicit(pad, pad, pad, pad))
             .with_bias(false)
-            .with_initializer(Initializer::KaimingNormal { gain: std::f64::consts::SQRT_2, fan_out_only: false });
+            .with_initializer(Initializer::KaimingNormal {
+                gain: std::f64::consts::SQRT_2,
+                fan_out_only: false,
+            });
         Self { conv: conv.init(device), norm: BatchNormConfig::new(outputs).init(device) }
     }
 
@@ -53,7 +56,8 @@ pub struct Block {
 
 impl Block {
     fn new(inputs: usize, outputs: usize, stride: usize, device: &Device) -> Self {
-        let past = (stride != 1 || inputs != outputs).then(|| ConvNorm::new([inputs, outputs], 1, stride, device));
+        let past =
+            (stride != 1 || inputs != outputs).then(|| ConvNorm::new([inputs, outputs], 1, stride, device));
         Self {
             first: ConvNorm::new([inputs, outputs], 3, stride, device),
             second: ConvNorm::new([outputs, outputs], 3, 1, device),
@@ -169,7 +173,8 @@ impl Net {
             let width = rows.dims()[1];
             rows.reshape([videos, frames, width])
         });
-        let told = self.readings.as_ref().zip(readings).map(|(linear, readings)| relu(linear.forward(readings)));
+        let told =
+            self.readings.as_ref().zip(readings).map(|(linear, readings)| relu(linear.forward(readings)));
         let parts: Vec<Tensor<3>> = seen.into_iter().chain(told).collect();
         let (states, _) = self.gru.forward(Tensor::cat(parts, 2), None);
         let first = frames.saturating_sub(LAST_FRAMES);

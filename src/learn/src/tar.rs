@@ -13,7 +13,9 @@ const MAX_SHARD_BYTES: u64 = 4 << 30;
 /// # Errors
 /// The file cannot be read, is cut, or a member's head is not that of a plain file.
 pub fn members(path: &Path) -> Result<Vec<(String, Vec<u8>)>, Problem> {
-    let fault = |problem: &str| format!("{}: {problem}; allowed: a whole shard of `domecast dataset`", path.display());
+    let fault = |problem: &str| {
+        format!("{}: {problem}; allowed: a whole shard of `domecast dataset`", path.display())
+    };
     let length = std::fs::metadata(path).map_err(|e| fault(&e.to_string()))?.len();
     if length > MAX_SHARD_BYTES {
         return Err(fault("is larger than 4 GiB"));

@@ -81,7 +81,9 @@ fn mean_and_deviation(values: impl Iterator<Item = f32> + Clone) -> [f32; 2] {
 pub fn scales_of(set: &DataSet) -> Scales {
     let train = set.part(Split::Train);
     let count = set.readings.len();
-    let column = |at: usize| train.iter().flat_map(move |video| video.readings.iter().skip(at).step_by(count).copied());
+    let column = |at: usize| {
+        train.iter().flat_map(move |video| video.readings.iter().skip(at).step_by(count).copied())
+    };
     Scales {
         window: set.frames,
         picture: set.picture,
@@ -107,19 +109,23 @@ impl Batch {
         let picture = set.picture.map(|[height, width]| {
             let levels = videos.iter().flat_map(|(video, _)| &video.picture);
             let values: Vec<f32> = levels.map(|level| f32::from(*level) / (LEVEL_PARTS * 255.0)).collect();
-            let picture: Tensor<4> = Tensor::from_data(TensorData::new(values, [frames, height, width, 3]), device);
+            let picture: Tensor<4> =
+                Tensor::from_data(TensorData::new(values, [frames, height, width, 3]), device);
             picture.permute([0, 3, 1, 2])
         });
         let count = set.readings.len();
         let readings = (count > 0).then(|| {
-            let table = videos.iter().flat_map(|(video, _)| &video.readings).zip(scales.readings.iter().cycle());
-            let values: Vec<f32> = table.map(|(value, [mean, deviation])| (value - mean) / deviation).collect();
+            let table =
+                videos.iter().flat_map(|(video, _)| &video.readings).zip(scales.readings.iter().cycle());
+            let values: Vec<f32> =
+                table.map(|(value, [mean, deviation])| (value - mean) / deviation).collect();
             Tensor::from_data(TensorData::new(values, [sides[0], sides[1], count]), device)
         });
         let mut classes = vec![0.0_f32; sides[0] * set.classes.len()];
         videos.iter().enumerate().for_each(|(at, (_, label))| classes[at * set.classes.len() + label] = 1.0);
         let [middle, deviation] = scales.log10_e;
-        let log10_e: Vec<f32> = videos.iter().map(|(video, _)| (video.log10_e - middle) / deviation).collect();
+        let log10_e: Vec<f32> =
+            videos.iter().map(|(video, _)| (video.log10_e - middle) / deviation).collect();
         Self {
             picture,
             readings,
@@ -218,11 +224,14 @@ impl<'a> Trainer<'a> {
 
     fn resume(&mut self) -> Result<(), Problem> {
         let folder = self.checkpoint();
-        let fault = |e: &dyn std::fmt::Debug| format!("{}: {e:?}; leave --resume out to begin anew", folder.display());
+        let fault = |e: &dyn std::fmt::Debug| {
+            format!("{}: {e:?}; leave --resume out to begin anew", folder.display())
+        };
         let text = std::fs::read_to_string(folder.join("state.json")).map_err(|e| fault(&e))?;
         let state: State = serde_json::from_str(&text).map_err(|e| fault(&e))?;
         if state.of != self.fingerprint() {
-            let problem = format!("is of another run:\n  {}\nthan this one:\n  {}", state.of, self.fingerprint());
+            let problem =
+                format!("is of another run:\n  {}\nthan this one:\n  {}", state.of, self.fingerprint());
             return Err(format!("{}: {problem}", folder.display()));
         }
         let record = ModuleRecord::load(folder.join("net.bpk")).map_err(|e| fault(&e))?;
@@ -265,7 +274,8 @@ impl<'a> Trainer<'a> {
             sum += f64::from(loss.into_scalar::<f32>()) * videos.len() as f64;
         }
         let val = self.set.part(Split::Val);
-        let score = outputs(&graph(&self.net, self.scales, &[]), self.set, &val).map(|rows| score(&rows, &val));
+        let score =
+            outputs(&graph(&self.net, self.scales, &[]), self.set, &val).map(|rows| score(&rows, &val));
         let score = score.unwrap_or_default();
         Epoch {
             epoch,
@@ -282,7 +292,11 @@ impl<'a> Trainer<'a> {
 ///
 /// # Errors
 /// A checkpoint cannot be written or read, or the loss is not finite any more.
-pub fn train(set: &DataSet, options: &Options, scales: &Scales) -> Result<(Option<Net>, Vec<Epoch>), Problem> {
+pub fn train(
+    set: &DataSet,
+    options: &Options,
+    scales: &Scales,
+) -> Result<(Option<Net>, Vec<Epoch>), Problem> {
     let mut trainer = Trainer::new(set, options, scales);
     if options.resume {
         trainer.resume()?;
@@ -306,7 +320,8 @@ pub fn train(set: &DataSet, options: &Options, scales: &Scales) -> Result<(Optio
             );
         }
         trainer.curve.push(row);
-        let stops = options.stop_after.is_some_and(|count| epoch + 1 - first >= count) && epoch < options.epochs;
+        let stops =
+            options.stop_after.is_some_and(|count| epoch + 1 - first >= count) && epoch < options.epochs;
         trainer.save()?;
         if stops {
             return Ok((None, trainer.curve));

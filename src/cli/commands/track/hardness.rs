@@ -89,13 +89,21 @@ fn moved_px(tracked: &Tracked) -> impl Iterator<Item = Option<(DVec2, DVec2)>> {
 
 impl HardnessLines {
     /// `None` where no model is named.
-    pub(super) fn open(arguments: &TrackArguments, tracker: &Tracker, at_mm: glam::DVec3) -> Result<Option<Self>, Failure> {
+    pub(super) fn open(
+        arguments: &TrackArguments,
+        tracker: &Tracker,
+        at_mm: glam::DVec3,
+    ) -> Result<Option<Self>, Failure> {
         let Some(model) = &arguments.hardness else { return Ok(None) };
         let mut reader = HardnessReader::load(model)
             .map_err(|e| input_fault(model, format!("{}: {}", e.at, e.problem), &e.allowed))?;
         let columns = columns(model, reader.metadata())?;
         let Some(path) = &arguments.rest else {
-            return Err(input_fault(model, "is given without --rest", "--rest FRAME of the untouched sensor"));
+            return Err(input_fault(
+                model,
+                "is given without --rest",
+                "--rest FRAME of the untouched sensor",
+            ));
         };
         let fault = |problem: String| input_fault(path, problem, "a frame of the untouched sensor");
         let bytes = std::fs::read(path).map_err(|e| fault(format!("cannot be read: {e}")))?;
@@ -136,7 +144,8 @@ impl HardnessLines {
         }
         let center = moved().map(|(at, moved)| at * moved.length_squared()).sum::<DVec2>() / weight;
         let mean = moved().map(|(_, moved)| moved.length()).sum::<f64>() / count;
-        let out = moved().map(|(at, moved)| (at - center).normalize_or_zero().dot(moved)).sum::<f64>() / count;
+        let out =
+            moved().map(|(at, moved)| (at - center).normalize_or_zero().dot(moved)).sum::<f64>() / count;
         let near_px = NEAR_PART * self.height_px;
         let (mut along, mut squares) = (0.0, 0.0);
         for (at, moved) in moved() {
@@ -149,7 +158,12 @@ impl HardnessLines {
     }
 
     /// Takes the frame in, and puts `hardness` into its JSON line, which ends with `}` and a line feed, once the window is full.
-    pub(super) fn write(&mut self, frame: Option<&CameraFrame<'_>>, tracked: &Tracked, line: Option<&mut Vec<u8>>) {
+    pub(super) fn write(
+        &mut self,
+        frame: Option<&CameraFrame<'_>>,
+        tracked: &Tracked,
+        line: Option<&mut Vec<u8>>,
+    ) {
         if !tracked.frame.is_multiple_of(self.every) {
             return;
         }

@@ -60,8 +60,13 @@ fn warn_without_key(output: &Output, arguments: &TrackArguments, constants: &Con
 
 /// The files that are read: none may be written.
 fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
-    let named =
-        arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times).chain(&arguments.rest).chain(&arguments.hardness);
+    let named = arguments
+        .frames
+        .iter()
+        .chain([&arguments.constants])
+        .chain(&arguments.times)
+        .chain(&arguments.rest)
+        .chain(&arguments.hardness);
     named.map(PathBuf::as_path).collect()
 }
 

@@ -194,6 +194,7 @@ impl GrowingFile {
     /// # Errors
     /// [`WriteError::Io`]; what was written is there all the same.
     pub fn end(self) -> Result<(), WriteError> {
+        self.file.sync_all().map_err(WriteError::io("write the file", &self.path))?;
         drop(self.file);
         marker::mark(&self.path, self.command).map_err(WriteError::io("write the file", &self.path))
     }

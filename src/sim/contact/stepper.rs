@@ -92,27 +92,23 @@ impl SolvedFrames {
     }
 }
 
+/// Time from frame to frame.
+fn step_s(scene: &Scene) -> f64 {
+    1.0 / scene.file().frames.rate_hz
+}
+
 impl<'a> Stepper<'a> {
     /// Makes the level's tables.
     ///
     /// # Errors
     /// An elastomer that the level cannot work with.
     pub fn new(scene: &'a Scene, level: Level) -> Result<Self, SimError> {
-        let px_per_mm = largest_px_per_mm(scene);
         if let Some(known) = scene.kept::<SolvedFrames>().filter(|known| known.level == level) {
             let contact = known.contact.clone();
-            return Ok(Self {
-                scene,
-                contact,
-                px_per_mm,
-                last: Last::Free,
-                gel: None,
-                known: Some(known),
-                placed: None,
-            });
+            return Ok(Self { known: Some(known), ..Self::free(scene, contact, None) });
         }
         let contact = Contact::new(elastomer_of(scene.design()), level).map_err(|error| unfit(&error))?;
-        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: None, known: None, placed: None })
+        Ok(Self::free(scene, contact, None))
     }
 
     /// The same on a dome whose tables are there already, at the level that they were made for.
@@ -120,17 +116,15 @@ impl<'a> Stepper<'a> {
     /// # Errors
     /// A slow gel that the dome's level cannot work with.
     pub fn on(scene: &'a Scene, dome: &Contact, gel: Option<&(Relaxation, f64)>) -> Result<Self, SimError> {
-        let px_per_mm = largest_px_per_mm(scene);
-        let step_s = 1.0 / scene.file().frames.rate_hz;
         let (gel, contact) = match gel {
             None => (None, dome.clone()),
             Some((relaxation, young_mpa)) => {
-                let made = GelMemory::on(relaxation.clone(), step_s, dome, *young_mpa);
+                let made = GelMemory::on(relaxation.clone(), step_s(scene), dome, *young_mpa);
                 let (gel, contact) = made.map_err(|error| unfit(&error))?;
                 (Some(gel), contact)
             }
         };
-        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel, known: None, placed: None })
+        Ok(Self::free(scene, contact, gel))
     }
 
     /// The same over a gel whose modulus relaxes, from that instant modulus, MPa; before the first frame nothing touches
@@ -144,11 +138,15 @@ impl<'a> Stepper<'a> {
         (relaxation, young_mpa): &(Relaxation, f64),
     ) -> Result<Self, SimError> {
         let elastomer = Elastomer { young_mpa: *young_mpa, ..elastomer_of(scene.design()) };
+        let (gel, contact) = GelMemory::new(relaxation.clone(), step_s(scene), &elastomer, level)
+            .map_err(|error| unfit(&error))?;
+        Ok(Self::free(scene, contact, Some(gel)))
+    }
+
+    /// Before anything touches.
+    fn free(scene: &'a Scene, contact: Contact, gel: Option<GelMemory>) -> Self {
         let px_per_mm = largest_px_per_mm(scene);
-        let step_s = 1.0 / scene.file().frames.rate_hz;
-        let (gel, contact) =
-            GelMemory::new(relaxation.clone(), step_s, &elastomer, level).map_err(|error| unfit(&error))?;
-        Ok(Self { scene, contact, px_per_mm, last: Last::Free, gel: Some(gel), known: None, placed: None })
+        Self { scene, contact, px_per_mm, last: Last::Free, gel, known: None, placed: None }
     }
 
     /// From now on holds the objects at these poses, `rest_from_object`, whatever their paths say; `None`: away from the dome.

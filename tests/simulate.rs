@@ -118,6 +118,32 @@ fn a_contact_that_its_level_does_not_cover_is_named() {
 }
 
 #[test]
+fn rays_beside_a_steep_membrane_are_counted_and_named() {
+    // a narrow bar two millimetres deep: beside its edges the membrane is nearly upright
+    let bar = scene(|scene| {
+        scene["contact"] = json!({ "level": "linear" });
+        scene["light"] = json!({ "surround_level": 0.02, "leds": { "level_per_mw_mm2": 285 } });
+        scene["objects"][0]["shape"] = json!({ "kind": "box", "size_mm": [2, 20, 6] });
+        scene["objects"][0]["path"] = json!([{ "time_s": 0, "position_mm": [0, 0, 14] }, { "time_s": 0.033, "position_mm": [0, 0, 12] }]);
+        scene["output"] = json!({});
+    });
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), &bar);
+    let output = domecast(&["simulate", "scene.json", "--out", "out"], folder.path());
+    let message = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(0), "{message}");
+    assert!(message.contains("contact rays_beside in 1 of 2 frames, first in frame 1: "), "{message}");
+    let truth = fs::read_to_string(folder.path().join("out/truth.jsonl")).expect("the truth");
+    let lines: Vec<Value> = truth.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let rays = |line: &Value| line.get("contact").and_then(|contact| contact.get("rays_beside")).cloned();
+    let frames: Vec<&Value> = lines.iter().filter(|line| line.get("frame").is_some()).collect();
+    assert_eq!(rays(frames[0]), None, "{}", frames[0]);
+    let counted = rays(frames[1]).unwrap_or_default();
+    let [beside, followed] = ["beside", "followed"].map(|name| counted[name].as_u64().unwrap_or(0));
+    assert!(0 < beside && beside * 100 < followed, "{counted}");
+}
+
+#[test]
 fn costs_are_told_in_seconds_and_decide_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     write(folder.path(), &scene(|scene| scene["electronics"] = json!({ "vignetting_exponent": 0.001 })));

@@ -177,6 +177,31 @@ def physics(index, videos):
     check(shift < 0.02, f"dots rest before the contact: {shift:.4f} px mean")
 
 
+def tracked(program, spec, folder):
+    """Readings that `track` says of frames at full size: the forces are the truth's within what a sensor as built is off."""
+    few = small_spec(spec, folder / "tracked.json", 6)
+    text = json.loads(few.read_text())
+    text["readings"]["kind"] = "tracked"
+    text["sensors"].update(train=1, val=1, test=1)
+    few.write_text(json.dumps(text))
+    run(program, "dataset", few, "--out", folder / "tracked")
+    index, videos = read_set(folder / "tracked")
+    columns = index["readings"]["columns"]
+    share, still, found = [], 0.0, []
+    for video in videos.values():
+        r, label = video["readings.npy"].astype(float), video["json"]
+        force, truth = np.linalg.norm(r[:, 1:4], axis=1), np.array(label["truth"]["force_n"])
+        share += [force[k] / truth[k] for k in range(len(truth)) if truth[k] > 0.2]
+        still = max(still, np.abs(r[:label["first_contact_frame"], 1:4]).max())
+        found.append(video["dots.npy"][..., 2].mean())
+    # wires, coils and modulus of the springs as built: two deviations of each at most
+    check(0.8 < min(share) <= max(share) < 1.25, f"tracked forces are {min(share):.3f} to {max(share):.3f} of the truth (sensors as built)")
+    check(still < 0.02, f"no tracked force before the contact: {still:.4f} N")
+    check(min(found) > 0.97, f"dots tracked: {min(found):.3f} at least")
+    unknown = np.isnan(np.concatenate([video["readings.npy"] for video in videos.values()])).any(axis=0)
+    check([columns[k] for k in np.flatnonzero(unknown)] == ["contact_radius_mm"], "only the contact's radius is not tracked")
+
+
 def pooled(frames, rest):
     """Difference to the rest frame, coarse."""
     d = frames.astype(float) - rest.astype(float)
@@ -264,6 +289,7 @@ def main():
         place = Path(place)
         if arguments.set is None:
             reproducible(arguments.program, small_spec(arguments.spec, place / "few.json", 16), place)
+            tracked(arguments.program, arguments.spec, place)
             spec = small_spec(arguments.spec, place / "more.json", arguments.videos)
             began = time.perf_counter()
             run(arguments.program, "dataset", spec, "--out", place / "more")

@@ -54,6 +54,11 @@ def bring(domecast, folder):
     frames.mkdir()
     for frame in sorted((folder / "simulated").glob("frame_*.png")):
         shutil.copy(frame, frames)
+    # a bench on which nothing moves, and what is answered to the wizard
+    (folder / "bench/01-rest").mkdir(parents=True)
+    for k in range(3):
+        shutil.copy(sorted(frames.iterdir())[0], folder / f"bench/01-rest/{k}.png")
+    (folder / "answers.txt").write_text("rest\ndone\n")
     run("simulate", "designs/scenes/lit.json", "--out", "lit")
     shutil.copy(folder / "lit/frame_0000.png", folder / "rest.png")
     shutil.rmtree(folder / "lit")
@@ -112,7 +117,7 @@ def run(domecast, line, folder):
     words[0] = domecast
     if "--watch" in words:
         return run_watching(words, folder)
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=LIMIT_S)
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=LIMIT_S, stdin=subprocess.DEVNULL)
     return None if done.returncode == 0 else f"exit code {done.returncode}: {(done.stderr + done.stdout)[-800:]}"
 
 

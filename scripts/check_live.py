@@ -13,6 +13,7 @@ too. --all plays 10,000 frames instead of 600.
 import json
 import os
 import re
+import resource
 import shutil
 import signal
 import socket
@@ -23,7 +24,11 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
+from mcap.exceptions import McapError
 from mcap.reader import make_reader
+from mcap.records import Channel, Message
+from mcap.stream_reader import StreamReader
 from rosbags.typesys import Stores, get_typestore
 
 REPOSITORY = Path(__file__).resolve().parent.parent
@@ -45,9 +50,9 @@ def one_core():
 class Live:
     """A run of `live`: its readings and events as they come, and its memory."""
 
-    def __init__(self, domecast, device, constants, *more, watch_memory=False):
+    def __init__(self, domecast, device, constants, *more, watch_memory=False, before=one_core):
         words = [domecast, "live", device, "--constants", constants, "--json", *more]
-        self.child = subprocess.Popen([str(w) for w in words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=one_core)
+        self.child = subprocess.Popen([str(w) for w in words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=before)
         self.readings, self.events, self.lines, self.memory_kb = [], [], [], []
         self.began, self.watch_memory = time.monotonic(), watch_memory
         self.thread = threading.Thread(target=self._read)
@@ -274,7 +279,7 @@ def browse(url):
 
 
 def check_ends(domecast, constants, files, folder):
-    """Ctrl-C ends in good order; kill -9 leaves a recording to its last chunk; a full disk does not stop the reading."""
+    """Ctrl-C ends in good order; kill -9 leaves a recording to its last chunk."""
     device = f"player:{files[0].parent}?rate={RATE}&frames=100000"
     live = Live(domecast, device, constants, "--record", folder / "b.mcap", "--fields", "wrench")
     live.event("started")
@@ -292,9 +297,6 @@ def check_ends(domecast, constants, files, folder):
         time.sleep(0.05)
     killed.child.send_signal(signal.SIGKILL)
     killed.end(wanted=-signal.SIGKILL)
-    from mcap.exceptions import McapError
-    from mcap.records import Channel, Message
-    from mcap.stream_reader import StreamReader
     topics, statuses = {}, 0
     with (folder / "c.mcap").open("rb") as file:
         try:
@@ -305,6 +307,60 @@ def check_ends(domecast, constants, files, folder):
         except McapError:
             pass
     expect(statuses >= len(killed.lines) - 32, f"kill -9: {statuses} of {len(killed.lines)} readings are in the recording")
+
+
+def check_heights(domecast, constants, rest, folder):
+    """Heights in a recording are those of `track --shape`, of the frame whose time they carry."""
+    frames = folder / "pressed"
+    subprocess.run([domecast, "simulate", REPOSITORY / "designs/scenes/ball.json", "--frames", "3", "--out", folder / "ball", "--quiet"], check=True)
+    frames.mkdir()
+    for file in (folder / "ball").glob("frame_*.png"):
+        shutil.copy(file, frames)
+    subprocess.run([domecast, "track", frames, "--constants", constants, "--shape", folder / "maps", "--rest", rest, "--out",
+                    folder / "pressed.jsonl", "--quiet"], check=True)
+    live = Live(domecast, f"player:{frames}?rate=2", constants, "--record", folder / "h.mcap", "--rest", rest, "--fields", "wrench")
+    live.end()
+    store, off, times = get_typestore(Stores.ROS2_HUMBLE), [], {"status": [], "height": []}
+    with (folder / "h.mcap").open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages(topics=["/domecast/status", "/domecast/height"]):
+            kind = channel.topic.rsplit("/", 1)[1]
+            times[kind].append(message.log_time)
+            if kind == "height":
+                image = store.deserialize_cdr(message.data, schema.name)
+                found = 1e3 * np.frombuffer(bytes(image.data), "<f4").reshape(image.height, image.width)
+                wanted = np.load(folder / f"maps/frame_{len(off):04}.height.npy")
+                off.append(np.nanmax(np.abs(found - wanted)) if (np.isnan(found) == np.isnan(wanted)).all() else np.inf)
+    expect(times["height"] == times["status"] and len(off) == 3, f"heights: {times}")
+    expect(max(off, default=np.inf) < 1e-6, f"heights: off by {off} mm")
+
+
+def check_full(domecast, constants, files, folder):
+    """A disk that takes no more (here: a limit of the file's size, which the system answers alike) ends the recording by name, not the reading."""
+    place, limit = folder / "full.mcap", 3_000_000
+
+    def full():
+        # the write fails then, and no signal ends the program
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        one_core()
+
+    device = f"player:{files[0].parent}?rate={RATE}&frames=180"
+    live = Live(domecast, device, constants, "--record", place, "--fields", "wrench", before=full)
+    live.end(wanted=1)
+    lost, ended = (live.event(name)[1] for name in ("recording_lost", "ended"))
+    expect(lost and str(place) in lost["message"] and "too large" in lost["message"], f"a full disk: {lost}")
+    expect(ended and ended["frames"] == len(live.lines) == 180, f"a full disk: the reading ends, {ended}")
+    topics, statuses = {}, 0
+    with place.open("rb") as file:
+        try:
+            for record in StreamReader(file).records:
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                statuses += isinstance(record, Message) and topics[record.channel_id] == "/domecast/status"
+        except McapError:
+            pass
+    expect(0.3 * limit < place.stat().st_size <= limit and statuses > 0, f"a full disk: {statuses} readings in {place.stat().st_size} bytes")
+    return statuses
 
 
 def main():
@@ -337,6 +393,9 @@ def main():
         ended, seen = check_page(domecast, constants, files, base / "lit/frame_0000.png")
         print("live: with the page: age p50 {age_p50_ms:.2f}, p99 {age_p99_ms:.2f} ms, {dropped} pushed out;".format(**ended), seen or "no Chromium")
         check_ends(domecast, constants, files, base)
+        check_heights(domecast, constants, base / "lit/frame_0000.png", base)
+        kept = check_full(domecast, constants, files, base)
+        print(f"live: a disk that is full ends the recording, not the reading; {kept} readings are in it")
     for fault in faults[:20]:
         print(f"FAIL {fault}")
     print(f"live: {len(faults)} failed, {time.monotonic() - began:.0f} s")

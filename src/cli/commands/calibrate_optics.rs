@@ -150,7 +150,7 @@ fn observations_in(
 }
 
 /// The table that [`observations_of`] reads.
-fn table_of(observations: &[Observation]) -> String {
+pub fn table_of(observations: &[Observation]) -> String {
     let mut text = String::from("frame,kind,id,u,v\n");
     for Observation { frame, kind, id, centroid_px } in observations {
         let kind = if *kind == Kind::White { "white" } else { "black" };
@@ -174,7 +174,8 @@ fn table_in(path: &Path) -> Result<Vec<Observation>, Failure> {
     }
 }
 
-fn observations_of(text: &str) -> Result<Vec<Observation>, TableError> {
+/// The centroids of a table's text.
+pub fn observations_of(text: &str) -> Result<Vec<Observation>, TableError> {
     let table = Table::parse(text)?;
     let column = |name: &str| {
         table.column(name).ok_or_else(|| TableError {

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod build;
+mod calibrate;
 mod calibrate_force;
 mod calibrate_optics;
 mod calibrate_print;
@@ -164,6 +165,8 @@ enum Command {
         #[arg(long)]
         pose: Option<PathBuf>,
     },
+    /// Calibrate a built sensor step by step: lens, rest, known weights; says what is still unknown, and which load helps most.
+    Calibrate(calibrate::CalibrateArguments),
     /// Fit the springs' stiffness to measured pairs of displacement and wrench.
     CalibrateForce {
         /// CSV of `tx,ty,tz,rx,ry,rz` (mm, rad) or `u0,v0,..,u3,v3` (px), then `Fx,Fy,Fz,Mx,My,Mz` (N, N*mm); an
@@ -356,6 +359,7 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
         Command::Check { dir } => check::run(output, dir),
         Command::Trace { design, pixels, pose } => points::trace(output, design, pixels, pose.as_deref()),
         Command::Project { design, points, pose } => points::project(output, design, points, pose.as_deref()),
+        Command::Calibrate(arguments) => calibrate::run(output, arguments),
         Command::CalibrateForce { measured, constants, out, motion_sd, temperature } => {
             let known = calibrate_force::Known { motion_sd: *motion_sd, temperature_c: *temperature };
             calibrate_force::run(output, measured, constants, out.as_deref(), &known)

@@ -48,6 +48,11 @@ impl Recording {
         self.recorder.write(time_ns, picture, tracked, skin).map_err(|error| fault(&self.path, &error))
     }
 
+    /// Adds the skin of a frame, which is measured later than the rest of it.
+    pub fn add_height(&mut self, time_ns: u64, skin: &ShapeMap) -> Result<(), Failure> {
+        self.recorder.write_height(time_ns, skin).map_err(|error| fault(&self.path, &error))
+    }
+
     /// Ends it with its index.
     pub fn end(self) -> Result<(), Failure> {
         let file = self.recorder.finish().map_err(|error| fault(&self.path, &error))?;

@@ -16,8 +16,10 @@
 //! other, so that a recording that is cut off anywhere can be read to its last whole chunk.
 
 mod cdr;
+mod heights;
 mod messages;
 mod recorder;
 mod schemas;
 
+pub use heights::HeightReader;
 pub use recorder::{MCAP_CHUNK_BYTES, McapError, McapRecorder, RecordedPicture};

@@ -45,7 +45,11 @@ pub struct McapError(mcap::McapError);
 
 impl fmt::Display for McapError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the recording cannot be written ({})", self.0)
+        // what the system says (a full disk), not that it said something
+        match &self.0 {
+            mcap::McapError::Io(error) => write!(f, "the recording cannot be written ({error})"),
+            other => write!(f, "the recording cannot be written ({other})"),
+        }
     }
 }
 
@@ -176,8 +180,7 @@ impl<W: Write> McapRecorder<W> {
             RecordedPicture::None => {}
         }
         if let Some(skin) = skin {
-            messages::height_image(&mut self.cdr, of(CAMERA), skin);
-            self.put_on("/domecast/height", &IMAGE, time_ns)?;
+            self.write_height(time_ns, skin)?;
         }
         self.write_motion(time_ns, tracked)?;
         messages::dots(&mut self.cdr, of(SENSOR), &self.dots, &tracked.black_dots);
@@ -190,6 +193,15 @@ impl<W: Write> McapRecorder<W> {
             self.chunk_ns = time_ns;
         }
         Ok(())
+    }
+
+    /// Records the skin of a frame that may be recorded already: with its time, ns since 1970.
+    ///
+    /// # Errors
+    /// [`McapError`].
+    pub fn write_height(&mut self, time_ns: u64, skin: &ShapeMap) -> Result<(), McapError> {
+        messages::height_image(&mut self.cdr, Header { time_ns, frame_id: CAMERA }, skin);
+        self.put_on("/domecast/height", &IMAGE, time_ns)
     }
 
     /// Wrench and pose, where the frame has them.

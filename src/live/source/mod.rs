@@ -10,6 +10,7 @@
 
 mod camera;
 mod controls;
+mod device;
 mod player;
 mod player_options;
 mod stream;
@@ -22,6 +23,7 @@ use crate::decode::{Picture, picture, with_huffman_tables, yuyv};
 
 pub use camera::{CameraRequest, open_camera};
 pub use controls::{CameraControls, ControlId, ControlRange, ControlReading, ControlRequest, lock_controls};
+pub use device::open_device;
 pub use player::Player;
 pub use player_options::PlayerOptions;
 pub use stream::PictureStream;

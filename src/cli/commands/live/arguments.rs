@@ -25,8 +25,9 @@ pub struct LiveArguments {
     /// Show the readings in a page of this machine, at http://127.0.0.1:PORT/ [default port: one that is free].
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
     pub show: Option<u16>,
-    /// A frame of the untouched sensor: the page then shows the depth of the skin too.
-    #[arg(long, requires = "show", value_name = "FRAME")]
+    /// A frame of the untouched sensor: the page then shows the depth of the skin too, and the recording has its heights, of the frames
+    /// that there is time for.
+    #[arg(long, value_name = "FRAME")]
     pub rest: Option<PathBuf>,
     /// Only these members of the JSON lines, separated by commas: `frame`, `time_s`, `status`, `problems`, `age_ms` and
     /// `dropped` are always there.
@@ -51,12 +52,14 @@ pub struct LiveArguments {
     pub tracker: TrackerArguments,
 }
 
-fn rate(text: &str) -> Result<f64, String> {
+/// Frames a second.
+pub fn rate(text: &str) -> Result<f64, String> {
     let number = text.trim().parse().ok().filter(|v: &f64| (0.1..=1000.0).contains(v));
     number.ok_or_else(|| "a number of frames a second from 0.1 to 1000".into())
 }
 
-fn milliseconds(text: &str) -> Result<f64, String> {
+/// An exposure.
+pub fn milliseconds(text: &str) -> Result<f64, String> {
     let number = text.trim().parse().ok().filter(|v: &f64| (0.1..=10_000.0).contains(v));
     number.ok_or_else(|| "a number of ms from 0.1 to 10000".into())
 }

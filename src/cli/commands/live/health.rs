@@ -55,7 +55,7 @@ impl Health {
 }
 
 /// What a problem that stays means; `None` for those that numbers stand beside.
-fn cure(problem: Problem, tracked: &Tracked) -> Option<String> {
+pub fn cure(problem: Problem, tracked: &Tracked) -> Option<String> {
     let other = "name the constants.json of the sensor that is before the camera";
     Some(match problem {
         Problem::Unreadable => "no frame can be read: look at the cable, or ask for another rate".into(),

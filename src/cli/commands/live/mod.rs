@@ -5,7 +5,6 @@ mod health;
 mod session;
 mod terminal;
 
-use std::io::{self, BufReader};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -16,14 +15,16 @@ use domecast_files::StopWish;
 use domecast_live::decode::picture;
 use domecast_live::frame_files::read_whole;
 use domecast_live::page::LivePage;
-use domecast_live::source::{CameraRequest, LiveSource, PictureStream, Player, PlayerOptions, open_camera};
+use domecast_live::record::HeightReader;
+use domecast_live::source::{CameraRequest, ControlRequest, LiveSource, open_device as open_named};
 use domecast_live::{LiveEvent, LiveReader};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeFromColor, ShapeOptions};
 use domecast_runtime::track::{CameraFrame, Tracker};
 use session::Session;
 
-pub use arguments::LiveArguments;
+pub use arguments::{LiveArguments, milliseconds, rate};
+pub use health::cure as cure_of;
 
 /// Frames that wait at most: what is older than that is no longer live.
 const MAX_WAITING: usize = 4;
@@ -34,20 +35,22 @@ const STALLED: Duration = Duration::from_secs(1);
 
 const DEVICES: &str = "a camera such as /dev/video0, - for PPM pictures, or player:FOLDER";
 
-fn open_source(arguments: &LiveArguments, constants: &Constants) -> Result<Box<dyn LiveSource>, Failure> {
-    let device = arguments.device.as_str();
-    let fault = |problem: String| input_fault(Path::new(device), problem, DEVICES);
-    if device == "-" {
-        return Ok(Box::new(PictureStream::new(BufReader::new(io::stdin()))));
-    }
-    if let Some(spec) = device.strip_prefix("player:") {
-        let (folder, options) = PlayerOptions::parse(spec).map_err(fault)?;
-        let player = Player::open(&folder, options);
-        return Ok(Box::new(player.map_err(|problem| input_fault(&folder, problem, "a folder of frames"))?));
-    }
+/// A device as it is named on the command line.
+#[derive(Debug, Clone)]
+pub struct Device<'a> {
+    /// Such as `/dev/video0`, `-`, `player:FOLDER`.
+    pub name: &'a str,
+    /// Frames a second that a camera is asked for.
+    pub rate_hz: f64,
+    /// What is wanted of a camera's controls.
+    pub controls: ControlRequest,
+}
+
+/// Opens a device for the frames of a sensor.
+pub fn open_device(device: &Device, constants: &Constants) -> Result<Box<dyn LiveSource>, Failure> {
     let size = [constants.camera.width, constants.camera.height];
-    let request = CameraRequest { size, rate_hz: arguments.rate, controls: arguments.controls() };
-    open_camera(Path::new(device), request).map_err(fault)
+    let request = CameraRequest { size, rate_hz: device.rate_hz, controls: device.controls };
+    open_named(device.name, request).map_err(|problem| input_fault(Path::new(device.name), problem, DEVICES))
 }
 
 /// Frames of another size say nothing, and never will.
@@ -78,6 +81,13 @@ fn skin_of(
     tracker: &Tracker,
 ) -> Result<Option<ShapeFromColor>, Failure> {
     let Some(rest) = &arguments.rest else { return Ok(None) };
+    if arguments.show.is_none() && arguments.record.is_none() {
+        return Err(input_fault(
+            rest,
+            "is of no use: nothing shows or records the skin",
+            "--show or --record",
+        ));
+    }
     let fault = |path: &Path, problem: String| input_fault(path, problem, "what shape from colour needs");
     let shape = ShapeFromColor::new(constants, tracker, ShapeOptions::default());
     let mut shape = shape.map_err(|error| fault(&arguments.constants, error.to_string()))?;
@@ -96,11 +106,13 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
     let unfit = |problem: String| input_fault(&arguments.constants, problem, "constants of a sensor");
     let tracker = Tracker::new(&constants, arguments.tracker.options()).map_err(|e| unfit(e.to_string()))?;
     let skin = skin_of(arguments, &constants, &tracker)?;
-    let source = open_source(arguments, &constants)?;
+    let device = Device { name: &arguments.device, rate_hz: arguments.rate, controls: arguments.controls() };
+    let source = open_device(&device, &constants)?;
     check_size(&*source, arguments, &constants)?;
     let page = match arguments.show {
         Some(port) => {
-            Some(LivePage::start(port, *tracker.optics().rest_from_camera(), skin).map_err(|error| {
+            let shown = skin.clone();
+            Some(LivePage::start(port, *tracker.optics().rest_from_camera(), shown).map_err(|error| {
                 let problem = format!("cannot be used ({error})");
                 input_fault(
                     Path::new(&format!("--show {port}")),
@@ -116,9 +128,12 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
     let begin =
         |path: &std::path::PathBuf| Recording::begin(output, path, "live", &rules, &constants, &tracker);
     let recording = arguments.record.as_ref().map(begin).transpose()?;
+    let heights = skin.filter(|_| recording.is_some()).map(HeightReader::start).transpose();
+    let heights = heights.map_err(Failure::Print)?;
     // the first Ctrl-C ends the reading in good order, with the recording's index and the summary
     let wish = StopWish::heed();
-    let mut session = Session::begin(output, arguments, tracker, source.info(), page, recording)?;
+    let mut session =
+        Session::begin(output, arguments, tracker, source.info(), page, recording.map(|r| (r, heights)))?;
     let reader = LiveReader::start(source, MAX_WAITING).map_err(Failure::Print)?;
     let mut heard = Instant::now();
     let mut is_stalled = false;

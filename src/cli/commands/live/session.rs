@@ -15,6 +15,7 @@ use crate::commands::recording::{Recording, recorded};
 use domecast_live::AgeStatistics;
 use domecast_live::decode::Picture;
 use domecast_live::page::{LivePage, LiveReading};
+use domecast_live::record::HeightReader;
 use domecast_live::source::{ArrivedFrame, SourceInfo};
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker, write_json_fields};
 use std::sync::Arc;
@@ -29,6 +30,8 @@ pub struct Session<'a> {
     tracker: Tracker,
     page: Option<LivePage>,
     recording: Option<Recording>,
+    /// What measures the skin for the recording.
+    heights: Option<HeightReader>,
     is_recording_lost: bool,
     view: Option<TerminalView>,
     head: String,
@@ -74,8 +77,9 @@ impl<'a> Session<'a> {
         tracker: Tracker,
         info: &SourceInfo,
         page: Option<LivePage>,
-        recording: Option<Recording>,
+        recording: Option<(Recording, Option<HeightReader>)>,
     ) -> Result<Self, Failure> {
+        let (recording, heights) = recording.unzip();
         let is_seen = io::stdout().is_terminal() && !output.is_json();
         let began = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let url = page.as_ref().map(LivePage::url);
@@ -85,6 +89,7 @@ impl<'a> Session<'a> {
             tracker,
             page,
             recording,
+            heights: heights.flatten(),
             is_recording_lost: false,
             view: is_seen.then(TerminalView::default),
             head: head(info),
@@ -169,7 +174,7 @@ impl<'a> Session<'a> {
         self.age_ms = 1e3 * age.as_secs_f64();
         self.keep_pace(frame.complete);
         let file = frame.file.as_deref().filter(|_| !is_mirrored);
-        self.record(frame, seen.as_ref().ok().copied(), file)?;
+        self.record(frame, seen.as_ref().ok().copied(), file, decoded.as_ref().ok())?;
         self.look(frame.complete, decoded.ok())
     }
 
@@ -191,10 +196,19 @@ impl<'a> Session<'a> {
         frame: &ArrivedFrame,
         seen: Option<CameraFrame<'_>>,
         file: Option<&[u8]>,
+        picture: Option<&Arc<Picture>>,
     ) -> Result<(), Failure> {
         let Some(recording) = &mut self.recording else { return Ok(()) };
         let time_ns = self.began_ns.saturating_add((1e9 * frame.time_s).max(0.0) as u64);
-        let added = recording.add(time_ns, recorded(seen, file), self.tracker.result(), None);
+        let mut added = recording.add(time_ns, recorded(seen, file), self.tracker.result(), None);
+        if let Some(heights) = &mut self.heights {
+            if let Some(picture) = picture {
+                heights.offer(time_ns, picture, self.tracker.result());
+            }
+            while let (Ok(()), Some((time_ns, map))) = (&added, heights.take()) {
+                added = recording.add_height(time_ns, &map);
+            }
+        }
         if let Err(failure) = added {
             // reading goes on: a full disk must not stop a robot
             self.recording = None;
@@ -266,7 +280,10 @@ impl<'a> Session<'a> {
 
     /// The summary.
     pub fn end(mut self) -> Result<(), Failure> {
-        if let Some(recording) = self.recording.take() {
+        if let Some(mut recording) = self.recording.take() {
+            for (time_ns, map) in self.heights.take().into_iter().flat_map(HeightReader::finish) {
+                recording.add_height(time_ns, &map)?;
+            }
             recording.end()?;
         }
         let ms = |share| self.ages.quantile_ms(share).map(|ms| (1e3 * ms).round() / 1e3);

@@ -5,11 +5,14 @@
 //! with compression) is the simplest within one standard error of the best in five-fold cross-validation. Noise of the
 //! displacements is taken out of the coefficients.
 //!
+//! Of a few known loads, [`SpringKnowledge`] says what they leave open beside the springs' geometry, and what another would say.
+//!
 //! [`examine_pairs`] and [`examine_fit`] ask whether table and fit can be this sensor's, and name the mistake if not.
 
 mod apply;
 mod choice;
 mod fit;
+mod knowledge;
 mod motion;
 mod plausibility;
 mod reference;
@@ -21,6 +24,7 @@ mod transformations;
 mod types;
 
 pub use fit::fit;
+pub use knowledge::{KnownLoad, SpringKnowledge};
 pub use plausibility::examine_pairs;
 pub use stiffness_check::examine_fit;
 pub use types::{AxisFit, ForceError, ForceFit, ForceModel, MotionNoise, Pair};

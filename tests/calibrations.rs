@@ -146,6 +146,13 @@ fn the_wizard_learns_from_a_load_refuses_a_wrong_one_and_goes_on() {
     let (code, wrong) = answer("weight 50 kg +x at pole");
     assert_eq!(code, Some(1));
     assert!(wrong["error"]["problem"].as_str().expect("words").contains("g instead of kg"), "{wrong}");
+    for words in
+        ["50 ounces +x at pole", "50 g sideways at pole", "50 g +x", "-1 g +x at pole", "50 g +x at 1,2"]
+    {
+        let (code, wrong) = answer(&format!("weight {words}"));
+        let problem = wrong["error"]["problem"].as_str().unwrap_or_default().to_owned();
+        assert!(code == Some(1) && problem.contains("the form is weight MASS UNIT"), "{words}: {wrong}");
+    }
     assert_eq!(fs::read(bench.path("session/session.json")).expect("an index"), index);
     let (code, done) = answer("weight 50 g +x at pole\ndone");
     assert_eq!(code, Some(0), "{done}");

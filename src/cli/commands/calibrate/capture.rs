@@ -10,11 +10,9 @@ use crate::commands::output::Failure;
 use domecast_live::decode::{Picture, PictureFormat, picture, png_of};
 use domecast_live::frame_files::{numbered, pictures_in, read_whole};
 use domecast_live::{LiveEvent, LiveReader};
-use domecast_runtime::calibrate::detect::Detector;
 use domecast_runtime::calibrate::optics::{Kind, Observation};
 use domecast_runtime::constants::Constants;
-use domecast_runtime::frames::Gray;
-use domecast_runtime::track::{CameraFrame, TrackOptions, Tracker};
+use domecast_runtime::track::{CameraFrame, MarkState, TrackOptions, Tracked, Tracker};
 
 /// A device that gives no frame for so long is not waited for.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -109,6 +107,17 @@ fn of_device(wish: &FrameWish, constants: &Constants) -> Result<Vec<(Vec<u8>, Pi
     Ok(found)
 }
 
+/// The marks of a frame that the tracker is sure of, as it will see them in use.
+fn marks_of(tracked: &Tracked, frame: usize) -> Vec<Observation> {
+    let one = |kind: Kind, id: u32, state: MarkState, centroid_px: Option<glam::DVec2>| {
+        let centroid_px = centroid_px.filter(|_| state == MarkState::Ok)?;
+        Some(Observation { frame, kind, id: id as usize, centroid_px })
+    };
+    let white = tracked.white_markers.iter().map(|m| one(Kind::White, m.id, m.state, m.centroid_px));
+    let black = tracked.black_dots.iter().map(|d| one(Kind::Black, d.id, d.state, d.centroid_px));
+    white.chain(black).flatten().collect()
+}
+
 /// Takes the frames of a step and finds their marks.
 pub fn take(wish: &FrameWish, constants: &Constants) -> Result<Taken, Failure> {
     let folder = Path::new(wish.device.name);
@@ -120,7 +129,6 @@ pub fn take(wish: &FrameWish, constants: &Constants) -> Result<Taken, Failure> {
     };
     let fault = |problem: String| input_fault(&place, problem, FRAMES);
     let mut tracker = Tracker::new(constants, TrackOptions::default()).map_err(|e| fault(e.to_string()))?;
-    let detector = Detector::new(constants).map_err(|e| fault(e.to_string()))?;
     let mut taken = Taken { frames: Vec::new(), marks: Vec::new() };
     for (number, (bytes, picture)) in found.into_iter().enumerate() {
         let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
@@ -129,9 +137,16 @@ pub fn take(wish: &FrameWish, constants: &Constants) -> Result<Taken, Failure> {
         if let Some(what) = tracked.problems.iter().find_map(|problem| cure_of(problem, tracked)) {
             return Err(fault(format!("frame {number}: {what}")));
         }
-        let gray = Gray::from_png(&bytes).map_err(|e| fault(format!("frame {number}: {e}")))?;
-        let marks = detector.observe(&gray, number).map_err(|e| fault(format!("frame {number} {e}")))?;
-        taken.marks.extend(marks.observations);
+        let marks = marks_of(tracked, number);
+        let (found, wanted) =
+            (marks.iter().filter(|mark| mark.kind == Kind::White).count(), constants.white_markers.len());
+        if found < wanted {
+            let problem = format!(
+                "frame {number} shows {found} of {wanted} white markers clearly; clean the sheet, see that nothing covers it"
+            );
+            return Err(fault(problem));
+        }
+        taken.marks.extend(marks);
         taken.frames.push(bytes);
     }
     still(&taken.marks, constants).map_err(&fault)?;

@@ -46,7 +46,7 @@ pub struct CalibrateArguments {
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(2..=200))]
     frames: u16,
     /// How far a load may be off what is said of it: a part of the weight, degrees of its direction, mm of its place.
-    #[arg(long, value_name = "PART,DEG,MM", default_value = "0.005,1,0.3", value_parser = load_sd)]
+    #[arg(long, value_name = "PART,DEG,MM", default_value = "0.005,1,0.5", value_parser = load_sd)]
     load_sd: LoadNoise,
     /// Frames a second that a camera is asked for.
     #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = super::live::rate)]

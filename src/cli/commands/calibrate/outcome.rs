@@ -130,7 +130,10 @@ fn fit_optics(constants: &Constants, steps: &[Step]) -> Result<Option<OpticsFit>
     let mut first = frames_of(&all);
     let rest_frames = first;
     for step in at_rest.chain(steps.iter().filter(|step| kind_of(step) == "weight")) {
-        all.extend(renumbered(&step.marks, first, OPTICS_FRAMES));
+        // a load that touches the dome moves its dots: then the markers alone say where the platform is
+        let is_touched = kind_of(step) != "rest";
+        let seen = renumbered(&step.marks, first, OPTICS_FRAMES);
+        all.extend(seen.filter(|mark| mark.kind == Kind::White || !is_touched));
         first += OPTICS_FRAMES;
     }
     fit(constants, &all, &priors, rest_frames).map(Some).map_err(|error| error.to_string())

@@ -23,6 +23,9 @@ pub struct Taking<'a> {
     pub said: &'a str,
 }
 
+/// A step and its frames as PNG, or why it is refused.
+type TakenStep = Result<(Step, Vec<Vec<u8>>), Failure>;
+
 /// A step of the wizard.
 pub struct StepKind {
     /// The word that takes it.
@@ -35,7 +38,7 @@ pub struct StepKind {
     pub after: Option<&'static str>,
     /// A step after which it cannot be taken any more.
     pub before: Option<&'static str>,
-    take: fn(&Taking, &str) -> Result<(Step, Vec<Vec<u8>>), Failure>,
+    take: fn(&Taking, &str) -> TakenStep,
 }
 
 /// In the order in which they are taken.
@@ -67,7 +70,7 @@ pub const STEPS: [StepKind; 3] = [
 ];
 
 /// Takes the step that the answer names.
-pub fn take(taking: &Taking, kind: &StepKind, earlier: &[&str]) -> Result<(Step, Vec<Vec<u8>>), Failure> {
+pub fn take(taking: &Taking, kind: &StepKind, earlier: &[&str]) -> TakenStep {
     if let Some(after) = kind.after.filter(|after| !earlier.contains(after)) {
         return Err(refused(taking, format!("comes after {after}"), "the steps in their order"));
     }
@@ -82,7 +85,7 @@ fn refused(taking: &Taking, problem: String, allowed: &str) -> Failure {
     input_fault(Path::new(taking.said), problem, allowed)
 }
 
-fn take_lens(taking: &Taking, name: &str) -> Result<(Step, Vec<Vec<u8>>), Failure> {
+fn take_lens(taking: &Taking, name: &str) -> TakenStep {
     let [file] = taking.words else {
         return Err(refused(taking, "names no file, or more than one".into(), "lens FILE"));
     };
@@ -91,14 +94,14 @@ fn take_lens(taking: &Taking, name: &str) -> Result<(Step, Vec<Vec<u8>>), Failur
     Ok((step, Vec::new()))
 }
 
-fn take_frames(taking: &Taking, name: &str) -> Result<(Step, Vec<Vec<u8>>), Failure> {
+fn take_frames(taking: &Taking, name: &str) -> TakenStep {
     let wish = FrameWish { device: taking.device.clone(), step: name, count: taking.frames };
     let taken = capture::take(&wish, taking.constants)?;
     let step = Step { name: name.into(), said: taking.said.into(), marks: taken.marks, camera: None };
     Ok((step, taken.frames))
 }
 
-fn take_weight(taking: &Taking, name: &str) -> Result<(Step, Vec<Vec<u8>>), Failure> {
+fn take_weight(taking: &Taking, name: &str) -> TakenStep {
     let form = "MASS UNIT DIRECTION at PLACE";
     loads::parse(taking.words, taking.constants).map_err(|problem| refused(taking, problem, form))?;
     take_frames(taking, name)

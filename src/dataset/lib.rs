@@ -30,6 +30,6 @@ pub use draw::PairDraw;
 pub use index::{FORMAT, INDEX_NAME};
 pub use make::{Maker, Shard};
 pub use read::{StoredSet, StoredVideo};
-pub use readings::COLUMNS;
+pub use readings::{COLUMNS, SeenDot, dots_features};
 pub use record::Made;
 pub use splits::split_of_slice;

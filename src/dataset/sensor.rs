@@ -13,6 +13,8 @@ use domecast_sim::{Plan, Scene, SimError, elastomer_of};
 
 /// Streams of the sensors' random numbers.
 const STREAM_SENSOR: u64 = 1 << 40;
+/// Draws of a sensor: what the rules of designs forbid (a marker under the dome's rim) no maker ships.
+const MAX_ATTEMPTS: u64 = 8;
 /// No sensor is further off than this many standard deviations: makers measure what they ship.
 const MAX_SD: f64 = 2.0;
 /// What sensors as built may be larger than the room that their design has, mm.
@@ -68,13 +70,24 @@ struct Print {
 }
 
 impl Dataset {
-    /// Builds a sensor by its number.
+    /// Builds a sensor by its number; one that cannot be is drawn again.
     ///
     /// # Errors
-    /// A design whose tolerances make a sensor that cannot be; lights or an elastomer that cannot be computed.
+    /// A design whose tolerances make sensors that cannot be; lights or an elastomer that cannot be computed.
     pub fn build_sensor(&self, sensor: u32) -> Result<BuiltSensor, SimError> {
-        let mut deviations =
-            Deviations(SeededRandom::stream(self.spec.seed, STREAM_SENSOR | u64::from(sensor)));
+        let mut attempt = 0;
+        loop {
+            attempt += 1;
+            match self.attempt_sensor(sensor, attempt - 1) {
+                Err(SimError::Input(_)) if attempt < MAX_ATTEMPTS => {}
+                built => return built,
+            }
+        }
+    }
+
+    fn attempt_sensor(&self, sensor: u32, attempt: u64) -> Result<BuiltSensor, SimError> {
+        let stream = STREAM_SENSOR | attempt << 32 | u64::from(sensor);
+        let mut deviations = Deviations(SeededRandom::stream(self.spec.seed, stream));
         let built = self.built_file(&mut deviations);
         let own = self.own(sensor, &built, &mut deviations);
         let meant = self.scene_of(self.design.sections(), self.scale(), &own)?;

@@ -8,8 +8,9 @@ use crate::tokens::tokens;
 use crate::{assert_none, crates, members, short, text, workspace};
 
 /// The crates from the ground up; each may depend on those named beside it and on no others of ours.
-const CRATES: [(&str, &[&str]); 15] = [
+const CRATES: [(&str, &[&str]); 16] = [
     ("files", &[]),
+    ("hardness", &[]),
     ("optics", &[]),
     ("mesh", &[]),
     ("light", &["optics"]),
@@ -25,8 +26,8 @@ const CRATES: [(&str, &[&str]); 15] = [
     (
         "cli",
         &[
-            "contact", "dataset", "design", "fab", "files", "live", "mesh", "optics", "runtime", "sim",
-            "springs",
+            "contact", "dataset", "design", "fab", "files", "hardness", "live", "mesh", "optics", "runtime",
+            "sim", "springs",
         ],
     ),
     ("python", &["cli", "design", "fab", "files", "optics", "runtime", "sim", "springs"]),

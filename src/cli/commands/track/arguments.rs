@@ -23,6 +23,7 @@ pub enum Format {
 
 /// Arguments of `domecast track`.
 #[derive(Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("read_against_rest").args(["shape", "hardness"]).multiple(true)))]
 pub struct TrackArguments {
     /// A folder of PNG or JPEG frames, frames, a video (through ffmpeg), a file of raw frames (with --raw), or `-` for
     /// standard input (PGM or PPM pictures one after the other, or raw with --raw).
@@ -67,8 +68,15 @@ pub struct TrackArguments {
     /// `.height.png` (16 bits) and `.ply` (the skin as triangles).
     #[arg(long, requires = "rest")]
     pub shape: Option<PathBuf>,
-    /// A frame of the untouched sensor, which the shape is read against.
-    #[arg(long, requires = "shape", value_name = "FRAME")]
+    /// State how hard what is touched is, by this model (ONNX, from `domecast-learn`), over a window of frames: class, Young's
+    /// modulus with its 90 % interval, or `unsure` where the touch is unlike what the model was trained with.
+    #[arg(long, requires = "rest", value_name = "MODEL")]
+    pub hardness: Option<PathBuf>,
+    /// The model sees each so many-th frame: its window should last about as long as the videos that it was trained with.
+    #[arg(long, requires = "hardness", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..), value_name = "N")]
+    pub hardness_every: u64,
+    /// A frame of the untouched sensor, which shape and hardness are read against.
+    #[arg(long, requires = "read_against_rest", value_name = "FRAME")]
     pub rest: Option<PathBuf>,
     /// Raw frames of this size: WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb.
     #[arg(long)]

@@ -1,6 +1,7 @@
 //! `domecast track FRAMES --constants FILE`
 
 mod arguments;
+mod hardness;
 mod pictures;
 mod results;
 mod shape;
@@ -60,8 +61,8 @@ fn warn_without_key(output: &Output, arguments: &TrackArguments, constants: &Con
 
 /// The files that are read: none may be written.
 fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
-    let named =
-        arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times).chain(&arguments.rest);
+    let named = arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times);
+    let named = named.chain(&arguments.rest).chain(&arguments.hardness);
     named.map(PathBuf::as_path).collect()
 }
 

@@ -4,8 +4,10 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use serde_json::Value;
 
 use super::arguments::{Format, TrackArguments};
+use super::hardness::HardnessLines;
 use super::pictures::Pictures;
 use super::shape::ShapeFiles;
 use crate::commands::output::{Failure, Output};
@@ -77,11 +79,20 @@ fn write_line(
     }
 }
 
+/// Adds a member to a JSON line, which ends with `}` and a line feed.
+fn add_member(line: &mut Vec<u8>, name: &str, value: &Value) {
+    if line.ends_with(b"}\n") {
+        line.truncate(line.len() - 2);
+        line.extend_from_slice(format!(",\"{name}\":{value}}}\n").as_bytes());
+    }
+}
+
 /// Lines, pictures, maps and the page of a run: all in their places at its end, or none.
 pub(super) struct Results {
     sink: Sink,
     pictures: Pictures,
     shape: Option<ShapeFiles>,
+    hardness: Option<HardnessLines>,
     page: Option<(StagedFile, TrackReport)>,
     recording: Option<Recording>,
     at_mm: DVec3,
@@ -100,6 +111,7 @@ impl Results {
         let at_mm = tracker.springs().map_or(DVec3::ZERO, Springs::at_mm);
         let pictures = Pictures::new(arguments, rules, constants, tracker)?;
         let shape = ShapeFiles::open(arguments, rules, constants, tracker)?;
+        let hardness = HardnessLines::open(arguments, tracker, at_mm)?;
         let sink = Sink::new(arguments.out.as_deref(), rules)?;
         let page = match &arguments.report {
             Some(path) => {
@@ -112,7 +124,7 @@ impl Results {
         // last, for it is there at once
         let begin = |path: &PathBuf| Recording::begin(output, path, "track", rules, constants, tracker);
         let recording = arguments.mcap.as_ref().map(begin).transpose()?;
-        Ok(Self { sink, pictures, shape, page, recording, at_mm, line: Vec::new() })
+        Ok(Self { sink, pictures, shape, hardness, page, recording, at_mm, line: Vec::new() })
     }
 
     /// Writes what stands before the lines.
@@ -146,6 +158,9 @@ impl Results {
         if let (Some(_), Some(shape)) = (frame, &mut self.shape) {
             let line = (arguments.format == Format::Jsonl).then_some(&mut self.line);
             shape.write(number, line, forces.as_deref_mut())?;
+        }
+        if let Some(member) = self.hardness.as_mut().and_then(|lines| lines.member(frame, tracked)) {
+            add_member(&mut self.line, "hardness", &member);
         }
         self.sink.put(&self.line)?;
         let skin = frame.and(self.shape.as_ref()).map(ShapeFiles::map);

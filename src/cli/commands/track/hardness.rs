@@ -1,0 +1,186 @@
+//! `track --hardness`: what a model reads from the frames and from what is tracked in them.
+
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+use serde_json::{Value, json};
+
+use super::arguments::{Format, TrackArguments};
+use crate::commands::input::input_fault;
+use crate::commands::output::Failure;
+use domecast_dataset::{SeenDot, dots_features};
+use domecast_hardness::{FrameView, HardnessEstimate, HardnessReader, Unsure};
+use domecast_live::decode;
+use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
+use domecast_springs::Displacement;
+
+/// Readings that a model may ask for, by their names in a data set: six of the wrench, six of the platform, three of the dots.
+const KNOWN: [&str; 15] = [
+    "fx_n",
+    "fy_n",
+    "fz_n",
+    "mx_nmm",
+    "my_nmm",
+    "mz_nmm",
+    "tx_mm",
+    "ty_mm",
+    "tz_mm",
+    "rx_rad",
+    "ry_rad",
+    "rz_rad",
+    "dots_mean_px",
+    "dots_radial_px",
+    "dots_divergence",
+];
+/// How many of them are no dots'.
+const RIGID: usize = 12;
+
+/// What is tracked of the frame at rest, and is taken off.
+struct Rest {
+    rigid: [f64; RIGID],
+    dots_px: Vec<Option<DVec2>>,
+}
+
+/// A model, and which of the frames it sees.
+pub(super) struct HardnessLines {
+    reader: HardnessReader,
+    /// For each of the model's readings its number in [`KNOWN`].
+    columns: Vec<usize>,
+    rest: Rest,
+    at_mm: DVec3,
+    height_px: f64,
+    every: u64,
+    readings: Vec<f64>,
+    seen: Vec<Option<SeenDot>>,
+}
+
+fn columns(model: &Path, reader: &HardnessReader) -> Result<Vec<usize>, Failure> {
+    let names = reader.metadata().readings.iter().map(|reading| reading.name.as_str());
+    names
+        .map(|name| {
+            let problem = || format!("needs the reading \"{name}\", which `track` does not have");
+            let known = KNOWN.iter().position(|other| *other == name);
+            known.ok_or_else(|| input_fault(model, problem(), &KNOWN.join(", ")))
+        })
+        .collect()
+}
+
+fn view<'a>(frame: &CameraFrame<'a>) -> FrameView<'a> {
+    FrameView {
+        width: frame.width(),
+        height: frame.height(),
+        channels: frame.channels(),
+        bytes: frame.bytes(),
+    }
+}
+
+/// Wrench, and motion of the platform's point about which it is stated; not a number where they are not known.
+fn rigid(tracked: &Tracked, at_mm: DVec3) -> [f64; RIGID] {
+    let (Some(wrench), Some(pose)) = (tracked.wrench, tracked.pose) else { return [f64::NAN; RIGID] };
+    let parts = [wrench.to_array(), Displacement::of_pose(&pose, at_mm).to_array()];
+    std::array::from_fn(|k| parts[k / 6][k % 6])
+}
+
+/// Where each dot would be on the undeformed dome, and how far from there it is seen.
+fn moved_px(tracked: &Tracked) -> impl Iterator<Item = Option<(DVec2, DVec2)>> {
+    tracked.black_dots.iter().map(|dot| {
+        let at_px = dot.undeformed_px?;
+        Some((at_px, dot.image_px? - at_px))
+    })
+}
+
+impl HardnessLines {
+    /// `None` where no model is named.
+    pub(super) fn open(
+        arguments: &TrackArguments,
+        tracker: &Tracker,
+        at_mm: DVec3,
+    ) -> Result<Option<Self>, Failure> {
+        let Some(model) = &arguments.hardness else { return Ok(None) };
+        if arguments.format != Format::Jsonl {
+            return Err(input_fault(model, "has no place in this --format", "--format jsonl"));
+        }
+        let mut reader = HardnessReader::load(model)
+            .map_err(|e| input_fault(model, format!("{}: {}", e.at, e.problem), &e.allowed))?;
+        let columns = columns(model, &reader)?;
+        let Some(path) = &arguments.rest else {
+            let allowed = "--rest FRAME of the untouched sensor";
+            return Err(input_fault(model, "is given without --rest", allowed));
+        };
+        let fault = |problem: String| input_fault(path, problem, "a frame of the untouched sensor");
+        let bytes = std::fs::read(path).map_err(|e| fault(format!("cannot be read: {e}")))?;
+        let mut picture = decode::picture(&bytes).map_err(&fault)?;
+        if arguments.tracker.camera_mirrored {
+            picture.mirror();
+        }
+        let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes)
+            .map_err(|e| fault(e.to_string()))?;
+        if !reader.set_rest(&view(&frame)) {
+            return Err(fault("is not whole".into()));
+        }
+        let mut at_rest = tracker.clone();
+        let tracked = at_rest.track(0, &frame);
+        let rest = Rest {
+            rigid: rigid(tracked, at_mm),
+            dots_px: moved_px(tracked).map(|dot| dot.map(|(_, moved)| moved)).collect(),
+        };
+        if rest.rigid.iter().any(|value| !value.is_finite()) {
+            return Err(fault(format!("has no wrench (status \"{}\")", tracked.status())));
+        }
+        let (every, height_px) = (arguments.hardness_every, frame.height() as f64);
+        let (readings, seen) = (Vec::new(), Vec::new());
+        Ok(Some(Self { reader, columns, rest, at_mm, height_px, every, readings, seen }))
+    }
+
+    /// The frame's numbers as the data sets have them: less those at rest.
+    fn read(&mut self, tracked: &Tracked) {
+        let now = rigid(tracked, self.at_mm);
+        self.seen.clear();
+        self.seen.extend(moved_px(tracked).zip(&self.rest.dots_px).map(|(dot, rest_px)| {
+            let ((at_px, moved_px), rest_px) = dot.zip(*rest_px)?;
+            Some(SeenDot { at_px, moved_px: moved_px - rest_px })
+        }));
+        let [mean, radial, divergence, found] = dots_features(&self.seen, self.height_px);
+        let dots = if found > 0.0 { [mean, radial, divergence] } else { [f64::NAN; 3] };
+        self.readings.clear();
+        self.readings.extend(self.columns.iter().map(|at| match at.checked_sub(RIGID) {
+            None => now[*at] - self.rest.rigid[*at],
+            Some(at) => dots[at],
+        }));
+    }
+
+    /// Takes the frame in; what its line says of hardness, or nothing of a frame that the model does not look at.
+    pub(super) fn member(&mut self, frame: Option<&CameraFrame<'_>>, tracked: &Tracked) -> Option<Value> {
+        if !tracked.frame.is_multiple_of(self.every) {
+            return None;
+        }
+        let whole = frame.filter(|_| tracked.status() == "ok").map(view);
+        if whole.is_none() {
+            self.reader.restart();
+            return Some(Value::Null);
+        }
+        self.read(tracked);
+        let found = self.reader.push(whole.as_ref(), &self.readings);
+        Some(found.map_or(Value::Null, |found| self.stated(found)))
+    }
+
+    fn stated(&self, found: Result<HardnessEstimate, Unsure>) -> Value {
+        match found {
+            Ok(found) => {
+                let modulus = self.reader.states_modulus();
+                json!({
+                    "status": "ok",
+                    "class": self.reader.class(found.class).map(|class| class.name.as_str()),
+                    "probability": found.probability,
+                    "log10_youngs_modulus_mpa": modulus.then_some(found.log10_e_mpa),
+                    "interval_90": modulus.then_some(found.interval),
+                })
+            }
+            Err(unsure) => json!({
+                "status": "unsure",
+                "reason": self.reader.reason(unsure),
+                "class": null, "probability": null, "log10_youngs_modulus_mpa": null, "interval_90": null,
+            }),
+        }
+    }
+}

@@ -10,6 +10,8 @@ use crate::picture::REST_NUMBERS;
 /// The metadata's key in the ONNX file.
 pub const METADATA_KEY: &str = "domecast_hardness";
 const VERSION: u32 = 1;
+/// What a class must have to be stated alone, as the intervals of a modulus hold nine of ten.
+const MIN_PROBABILITY: f64 = 0.9;
 
 /// A class that a model tells apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -84,6 +86,11 @@ impl Metadata {
             .map_err(|e| ModelError::new(at(), e.to_string(), "JSON as `domecast-learn` writes it"))?;
         metadata.check(network)?;
         Ok(metadata)
+    }
+
+    /// Whether a model of classes alone has none to state: the likeliest is less probable than [`MIN_PROBABILITY`].
+    pub fn is_undecided(&self, probability: f64) -> bool {
+        self.interval_quantile == 0.0 && probability < MIN_PROBABILITY
     }
 
     /// The first number of a picture at rest that is farther from those of the training than half of their own range, and than a

@@ -23,6 +23,8 @@ pub enum Unsure {
     /// This number of the picture at rest is out of the range of the sensors that were trained with: 0 its level (light), else
     /// a block of it (lens, dome).
     Rest(usize),
+    /// No class is probable enough, and the model states no modulus.
+    Undecided,
     /// The modulus would be out of the range that was trained with.
     Modulus,
     /// The network's numbers are not finite.
@@ -169,6 +171,9 @@ impl HardnessReader {
                 (class, probability) = (at, f64::from(*value));
             }
         }
+        if self.metadata.is_undecided(probability) {
+            return Err(Unsure::Undecided);
+        }
         let log10_e_mpa = f64::from(numbers("log10_e")[0]);
         let half = self.metadata.interval_quantile * f64::from(numbers("log10_e")[1]).exp();
         if self.states_modulus() && outside(log10_e_mpa, self.metadata.log10_e_range) {
@@ -202,6 +207,7 @@ impl HardnessReader {
             Unsure::Reading(at) => format!("out_of_range_{}", name(at)),
             Unsure::Rest(0) => "out_of_range_light".into(),
             Unsure::Rest(_) => "unlike_training_rest".into(),
+            Unsure::Undecided => "undecided".into(),
             Unsure::Modulus => "out_of_range_modulus".into(),
             Unsure::NotFinite => "not_finite".into(),
         }

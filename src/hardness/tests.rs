@@ -73,6 +73,10 @@ fn view(bytes: &[u8]) -> FrameView<'_> {
 }
 
 fn model() -> Vec<u8> {
+    model_of(1.6)
+}
+
+fn model_of(interval_quantile: f64) -> Vec<u8> {
     let reading = |name: &str, range| ModelReading { name: name.into(), range };
     let levels: Vec<f32> = frame(100).iter().map(|level| f32::from(*level)).collect();
     let profile = rest_profile(&levels, [SIDE, SIDE]);
@@ -87,7 +91,7 @@ fn model() -> Vec<u8> {
         ],
         rest_ranges: profile.map(|value| [0.9 * value, 1.1 * value]).to_vec(),
         log10_e_range: [-3.0, 3.0],
-        interval_quantile: 1.6,
+        interval_quantile,
         novelty_limits: vec![1e3],
         novelty_names: vec!["features".into()],
         training: serde_json::Value::Null,
@@ -154,6 +158,19 @@ fn what_is_unlike_the_training_is_unsure() {
     turned[SIDE * SIDE * 3 / 2..].iter_mut().for_each(|level| *level += 40);
     assert!(reader.set_rest(&view(&turned)));
     assert_eq!(unsure(&mut reader, &TOUCH), "unlike_training_rest");
+}
+
+#[test]
+fn a_class_that_is_no_more_than_a_guess_is_not_stated_alone() {
+    let mut reader = reader();
+    let bytes = frame(110);
+    let found = (0..WINDOW).map(|_| reader.push(Some(&view(&bytes)), &TOUCH)).last().flatten();
+    let probability = found.and_then(Result::ok).expect("it states the modulus").probability;
+    assert!(probability < 0.9, "{probability}");
+    let mut reader = HardnessReader::new(&model_of(0.0)).expect("a model of classes");
+    assert!(reader.set_rest(&view(&frame(100))) && !reader.states_modulus());
+    assert_eq!(stated(&mut reader, 110, &TOUCH), Some(Err(Unsure::Undecided)));
+    assert_eq!(reader.reason(Unsure::Undecided), "undecided");
 }
 
 #[test]

@@ -98,14 +98,18 @@ fn share(right: usize, count: usize) -> Value {
     json!({ "right": right, "of": count, "part": right as f64 / count.max(1) as f64, "wilson_95": wilson(right, count) })
 }
 
-/// Whether a video is of the kind that was trained with, by the model's own limits.
-pub fn is_familiar(row: &Row, video: &Video, metadata: &Metadata) -> bool {
+/// Whether `track` would state the video's hardness, by the model's own limits.
+pub fn is_stated(row: &Row, video: &Video, metadata: &Metadata) -> bool {
     let rest_fits = metadata.foreign_rest(&video.rest).is_none();
     let near =
         row.third.iter().zip(&metadata.novelty_limits).all(|(value, limit)| f64::from(*value) <= *limit);
     let first = video.readings.len() - metadata.readings.len();
     let readings = video.readings[first..].iter().zip(&metadata.readings);
-    rest_fits && near && readings.into_iter().all(|(value, reading)| reading.allows(f64::from(*value)))
+    let decided = !metadata.is_undecided(f64::from(row.probability[row.class()]));
+    rest_fits
+        && near
+        && decided
+        && readings.into_iter().all(|(value, reading)| reading.allows(f64::from(*value)))
 }
 
 fn reliability(rows: &[Row], videos: &[&Video]) -> (Vec<Value>, f64) {
@@ -145,7 +149,7 @@ fn modulus(rows: &[Row], videos: &[&Video], quantile: f64) -> Value {
 pub fn judgement(rows: &[Row], videos: &[&Video], set: &DataSet, metadata: &Metadata) -> Value {
     let right = |row: &Row, video: &Video| row.class() == video.label;
     let pairs = || rows.iter().zip(videos);
-    let stated: Vec<_> = pairs().filter(|(row, video)| is_familiar(row, video, metadata)).collect();
+    let stated: Vec<_> = pairs().filter(|(row, video)| is_stated(row, video, metadata)).collect();
     let mut confusion = vec![vec![0_usize; set.classes.len()]; set.classes.len()];
     let mut shapes: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
     for (row, video) in pairs() {

@@ -13,7 +13,7 @@ Then, beside the test's own packages,
 
 - random wrong inputs end in exceptions, never in a panic (`python/wrong_inputs.py`);
 - stubs and examples are clean under `pyright` and `mypy --strict`, and the examples and notebooks run;
-- the simulators' side is judged by MuJoCo and gymnasium (`python/simulators.py`).
+- the simulators' side is judged by MuJoCo and gymnasium (`python/simulators.py`), the ROS 2 node beside a stub of rclpy (`python/ros_node.py`).
 
 Times are printed and judged nowhere. --all: more frames, more wrong inputs.
 """
@@ -154,6 +154,7 @@ def main():
         inputs = asked.inputs or (20_000 if asked.all else 3_000)
         run(sys.executable, HERE / "wrong_inputs.py", constants, REPOSITORY, inputs, env=beside, cwd=base)
         run(sys.executable, HERE / "run_notebooks.py", REPOSITORY, base / "notebooks", env=beside)
+        run(sys.executable, HERE / "ros_node.py", constants, base / "work/simulated-push", env=beside, cwd=base)
         if (HERE / "simulators.py").exists():
             run(sys.executable, HERE / "simulators.py", REPOSITORY, env=beside, cwd=base)
     print("python: 0 faults")

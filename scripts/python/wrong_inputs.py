@@ -103,6 +103,7 @@ CALLS = {
     "Reading.overlay_png": (lambda a: READING.overlay_png(a[0], rgb=True, magnify=a[1]), some.tuples(frames, words)),
     "Sensor.from_str": (lambda a: domecast.Sensor.from_str(a), some.one_of(some.text(), broken("constants").map(text_of))),
     "Tracker of other constants": (track_other, broken("constants").map(text_of)),
+    "Camera": (lambda a: domecast.Camera(a[0], SENSOR, rate=a[1], exposure_ms=a[2], gain=a[3]), some.tuples(some.one_of(scalars, some.text(max_size=6).map("player:".__add__)), words, words, words)),
     "Sensor.load": (lambda a: domecast.Sensor.load(a), scalars),
     "Design.from_str": (lambda a: domecast.Design.from_str(a), some.one_of(some.text(), anything)),
     "Design edits": (edit, some.one_of(broken("design"), some.dictionaries(some.text(max_size=6), anything, max_size=3))),

@@ -5,6 +5,7 @@
 #![allow(unsafe_code)] // pyo3's macros write it; no line of this crate does
 
 mod arrays;
+mod camera;
 mod command;
 mod design;
 mod error;
@@ -40,6 +41,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<scene::PyScene>()?;
     module.add_class::<scene::PyFrames>()?;
     module.add_class::<live::PyLive>()?;
+    module.add_class::<camera::PyCamera>()?;
     module.add_function(wrap_pyfunction!(command::main, module)?)?;
     module.add_function(wrap_pyfunction!(command::call, module)?)?;
     module.add_function(wrap_pyfunction!(command::write_text, module)?)?;

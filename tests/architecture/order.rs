@@ -30,7 +30,7 @@ const CRATES: [(&str, &[&str]); 16] = [
             "sim", "springs",
         ],
     ),
-    ("python", &["cli", "design", "fab", "files", "optics", "runtime", "sim", "springs"]),
+    ("python", &["cli", "design", "fab", "files", "live", "optics", "runtime", "sim", "springs"]),
 ];
 
 /// Where data runs through stages: the crate, the folder of the stages, and they in order.

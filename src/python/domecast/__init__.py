@@ -8,13 +8,14 @@
 
 Lengths are mm, angles rad unless a name says deg, forces N, torques N mm, pixels px with the centre of the top-left one at
 (0, 0). Faults are `DomecastError`, with the field. A `Tracker`, a `Shape` and a `Traction` serve one thread each; the rest is
-free to share. `domecast.mujoco` and `domecast.gym` are for simulators.
+free to share. `domecast.mujoco` and `domecast.gym` are for simulators, `domecast.ros` is a node of ROS 2.
 """
 
 from ._commands import accuracy, calibrate_force, calibrate_optics, calibrate_print, main
 from ._design import Design, Optics
 from ._error import DomecastError
 from ._native import (
+    Camera,
     Forces,
     Layout,
     Reading,
@@ -28,6 +29,7 @@ from ._native import (
 from ._scene import Scene
 
 __all__ = [
+    "Camera",
     "Design",
     "DomecastError",
     "Forces",

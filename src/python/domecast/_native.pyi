@@ -271,6 +271,28 @@ class Forces:
         """The line that `domecast track --traction` writes of this frame."""
 
 @final
+class Camera:
+    """A camera of Linux with exposure, gain and white balance locked, or `player:FOLDER?rate=60`: frames as they come, the newest first where
+    the caller falls behind."""
+
+    def __new__(
+        cls,
+        device: str,
+        sensor: Sensor,
+        *,
+        rate: float = 30.0,
+        exposure_ms: float | None = None,
+        gain: int | None = None,
+        white_balance_k: int | None = None,
+    ) -> Camera:
+        """The options are those of `domecast live`. A device that goes is opened again; damaged frames are left out."""
+
+    def __iter__(self) -> Camera: ...
+    def __next__(self) -> tuple[Bytes, float, int]:
+        """A frame (uint8, red first; (height, width) of grey), when it was taken (s since the device was opened), and its number: one that is
+        missing before it never came."""
+
+@final
 class NativeScene:
     @staticmethod
     def load(path: Path, frames: int | None, seed: int | None) -> NativeScene: ...

@@ -93,12 +93,15 @@ impl Metadata {
         self.interval_quantile == 0.0 && probability < MIN_PROBABILITY
     }
 
-    /// The first number of a picture at rest that is farther from those of the training than half of their own range, and than a
-    /// fiftieth of the largest: a few sensors do not show all that their tolerances allow.
+    /// The first number of a picture at rest that is beyond those of the training: the light, which differs from video to video, by a
+    /// twentieth of their range; its form, of which a few sensors do not show all that their tolerances allow, by half of it; either by a
+    /// fiftieth of the largest in any case.
     pub fn foreign_rest(&self, profile: &[f64]) -> Option<usize> {
-        self.rest_ranges.iter().zip(profile).position(|([low, high], value)| {
-            let margin = (0.5 * (high - low)).max(0.02 * high.abs());
-            !(low - margin..=high + margin).contains(value)
+        let mut ranges = self.rest_ranges.iter().zip(profile).enumerate();
+        ranges.find_map(|(at, ([low, high], value))| {
+            let part = if at == 0 { 0.05 } else { 0.5 };
+            let margin = (part * (high - low)).max(0.02 * high.abs());
+            (!(low - margin..=high + margin).contains(value)).then_some(at)
         })
     }
 

@@ -106,6 +106,9 @@ fn take_lens(constants: &mut Constants, text: &str) -> Result<String, String> {
     for dot in &mut constants.black_dots {
         place(dot.surface_mm, &mut dot.image_px)?;
     }
+    if let Some(key) = &mut constants.key {
+        place(key.surface_mm, &mut key.image_px)?;
+    }
     Ok(format!(
         "the camera's own calibration moves marks by up to {moved_px:.1} px against the design's lens"
     ))

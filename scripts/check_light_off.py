@@ -97,8 +97,7 @@ def one(domecast, work, design, constants, change):
     file = off_design(design, change, work)
     true = true_constants(file, constants, work / f"{file.stem}-true.json")
     level = 0.9 * json.loads((work / design / "report/light.json").read_text())["level_per_mw_mm2"]
-    optics = json.loads(true.read_text())["optics"]
-    dome = {"radius": optics["dome_radius_mm"], "center_z": optics.get("dome_center_z_mm", 0.0)}
+    dome = judge.dome_of(true)
     scale = dome["radius"] / 10
     label = f"{design}, {change['name']}"
     rest = judge.drawn(judge.draw(domecast, work / f"{file.stem}-rest", file, level, None))

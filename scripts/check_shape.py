@@ -37,6 +37,13 @@ def ball(radius, polar_deg, azimuth_deg, depth, dome):
              "path": [{"time_s": 0, "position_mm": at.tolist()}]}]
 
 
+def dome_of(file):
+    """The dome that presses and errors are measured from."""
+    constants = json.loads(file.read_text())
+    optics = constants["optics"]
+    return {"radius": optics["dome_radius_mm"], "center_z": optics.get("dome_center_z_mm", 0.0), "elastomer": constants["elastomer"]}
+
+
 def nut(depth, dome):
     return [{"name": "nut", "shape": {"kind": "mesh", "file": str(ROOT / "designs/scenes/meshes/nut.stl")},
              "path": [{"time_s": 0, "position_mm": [0, 0, dome["center_z"] + dome["radius"] - depth]}]}]
@@ -70,6 +77,35 @@ PRESSES = {
     "digit-rigid": {"ball at 10 deg": lambda d: ball(4, 10, 100, 0.4, d), "edge": lambda d: edge(0.25, d)},
     "picam-r20": {"ball at 20 deg": lambda d: ball(6, 20, 300, 0.8, d), "nut": lambda d: nut(0.4, d)},
 }
+
+
+# Pixels within 1, 2, 3 deviations, all that are known to 60 degrees, touched or not: a normal number's shares, and by how much they may
+# be off: of one frame, whose errors go together over the dome, from below alone; of a design's frames; of all.
+SHARES = (0.683, 0.954, 0.997)
+ONE, DESIGN, ALL = 0.25, 0.12, 0.06
+deviations = {}
+
+# Touched pixels of a ball that both find, over those that either finds.
+BALL_OVERLAP = 0.82
+
+
+def within(ratio):
+    return np.array([np.mean(ratio <= k) for k in (1, 2, 3)])
+
+
+def shown(shares):
+    return "within 1, 2, 3: " + " ".join(f"{share:.2f}" for share in shares)
+
+
+def check_deviations():
+    """Whether deviations are neither too small nor too large, frames alike."""
+    for design, shares in deviations.items():
+        if len(shares) == 1:
+            continue
+        mean = np.mean(shares, axis=0)
+        check(f"{design}: sd from both sides", all(np.abs(mean - SHARES) <= DESIGN), shown(mean))
+    mean = np.mean([share for shares in deviations.values() for share in shares], axis=0)
+    check("all: sd from both sides", all(np.abs(mean - SHARES) <= ALL), shown(mean))
 
 
 def run(*words):
@@ -133,6 +169,22 @@ def track(domecast, frame, rest, constants, out):
     return json.loads(line.splitlines()[0])
 
 
+def touched(truth, objects, contact, dome):
+    """The pixels that a touch covers. Of a ball the circle that Hertz' formula gives for the force: the simulator's elements of half a
+    millimetre are no outline. Of all else those whose pressure is more than a fiftieth of the largest, which is as coarse as the elements."""
+    shape = objects[0]["shape"]
+    if shape["kind"] != "sphere":
+        pressure = np.load(truth / "frame_0000.pressure.npy")
+        return pressure > 0.02 * np.nanmax(pressure)
+    rubber, force = dome["elastomer"], np.linalg.norm(contact["force_n"])
+    radius = 1 / (1 / shape["radius_mm"] + 1 / dome["radius"])
+    stiffness = rubber["young_modulus_mpa"] / (1 - rubber["poisson_ratio"] ** 2)
+    edge = (0.75 * force * radius / stiffness) ** (1 / 3)
+    away = np.load(truth / "frame_0000.surface.npy") - np.array(contact["point_mm"])
+    axis = np.array(contact["normal"])
+    return np.linalg.norm(np.cross(away, axis), axis=2) < edge
+
+
 def judge(domecast, work, design, name, objects, dome, constants):
     label = f"{design}, {name}"
     folder = work / f"{design}-{name.replace(' ', '-')}"
@@ -158,17 +210,16 @@ def judge(domecast, work, design, name, objects, dome, constants):
     check(f"{label}: height to 60 deg", n60["rms"] <= rms60, f"rms {n60['rms']:.4f} p99 {n60['p99']:.4f} mm, known {n60['known']:.3f}")
     check(f"{label}: normals to 45 deg", n45["normal"] <= turned, f"rms {n45['normal']:.2f} deg; to 60: {n60['normal']:.2f}")
     ratio = (np.abs(e["off"]) / e["sd"])[e["known"] & (e["polar"] <= 60)]
-    inside = [np.mean(ratio <= k) for k in (1, 2, 3)]
-    holds = all(found >= wanted - 0.04 for found, wanted in zip(inside, (0.683, 0.954, 0.997)))
-    check(f"{label}: sd holds", holds, f"within 1, 2, 3: {inside[0]:.2f} {inside[1]:.2f} {inside[2]:.2f}")
-    # What is pressed by less than a fiftieth of the most is the smear of the simulator's elements.
-    pressure = np.load(truth / "frame_0000.pressure.npy")
-    there, found = pressure > 0.02 * np.nanmax(pressure), np.load(shape / "frame_0000.contact.npy") > 0
-    overlap = (there & found).sum() / max(1, (there | found).sum())
+    shares = within(ratio)
+    check(f"{label}: sd is not too small", all(shares >= np.array(SHARES) - ONE), shown(shares))
+    deviations.setdefault(design, []).append(shares)
     contact = json.loads((truth / "truth.jsonl").read_text().splitlines()[0])["contact"]
+    there, found = touched(truth, objects, contact, dome), np.load(shape / "frame_0000.contact.npy") > 0
+    overlap = (there & found).sum() / max(1, (there | found).sum())
     away = np.linalg.norm(np.subtract(line["contact"]["point_mm"], contact["point_mm"]))
     detail = f"{away:.3f} mm; IoU {overlap:.2f}, {line['contact']['area_mm2']:.2f} of {contact['area_mm2']:.2f} mm2"
-    check(f"{label}: centre of the touch", away <= 0.1 or "ball" not in name, detail)
+    is_ball = objects[0]["shape"]["kind"] == "sphere"
+    check(f"{label}: place of the touch", not is_ball or (away <= 0.1 and overlap >= BALL_OVERLAP), detail)
     outline = np.array(line["contact"]["outline_px"], np.float32)
     check(f"{label}: outline", cv2.contourArea(outline) > 0 and line["shape"]["status"] == "ok",
           f"{len(outline)} corners, {cv2.contourArea(outline):.0f} of {found.sum()} px")
@@ -236,6 +287,29 @@ def faults(domecast, work, dome, constants):
     refused("constants without light", "light is not in", "--constants", truth / "old.json", "--rest", truth / "swapped.png")
 
 
+def pillar(domecast, work):
+    """thumb24's dome on a cylinder of 2 mm: heights of a press beside the pole."""
+    design = json.loads((ROOT / "designs/thumb24.json").read_text()) | {"name": "pillar"}
+    design["dome"]["cylinder_height_mm"] = 2.0
+    design["envelope"]["size_mm"] = [24.0, 24.0, 28.0]
+    file, built = work / "pillar.json", work / "pillar"
+    file.write_text(json.dumps(design))
+    if not built.exists():
+        run(domecast, "build", file, "--out", built, "--quiet")
+    constants = built / "constants/constants.json"
+    dome, level = dome_of(constants), json.loads((built / "report/light.json").read_text())["level_per_mw_mm2"]
+    rest = draw(domecast, work / "pillar-rest", file, level, None)
+    truth = draw(domecast, work / "pillar-ball", file, level, ball(4, 15, 60, 0.4, dome))
+    for name, seed, picture in (("frame", 1, truth), ("rest", 2, rest)):
+        cv2.imwrite(str(truth / f"camera_{name}.png"), photograph(drawn(picture), seed))
+    track(domecast, truth / "camera_frame.png", truth / "camera_rest.png", constants, truth / "shape")
+    e = errors(truth, truth / "shape", dome)
+    off = np.abs(e["off"][e["known"] & (e["polar"] <= 45)])
+    rms = np.sqrt(np.mean(off**2))
+    check("on a cylinder: height to 45 deg", rms <= 0.010 and np.percentile(off, 99) <= 0.030,
+          f"rms {rms:.4f} p99 {np.percentile(off, 99):.4f} mm, depth {-np.nanmin(e['true']):.3f}")
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("domecast", type=pathlib.Path)
@@ -253,12 +327,13 @@ def main():
             if not built.exists():
                 run(arguments.domecast, "build", ROOT / f"designs/{design}.json", "--out", built, "--quiet")
             constants = built / "constants/constants.json"
-            optics = json.loads(constants.read_text())["optics"]
-            dome = {"radius": optics["dome_radius_mm"], "center_z": optics.get("dome_center_z_mm", 0.0)}
+            dome = dome_of(constants)
             for name, objects in list(presses.items())[: 1 if arguments.quick else None]:
                 judge(arguments.domecast, work, design, name, objects(dome), dome, constants)
             if design == "thumb24":
+                pillar(arguments.domecast, work)
                 faults(arguments.domecast, work, dome, constants)
+    check_deviations()
     sys.exit(1 if failed else 0)
 
 

@@ -131,8 +131,7 @@ def main():
         if not built.exists():
             judge.run(domecast, "build", judge.ROOT / f"designs/{design}.json", "--out", built, "--quiet")
         constants = built / "constants/constants.json"
-        optics = json.loads(constants.read_text())["optics"]
-        dome = {"radius": optics["dome_radius_mm"], "center_z": optics.get("dome_center_z_mm", 0.0)}
+        dome = judge.dome_of(constants)
         still = judge.simulate(domecast, work / f"{design}-rest", design, None)
         rest = np.mean([judge.photograph(judge.drawn(still), seed).astype(float) for seed in range(20, 28)], axis=0)
         tables = {"ball": Table(rest, False), "all": Table(rest, True)}

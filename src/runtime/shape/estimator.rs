@@ -15,6 +15,7 @@ use super::marks::Marks;
 use super::normals::{self, CellReading};
 use super::rest::RestMap;
 use super::system::{END_MM, SolveStatus, System};
+use super::volume::Volume;
 use crate::constants::Constants;
 use crate::track::{CameraFrame, Tracked, Tracker};
 use domecast_optics::SensorOptics;
@@ -64,6 +65,7 @@ pub struct ShapeFromColor {
     /// Constants without white markers are those of a rigid mount.
     is_rigid: bool,
     rest: Option<RestMap>,
+    volume: Volume,
     /// As it stood in the frame at rest.
     rest_seen: SensorOptics,
     pub(super) view: View,
@@ -115,6 +117,7 @@ impl ShapeFromColor {
             marks: Marks::new(constants, &optics),
             is_rigid: constants.white_markers.is_empty(),
             rest: None,
+            volume: Volume::new(&optics, constants.elastomer.map(|elastomer| elastomer.poisson_ratio)),
             rest_seen: optics.clone(),
             view: View::default(),
             levels: Vec::new(),
@@ -224,8 +227,12 @@ impl ShapeFromColor {
         }
         status = self.system.go_on(&mut self.moved_mm, status, END_MM);
         let width = self.cells.width;
-        self.deviations.measure(&self.cells, &self.view, &self.readings);
-        let sd_mm = |cell: usize, height_mm: f32| self.deviations.of(cell, width, height_mm);
+        self.measure_deviations();
+        self.volume.hold(&self.cells, &self.view, self.deviations.away(), &mut self.moved_mm);
+        let sd_mm = |cell: usize, height_mm: f32| {
+            let ring_mm2 = self.volume.variance_mm2(self.deviations.away()[cell]);
+            (self.deviations.variance_mm2(cell, width, height_mm) + ring_mm2).sqrt()
+        };
         let skin = Skin { view: &self.view, moved_mm: &self.moved_mm, dome: self.optics.dome() };
         self.map.draw(&self.cells, &skin, sd_mm, &mut self.chart, status);
         Ok(&self.map)
@@ -280,6 +287,17 @@ impl ShapeFromColor {
             }
         });
         self.readings = readings;
+    }
+
+    /// How far heights may be off, by what the normals leave over.
+    fn measure_deviations(&mut self) {
+        let (view, moved_mm, tilt) = (&self.view, &self.moved_mm, &self.tilt);
+        let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * moved_mm[cell] as f32;
+        let left_mm = |cell: usize, next: usize| {
+            let normal = |i: usize| view.normal[i] + tilt[i].0;
+            0.5 * (normal(cell) + normal(next)).dot(point(next) - point(cell))
+        };
+        self.deviations.measure(&self.cells, view, &self.readings, |cell| tilt[cell].0, left_mm);
     }
 
     /// Finds the skin that is perpendicular to the normals.

@@ -51,6 +51,7 @@ mod outline;
 mod reading;
 mod rest;
 mod system;
+mod volume;
 
 pub use contact::SkinContact;
 pub use error::ShapeError;

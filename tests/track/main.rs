@@ -8,6 +8,7 @@ mod render;
 mod report;
 mod rigid;
 mod sequences;
+mod shape;
 mod simulated;
 mod traction;
 

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::{names, tracker};
 use crate::sequences::frames_or;
 
-fn scenes() -> PathBuf {
+pub fn scenes() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("designs/scenes")
 }
 

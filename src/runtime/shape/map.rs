@@ -61,6 +61,8 @@ pub struct ShapeMap {
     /// Pressure over that at the edge of the touch.
     cell_pressure: Vec<f32>,
     cell_sd_mm: Vec<f32>,
+    /// Room for an outline while nothing is touched.
+    outline_room: Vec<Vec2>,
 }
 
 impl ShapeMap {
@@ -85,6 +87,7 @@ impl ShapeMap {
             cell_point: vec![Vec3A::NAN; cells.count()],
             cell_pressure: vec![0.0; cells.count()],
             cell_sd_mm: vec![f32::NAN; cells.count()],
+            outline_room: Vec::new(),
         }
     }
 
@@ -170,7 +173,10 @@ impl ShapeMap {
         self.normal.fill(Vec3::NAN);
         self.is_touched.fill(false);
         self.cell_mm.fill(f32::NAN);
-        self.contact = None;
+        if let Some(contact) = self.contact.take() {
+            // The next outline is written over the last.
+            self.outline_room = contact.outline_px;
+        }
         self.status = None;
     }
 
@@ -183,8 +189,6 @@ impl ShapeMap {
         chart: &mut Chart,
         status: SolveStatus,
     ) {
-        // The last frame's outline is written over.
-        let outline_px = self.contact.take().map_or_else(Vec::new, |contact| contact.outline_px);
         self.forget();
         self.status = Some(status);
         let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * moved_mm[cell] as f32;
@@ -209,11 +213,11 @@ impl ShapeMap {
         }
         self.touch(cells, view, dome, chart);
         self.spread(cells, view);
-        self.draw_outline(cells, outline_px);
+        self.draw_outline(cells);
     }
 
     /// Finds the outline of the touch about its deepest place, or its middle, where an object's hole is deepest.
-    fn draw_outline(&mut self, cells: &Cells, mut room: Vec<Vec2>) {
+    fn draw_outline(&mut self, cells: &Cells) {
         let Some(contact) = &mut self.contact else { return };
         let known = self.cell_mm.iter().enumerate().filter(|(_, depth)| depth.is_finite());
         let touched = known.filter(|(cell, _)| self.cell_pressure[*cell] > 1.0);
@@ -226,6 +230,7 @@ impl ShapeMap {
         };
         let own = |k: usize| (k * cells.px) as i64;
         let from = (own(cell % cells.width), own(cell / cells.width));
+        let mut room = std::mem::take(&mut self.outline_room);
         room.clear();
         outline(is_in, from, (width, height), &mut room);
         contact.outline_px = room;

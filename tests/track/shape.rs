@@ -1,0 +1,72 @@
+//! The shape of the skin from colour beside the forces on it: that nothing is allocated once they run.
+
+use std::ops::Range;
+
+use domecast::shape::{ShapeFromColor, ShapeOptions};
+use domecast::sim::scene::SceneFile;
+use domecast::sim::{Around, Drawn, Plan, Renderer, Scene, Scratch};
+use domecast::track::{CameraFrame, TrackOptions};
+use domecast::traction::{ForceDistribution, PressureMap};
+use serde_json::json;
+
+use super::simulated::scenes;
+use super::{SENSOR, tracker};
+
+/// A ball that comes down beside the pole, is moved over the dome and lifted: lit, without noise.
+fn pressed() -> Vec<Drawn> {
+    let file = json!({
+        "version": 1, "name": "pressed", "design": "../thumb24.json",
+        "frames": { "count": 4, "rate_hz": 1, "colour": true }, "tolerance": { "px": 0.1, "grey": 1 },
+        "contact": { "level": "linear", "element_mm": 1.0 },
+        "objects": [{ "name": "ball", "shape": { "kind": "sphere", "radius_mm": 5 }, "path": [
+            { "time_s": 0, "position_mm": [0, 0, 16] }, { "time_s": 1, "position_mm": [1, 0, 14.4] },
+            { "time_s": 2, "position_mm": [2, 1, 14.2] }, { "time_s": 3, "position_mm": [2, 1, 16] },
+        ]}],
+        "light": { "leds": { "level_per_mw_mm2": 280 } },
+    });
+    let file: SceneFile = domecast::design::from_value(&file).expect("a scene's fields");
+    let design = domecast::design::Design::load(&scenes().join("../thumb24.json")).expect("the design");
+    let scene = Scene::new(file, &scenes(), design).expect("a scene");
+    let plan = Plan::of(&scene).expect("a plan");
+    let renderer = Renderer::new(&scene, &plan).expect("its effects");
+    let mut stepper = renderer.stepper().expect("a contact").expect("an object");
+    let mut touch = |number| stepper.next(number, scene.time_s(number), &mut Default::default());
+    let touches: Vec<_> = (0..scene.frame_count()).map(|number| touch(number).expect("a touch")).collect();
+    let mut scratch = Scratch::default();
+    let mut frame = |number: u32| {
+        let around = Around::of(&touches, number as usize);
+        renderer.frame_around(number, around.as_ref(), &mut scratch).expect("a frame")
+    };
+    (0..scene.frame_count()).map(&mut frame).collect()
+}
+
+#[test]
+fn shape_and_forces_allocate_nothing_once_they_run() {
+    let drawn = pressed();
+    let frames: Vec<CameraFrame<'_>> = drawn
+        .iter()
+        .map(|drawn| {
+            let image = drawn.image.as_ref().expect("a picture");
+            CameraFrame::new(image.width, image.height, image.channels, &image.bytes).expect("a frame")
+        })
+        .collect();
+    let mut tracker = tracker(TrackOptions::default());
+    let mut shape = ShapeFromColor::new(&SENSOR.constants, &tracker, ShapeOptions::default()).expect("light");
+    let mut forces = ForceDistribution::new(&SENSOR.constants, None).expect("an elastomer");
+    let mut pressure = PressureMap::default();
+    shape.set_rest(&frames[0], tracker.track(0, &frames[0])).expect("a frame at rest");
+    let mut run = |numbers: Range<u64>| {
+        for number in numbers {
+            let frame = &frames[number as usize % frames.len()];
+            let tracked = tracker.track(number, frame);
+            let map = shape.measure(frame, tracked).expect("a map");
+            forces.update_with_shape(tracked, map);
+            forces.draw_pressure(map, &mut pressure);
+            assert_eq!(map.contact.is_some(), matches!(number % 4, 1 | 2), "frame {number}");
+        }
+    };
+    // Each picture once: room grows with what was seen.
+    run(1..5);
+    let counted = allocation_counter::measure(|| run(5..13));
+    assert_eq!(counted.count_total, 0);
+}

@@ -145,7 +145,12 @@ impl ForceDistribution {
     /// The forces in a frame whose skin is measured: they press where it is touched, and as deep as it is. `map` is the same
     /// frame's ([`ShapeFromColor`](crate::shape::ShapeFromColor)).
     pub fn update_with_shape(&mut self, tracked: &Tracked, map: &ShapeMap) -> &LocalForces {
-        self.find(tracked, Some(map))
+        self.find(tracked, Some(map));
+        if let (Some(contact), Some(seen)) = (&mut self.result.contact, &map.contact) {
+            // Finer than the nodes, and as `draw_pressure` shares the force out.
+            contact.point_mm = seen.point_mm;
+        }
+        &self.result
     }
 
     fn find(&mut self, tracked: &Tracked, map: Option<&ShapeMap>) -> &LocalForces {

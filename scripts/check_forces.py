@@ -25,7 +25,7 @@ from scipy.ndimage import map_coordinates
 DESIGNS = pathlib.Path(__file__).resolve().parent.parent / "designs"
 ELEMENT_MM = 0.5
 # Peak pressure against the truth's, and how far the contact point may be off along the skin, with heights and dots together.
-MIN_PEAK, MAX_PEAK, POINT_MM = 0.9, 1.1, 0.15
+MIN_PEAK, MAX_PEAK, POINT_MM = 0.9, 1.1, 0.1
 
 
 def simulate(program, folder, name, design, objects, count):

@@ -251,27 +251,6 @@ def prints():
     check(texts[0] == texts[1] and told[0] == told[1], "calibrate-print: file and result")
 
 
-# what no two runs have alike, by the names of the fields
-CLOCKS = ("time", "_s", "speedup", "dominated", "conclusion", "meets", "because", "machine")
-
-
-def numbers_of(tree, name=""):
-    """A measurement without what the clock says, or what is chosen by it."""
-    if isinstance(tree, dict):
-        return {key: numbers_of(value, key) for key, value in tree.items() if not any(word in key for word in CLOCKS)}
-    return [numbers_of(one, name) for one in tree] if isinstance(tree, list) else tree
-
-
-def accuracies():
-    """What accuracy costs: everything but the times, bit for bit."""
-    known = json.loads(cli("accuracy", DESIGN, "--quick", "--out", WORK / "accuracy-1", "--json"))
-    found = domecast.accuracy(DESIGN, out=WORK / "accuracy-2", quick=True)
-    files = [json.loads((WORK / f"accuracy-{k}/accuracy.json").read_text()) for k in (1, 2)]
-    same = json.dumps(numbers_of(files[0])) == json.dumps(numbers_of(files[1]))
-    errors = sum("max_error" in sample for sweep in files[0]["sweeps"] for sample in sweep["samples"])
-    check(same and errors > 20 and known.keys() == found.keys(), f"accuracy --quick: {errors} errors of samples and all else but the times")
-
-
 def resident_mb():
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
@@ -362,7 +341,6 @@ def main():
     shapes(balls, pressed, rest / "frame_0000.png")
     calibrations(pushed)
     prints()
-    accuracies()
     threads(sensor, frames, lines)
     memory(sensor, frames)
     overhead(sensor, frames)

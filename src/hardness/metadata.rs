@@ -88,7 +88,7 @@ impl Metadata {
         Ok(metadata)
     }
 
-    /// Whether a model of classes alone has none to state: the likeliest is less probable than [`MIN_PROBABILITY`].
+    /// Whether a model of classes alone has none to state: the likeliest is less probable than 0.9.
     pub fn is_undecided(&self, probability: f64) -> bool {
         self.interval_quantile == 0.0 && probability < MIN_PROBABILITY
     }

@@ -49,6 +49,11 @@ fn degrees(text: &str) -> Result<f64, String> {
 }
 
 impl TrackerArguments {
+    /// Whether the picture, mirrored back, is turned against the constants.
+    pub fn is_turned(&self) -> bool {
+        self.camera_turned.is_some_and(|deg| deg != 0.0)
+    }
+
     /// A picture that is mirrored and then turned is, mirrored back, turned the other way.
     fn camera_turned_rad(&self) -> Option<f64> {
         let turned_rad = self.camera_turned.map(f64::to_radians);

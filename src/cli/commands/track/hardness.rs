@@ -100,6 +100,13 @@ impl HardnessLines {
         if arguments.format != Format::Jsonl {
             return Err(input_fault(model, "has no place in this --format", "--format jsonl"));
         }
+        if arguments.tracker.is_turned() {
+            return Err(input_fault(
+                model,
+                "knows no picture that is turned",
+                "frames as the constants have them",
+            ));
+        }
         let mut reader = HardnessReader::load(model)
             .map_err(|e| input_fault(model, format!("{}: {}", e.at, e.problem), &e.allowed))?;
         let columns = columns(model, &reader)?;

@@ -178,15 +178,65 @@ fn dome_tables(ways: &Ways) -> Tables {
 
 /// Vector irradiance of each source on the sphere of a part of the dome's radius.
 fn tables(ways: &Ways, part: f64, grid: DomeGrid) -> Tables {
-    let rule = EmitterRule::default();
-    let fill = |source| {
-        grid.fill_in_parallel(|direction| {
-            let flux = ways.flux(source, ways.point(direction, part), &rule);
-            flux.extend(flux.dot(grid.face.normal(direction)).max(0.0)).to_array()
-        })
-    };
-    let sources = ways.sources.iter().map(fill).collect();
+    let sources = ways.sources.iter().map(|source| table(ways, source, part, &grid)).collect();
     Tables { grid, sources, error: 0.0, evaluations: grid.evaluations() }
+}
+
+fn table(ways: &Ways, source: &Source, part: f64, grid: &DomeGrid) -> Vec<Node> {
+    let rule = EmitterRule::default();
+    grid.fill_in_parallel(|direction| {
+        let flux = ways.flux(source, ways.point(direction, part), &rule);
+        flux.extend(flux.dot(grid.face.normal(direction)).max(0.0)).to_array()
+    })
+}
+
+/// Cells across the tables of one light: on the dome, and on the shells inside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TableCells {
+    /// On the dome.
+    pub dome: usize,
+    /// On each shell.
+    pub shells: usize,
+}
+
+impl TableCells {
+    /// Those that frames are drawn and read with.
+    pub const USUAL: Self = Self { dome: DOME_CELLS, shells: SHELL_CELLS };
+}
+
+/// The tables of one light: on the dome, then on the shells inside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SourceTables(Vec<Vec<Node>>);
+
+impl SourceTables {
+    /// Computes them for one of the ways' sources.
+    pub fn new(ways: &Ways, source: &Source, cells: TableCells) -> Self {
+        let of = |(shell, part): (usize, &f64)| {
+            table(ways, source, ways.shell(*part), &shell_grid(ways, cells, shell))
+        };
+        Self(SHELLS.iter().enumerate().map(of).collect())
+    }
+}
+
+fn shell_grid(ways: &Ways, cells: TableCells, shell: usize) -> DomeGrid {
+    DomeGrid::with_cells(if shell == 0 { cells.dome } else { cells.shells }).over(ways.face())
+}
+
+impl Prepared {
+    /// Puts together what was computed light by light, each with tables of these cells, and the dome as a room.
+    pub fn of(ways: &Ways, cells: TableCells, sources: &[&SourceTables], rooms: &[DomeRoom]) -> Self {
+        let gathered = |shell: usize| Tables {
+            grid: shell_grid(ways, cells, shell),
+            sources: sources.iter().filter_map(|own| own.0.get(shell).cloned()).collect(),
+            error: 0.0,
+            evaluations: 0,
+        };
+        Self {
+            dome: OnceLock::from(gathered(0)),
+            shells: OnceLock::from((1..SHELLS.len()).map(gathered).collect::<Vec<_>>()),
+            rooms: OnceLock::from(rooms.to_vec()),
+        }
+    }
 }
 
 /// Exact evaluations of each source, with or without shells.

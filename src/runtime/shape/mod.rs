@@ -50,10 +50,13 @@ mod normals;
 mod outline;
 mod reading;
 mod rest;
+mod seen;
 mod system;
 
 pub use contact::SkinContact;
 pub use error::ShapeError;
 pub use estimator::{ShapeFromColor, ShapeOptions};
 pub use map::{ShapeMap, SkinSurface};
+pub(crate) use light::ShapeLight;
+pub(crate) use seen::{ChannelRay, SeenCell};
 pub use system::SolveStatus;

@@ -269,6 +269,18 @@ def faults(domecast, work, dome, constants):
         sds = np.nanmean(np.abs(e["off"][patch]) / e["sd"][patch])
         check(f"its {what} says so", sds < 1.5 and np.nanmean(e["sd"][patch]) > np.nanmedian(e["sd"]), f"{sds:.2f} sd off")
 
+    # A light that has become weaker since the frame at rest feigns a slope all over the dome: the deviations must say so.
+    still = cv2.imread(str(truth / "camera_frame.png"))
+    for c, color in enumerate(("blue", "green", "red")):
+        weaker = still.astype(float)
+        weaker[..., c] *= 0.98
+        cv2.imwrite(str(truth / "weaker.png"), np.rint(weaker).astype(np.uint8))
+        track(domecast, truth / "weaker.png", rest, constants, truth / "weaker")
+        e = errors(truth, truth / "weaker", dome)
+        here = e["known"] & (e["polar"] <= 60)
+        rms, share = np.sqrt(np.mean(e["off"][here] ** 2)), np.mean(np.abs(e["off"][here]) <= 3 * e["sd"][here])
+        check(f"{color} 2 % weaker than at rest", share >= 0.97 and rms <= 0.04, f"rms {rms:.4f} mm to 60 deg, {share:.2f} within 3 sd")
+
     def refused(what, word, *words):
         done = subprocess.run([str(w) for w in (domecast, "track", truth / "camera_frame.png", "--shape",
                                                 truth / "refused", *words)], capture_output=True, text=True)

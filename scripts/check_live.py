@@ -278,6 +278,20 @@ def browse(url):
             driver.quit()
 
 
+def statuses_in(path):
+    """How many readings are in a recording that may be cut off."""
+    topics, statuses = {}, 0
+    with path.open("rb") as file:
+        try:
+            for record in StreamReader(file).records:
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                statuses += isinstance(record, Message) and topics[record.channel_id] == "/domecast/status"
+        except McapError:
+            pass
+    return statuses
+
+
 def check_ends(domecast, constants, files, folder):
     """Ctrl-C ends in good order; kill -9 leaves a recording to its last chunk."""
     device = f"player:{files[0].parent}?rate={RATE}&frames=100000"
@@ -297,15 +311,7 @@ def check_ends(domecast, constants, files, folder):
         time.sleep(0.05)
     killed.child.send_signal(signal.SIGKILL)
     killed.end(wanted=-signal.SIGKILL)
-    topics, statuses = {}, 0
-    with (folder / "c.mcap").open("rb") as file:
-        try:
-            for record in StreamReader(file).records:
-                if isinstance(record, Channel):
-                    topics[record.id] = record.topic
-                statuses += isinstance(record, Message) and topics[record.channel_id] == "/domecast/status"
-        except McapError:
-            pass
+    statuses = statuses_in(folder / "c.mcap")
     expect(statuses >= len(killed.lines) - 32, f"kill -9: {statuses} of {len(killed.lines)} readings are in the recording")
 
 
@@ -350,15 +356,7 @@ def check_full(domecast, constants, files, folder):
     lost, ended = (live.event(name)[1] for name in ("recording_lost", "ended"))
     expect(lost and str(place) in lost["message"] and "too large" in lost["message"], f"a full disk: {lost}")
     expect(ended and ended["frames"] == len(live.lines) == 180, f"a full disk: the reading ends, {ended}")
-    topics, statuses = {}, 0
-    with place.open("rb") as file:
-        try:
-            for record in StreamReader(file).records:
-                if isinstance(record, Channel):
-                    topics[record.id] = record.topic
-                statuses += isinstance(record, Message) and topics[record.channel_id] == "/domecast/status"
-        except McapError:
-            pass
+    statuses = statuses_in(place)
     expect(0.3 * limit < place.stat().st_size <= limit and statuses > 0, f"a full disk: {statuses} readings in {place.stat().st_size} bytes")
     return statuses
 

@@ -1,5 +1,7 @@
 //! The numbers beside the frames: what a tracker says, modelled from the truth.
 
+use std::ops::Range;
+
 use glam::{DVec2, Vec3};
 
 use crate::check::Dataset;
@@ -29,6 +31,11 @@ pub const COLUMNS: [&str; 19] = [
     "contact_radius_mm",
     "dots_found",
 ];
+
+/// Those of wrench and platform.
+pub const RIGID_COLUMNS: Range<usize> = 1..13;
+/// Those that say how the dots moved.
+pub const DOT_COLUMNS: Range<usize> = 14..17;
 
 /// Stream of the readings' noise, apart from the frames'.
 const STREAM_READINGS: u64 = 0x7ead;

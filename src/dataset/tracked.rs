@@ -1,27 +1,18 @@
 //! Readings as `track` says them of frames at the design's own size.
 
-use glam::DVec2;
-
 use crate::check::Dataset;
 use crate::draw::PairDraw;
 use crate::readings::{Readings, SeenDot, row, written};
+use crate::rest::TrackedRest;
 use crate::scene::video_scene;
 use crate::sensor::{BuiltSensor, FullSensor};
 use crate::video::{NoVideo, Refused, Video, touches};
 use domecast_optics::numeric::SeededRandom;
-use domecast_runtime::track::{CameraFrame, TrackOptions, Tracked, Tracker};
+use domecast_runtime::track::{CameraFrame, TrackOptions, Tracker};
 use domecast_sim::{Around, Renderer, Scratch};
-use domecast_springs::Displacement;
 
 /// Stream of the noise of what is not tracked.
 const STREAM_TRACKED: u64 = 0x7eac;
-
-/// What is taken off: a sensor whose constants are those of its design sees something at rest.
-struct Tare {
-    wrench: [f64; 6],
-    platform: [f64; 6],
-    dots_px: Vec<Option<DVec2>>,
-}
 
 /// The readings of a video: the tracker has the design's constants, not those of the sensor as built, and what it says of the
 /// frame at rest is taken off. The contact's radius is not tracked, nor is the hand's travel.
@@ -50,7 +41,7 @@ pub fn tracked(
     let mut random = SeededRandom::stream(seed, STREAM_TRACKED);
     let mut scratch = Scratch::default();
     let count = touched.touches.len();
-    let mut tare: Option<Tare> = None;
+    let mut rest: Option<TrackedRest> = None;
     let (mut rows, mut dots) = (Vec::new(), Vec::new());
     // the frame at rest first
     for order in 0..=count {
@@ -61,31 +52,13 @@ pub fn tracked(
         let frame = CameraFrame::new(image.width, image.height, image.channels, &image.bytes);
         let frame = frame.map_err(|fault| refused(format!("{fault:?}")))?;
         let said = tracker.track(order as u64, &frame);
-        let [wrench, platform] = numbers(said, at_mm);
-        let seen: Vec<Option<(DVec2, DVec2)>> = said
-            .black_dots
-            .iter()
-            .map(|dot| {
-                let at_rest_px = dot.undeformed_px?;
-                Some((at_rest_px, dot.image_px? - at_rest_px))
-            })
-            .collect();
         scratch.give_back(image);
-        let Some(tare) = &tare else {
-            let dots_px = seen.iter().map(|dot| dot.map(|(_, moved)| moved)).collect();
-            tare = Some(Tare { wrench, platform, dots_px });
+        let Some(rest) = &rest else {
+            rest = Some(TrackedRest::new(said, at_mm));
             continue;
         };
-        let wrench = std::array::from_fn(|k| wrench[k] - tare.wrench[k]);
-        let platform = std::array::from_fn(|k| platform[k] - tare.platform[k]);
-        let seen: Vec<Option<SeenDot>> = seen
-            .iter()
-            .zip(&tare.dots_px)
-            .map(|(dot, rest)| {
-                let ((at_px, moved_px), rest_px) = (*dot).zip(*rest)?;
-                Some(SeenDot { at_px, moved_px: moved_px - rest_px })
-            })
-            .collect();
+        let [wrench, platform] = rest.rigid(said);
+        let seen: Vec<Option<SeenDot>> = rest.dots(said).collect();
         let travel_mm = match dataset.spec().readings.robot_travel_sd_mm {
             Some(sd_mm) => video.travel_mm[at] + sd_mm * random.normal(),
             None => f64::NAN,
@@ -95,12 +68,4 @@ pub fn tracked(
         dots.push(seen.into_iter().map(written).collect());
     }
     Ok(Readings { rows, dots })
-}
-
-/// Wrench and displacement of the platform; NaN where the tracker withholds them.
-fn numbers(said: &Tracked, at_mm: glam::DVec3) -> [[f64; 6]; 2] {
-    [
-        said.wrench.map_or([f64::NAN; 6], |wrench| wrench.to_array()),
-        said.pose.map_or([f64::NAN; 6], |pose| Displacement::of_pose(&pose, at_mm).to_array()),
-    ]
 }

@@ -1,8 +1,9 @@
 //! A camera, or recorded frames that are played as one would give them.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use domecast_live::source::{CameraRequest, ControlRequest, open_device};
+use domecast_live::decode::Picture;
+use domecast_live::source::{ArrivedFrame, CameraRequest, ControlRequest, open_device};
 use domecast_live::{LiveEvent, LiveReader};
 use domecast_sim::Image8;
 use pyo3::prelude::*;
@@ -38,14 +39,13 @@ impl PyCamera {
     fn hear(&self) -> Heard {
         let reader = self.reader.lock().unwrap_or_else(PoisonError::into_inner);
         match reader.next(LOOK) {
-            Some(LiveEvent::Frame(frame, _)) => match frame.data.decode() {
-                Ok(picture) => {
-                    let (width, height, channels) = (picture.width, picture.height, picture.channels);
-                    let image = Image8 { width, height, channels, bytes: picture.bytes.clone() };
-                    Heard::Frame(image, frame.time_s, frame.number)
-                }
-                Err(_) => Heard::Damaged,
-            },
+            Some(LiveEvent::Frame(ArrivedFrame { data, time_s, number, .. }, _)) => {
+                let Ok(picture) = data.decode() else { return Heard::Damaged };
+                // the last one who holds the picture takes it without a copy
+                drop(data);
+                let Picture { width, height, channels, bytes } = Arc::unwrap_or_clone(picture);
+                Heard::Frame(Image8 { width, height, channels, bytes }, time_s, number)
+            }
             Some(LiveEvent::Ended(why)) => Heard::End(why),
             // one that is gone is tried again until it is back
             Some(LiveEvent::Unplugged(_) | LiveEvent::Replugged(..)) | None => Heard::Nothing,

@@ -20,6 +20,18 @@ const SIDE_SHARE: f64 = 0.8;
 /// A wrong load is named where it would be this little beyond what is known (six squares; 1 in 1,000 is beyond 22.5).
 const EXPLAINED: f64 = 22.5;
 
+/// Ways that a load pulls or presses, by name; those before `up` can be hung or laid on.
+const DIRECTIONS: [(&str, DVec3); 6] = [
+    ("down", DVec3::NEG_Z),
+    ("+x", DVec3::X),
+    ("-x", DVec3::NEG_X),
+    ("+y", DVec3::Y),
+    ("-y", DVec3::NEG_Y),
+    ("up", DVec3::Z),
+];
+/// How many of them are before `up`.
+const HUNG: usize = 5;
+
 /// How far a load may be off what is said of it, one standard deviation each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadNoise {
@@ -62,18 +74,14 @@ pub fn parse(words: &[&str], constants: &Constants) -> Result<Load, String> {
         Some("mN") => 1e-3,
         other => return Err(wrong(&format!("\"{}\" is none of g, kg, N, mN", other.unwrap_or_default()))),
     };
-    let direction = match rest.next() {
-        Some("down" | "-z") => -DVec3::Z,
-        Some("up" | "+z") => DVec3::Z,
-        Some("+x") => DVec3::X,
-        Some("-x") => -DVec3::X,
-        Some("+y") => DVec3::Y,
-        Some("-y") => -DVec3::Y,
-        other => {
-            let given = other.unwrap_or_default();
-            return Err(wrong(&format!("\"{given}\" is none of down, up, +x, -x, +y, -y")));
-        }
+    let given = match rest.next().unwrap_or_default() {
+        "-z" => "down",
+        "+z" => "up",
+        given => given,
     };
+    let direction = DIRECTIONS.iter().find(|(name, _)| *name == given).map(|(_, direction)| *direction);
+    let direction =
+        direction.ok_or_else(|| wrong(&format!("\"{given}\" is none of down, up, +x, -x, +y, -y")))?;
     let place = match (rest.next(), rest.next(), rest.next()) {
         (Some("at"), Some(place), None) => place,
         _ => return Err(wrong("after the direction stands `at` and a place, without spaces in it")),
@@ -133,17 +141,10 @@ impl Load {
 
     /// As an answer of the wizard.
     pub fn answer(&self) -> String {
-        let direction = [
-            (DVec3::X, "+x"),
-            (-DVec3::X, "-x"),
-            (DVec3::Y, "+y"),
-            (-DVec3::Y, "-y"),
-            (DVec3::Z, "up"),
-            (-DVec3::Z, "down"),
-        ]
-        .into_iter()
-        .find(|(axis, _)| axis.dot(self.direction) > 0.99)
-        .map_or("down", |(_, name)| name);
+        let direction = DIRECTIONS
+            .iter()
+            .find(|(_, axis)| axis.dot(self.direction) > 0.99)
+            .map_or("down", |(name, _)| name);
         let p = self.point_mm;
         let place = if p.x == 0.0 && p.y == 0.0 {
             "pole".to_owned()
@@ -171,7 +172,7 @@ fn places(constants: &Constants) -> Vec<DVec3> {
 }
 
 /// Loads that the springs bear well: at each place each direction, with the largest weight that they allow and the next smaller one.
-pub fn candidates(constants: &Constants, knowledge: &SpringKnowledge) -> Vec<(Load, [f64; 6])> {
+fn candidates(constants: &Constants, knowledge: &SpringKnowledge) -> Vec<(Load, [f64; 6])> {
     let Some(springs) = &constants.springs else { return Vec::new() };
     let at_mm = DVec3::from_array(springs.at_mm);
     let grip_force_n = springs.law.as_ref().and_then(|law| law.grip_force_n);
@@ -194,7 +195,7 @@ pub fn candidates(constants: &Constants, knowledge: &SpringKnowledge) -> Vec<(Lo
     };
     let mut all = Vec::new();
     for point_mm in places(constants) {
-        for direction in [-DVec3::Z, DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y] {
+        for (_, direction) in DIRECTIONS.into_iter().take(HUNG) {
             let of_mass = |mass: &f64| {
                 let load = Load { force_n: 1e-3 * GRAVITY * mass, direction, point_mm };
                 Some((load, borne(&load)?))
@@ -251,9 +252,7 @@ pub fn looks_like(
     ];
     others
         .extend(times.map(|(factor, name)| (Load { force_n: load.force_n * factor, ..*load }, name.into())));
-    for (direction, name) in
-        [(DVec3::X, "+x"), (-DVec3::X, "-x"), (DVec3::Y, "+y"), (-DVec3::Y, "-y"), (-DVec3::Z, "down")]
-    {
+    for (name, direction) in DIRECTIONS.into_iter().take(HUNG) {
         others.push((Load { direction, ..*load }, format!("a load along {name}")));
     }
     for point_mm in places(constants) {

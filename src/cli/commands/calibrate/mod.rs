@@ -141,7 +141,7 @@ impl Wizard<'_> {
         if let Some(knowledge) = &self.outcome.knowledge {
             self.output.say(&format!("springs: {}", words::known(knowledge)))?;
         }
-        match self.next() {
+        match self.next(self.best().as_ref()) {
             Some(next) => self.output.say(&format!("helps most next: {next}")),
             None => Ok(()),
         }
@@ -153,11 +153,11 @@ impl Wizard<'_> {
         loads::best(&self.outcome.constants, knowledge, &motion, &self.arguments.load_sd)
     }
 
-    /// The answer that helps most now.
-    fn next(&self) -> Option<String> {
+    /// The answer that helps most now, with what [`Wizard::best`] found.
+    fn next(&self, best: Option<&(Load, f64)>) -> Option<String> {
         match self.outcome.optics {
             None => Some("rest".into()),
-            Some(_) => self.best().map(|(load, _)| load.answer()),
+            Some(_) => best.map(|(load, _)| load.answer()),
         }
     }
 
@@ -234,7 +234,7 @@ impl Wizard<'_> {
         json!({
             "steps": self.session.steps.iter().map(step).collect::<Vec<_>>(),
             "known": self.outcome.knowledge.as_ref().map(words::known_json),
-            "next": self.next(),
+            "next": self.next(best.as_ref()),
             "next_gain": best.map(|(_, gain)| gain),
             "surprises": self.outcome.loads.iter().map(|load| load.surprise).collect::<Vec<_>>(),
             "constants": written(MEASURED),

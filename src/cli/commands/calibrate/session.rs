@@ -1,6 +1,5 @@
 //! What a wizard keeps: the constants it began with, and a folder for each step.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
@@ -134,7 +133,6 @@ impl CalibrationSession {
 
     /// Writes results, each whole.
     pub fn write_results(&self, output: &Output, files: &[(&str, &[u8])]) -> Result<(), Failure> {
-        fs::create_dir_all(&self.folder)?;
         for (name, bytes) in files {
             let mut file = StagedFile::new(&self.path(name), "calibrate", &output.rules(&[]))?;
             file.write(bytes)?;

@@ -2,52 +2,23 @@
 
 use std::path::Path;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::arguments::{Format, TrackArguments};
 use crate::commands::input::input_fault;
 use crate::commands::output::Failure;
-use domecast_dataset::{SeenDot, dots_features};
+use domecast_dataset::{COLUMNS, DOT_COLUMNS, RIGID_COLUMNS, SeenDot, TrackedRest, dots_features};
 use domecast_hardness::{FrameView, HardnessEstimate, HardnessReader, Unsure};
 use domecast_live::decode;
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
-use domecast_springs::Displacement;
-
-/// Readings that a model may ask for, by their names in a data set: six of the wrench, six of the platform, three of the dots.
-const KNOWN: [&str; 15] = [
-    "fx_n",
-    "fy_n",
-    "fz_n",
-    "mx_nmm",
-    "my_nmm",
-    "mz_nmm",
-    "tx_mm",
-    "ty_mm",
-    "tz_mm",
-    "rx_rad",
-    "ry_rad",
-    "rz_rad",
-    "dots_mean_px",
-    "dots_radial_px",
-    "dots_divergence",
-];
-/// How many of them are no dots'.
-const RIGID: usize = 12;
-
-/// What is tracked of the frame at rest, and is taken off.
-struct Rest {
-    rigid: [f64; RIGID],
-    dots_px: Vec<Option<DVec2>>,
-}
 
 /// A model, and which of the frames it sees.
 pub(super) struct HardnessLines {
     reader: HardnessReader,
-    /// For each of the model's readings its number in [`KNOWN`].
+    /// For each of the model's readings its number in [`COLUMNS`].
     columns: Vec<usize>,
-    rest: Rest,
-    at_mm: DVec3,
+    rest: TrackedRest,
     height_px: f64,
     every: u64,
     readings: Vec<f64>,
@@ -59,8 +30,10 @@ fn columns(model: &Path, reader: &HardnessReader) -> Result<Vec<usize>, Failure>
     names
         .map(|name| {
             let problem = || format!("needs the reading \"{name}\", which `track` does not have");
-            let known = KNOWN.iter().position(|other| *other == name);
-            known.ok_or_else(|| input_fault(model, problem(), &KNOWN.join(", ")))
+            let known = COLUMNS.iter().position(|other| *other == name);
+            let known = known.filter(|at| RIGID_COLUMNS.contains(at) || DOT_COLUMNS.contains(at));
+            let allowed = || [&COLUMNS[RIGID_COLUMNS], &COLUMNS[DOT_COLUMNS]].concat().join(", ");
+            known.ok_or_else(|| input_fault(model, problem(), &allowed()))
         })
         .collect()
 }
@@ -72,21 +45,6 @@ fn view<'a>(frame: &CameraFrame<'a>) -> FrameView<'a> {
         channels: frame.channels(),
         bytes: frame.bytes(),
     }
-}
-
-/// Wrench, and motion of the platform's point about which it is stated; not a number where they are not known.
-fn rigid(tracked: &Tracked, at_mm: DVec3) -> [f64; RIGID] {
-    let (Some(wrench), Some(pose)) = (tracked.wrench, tracked.pose) else { return [f64::NAN; RIGID] };
-    let parts = [wrench.to_array(), Displacement::of_pose(&pose, at_mm).to_array()];
-    std::array::from_fn(|k| parts[k / 6][k % 6])
-}
-
-/// Where each dot would be on the undeformed dome, and how far from there it is seen.
-fn moved_px(tracked: &Tracked) -> impl Iterator<Item = Option<(DVec2, DVec2)>> {
-    tracked.black_dots.iter().map(|dot| {
-        let at_px = dot.undeformed_px?;
-        Some((at_px, dot.image_px? - at_px))
-    })
 }
 
 impl HardnessLines {
@@ -127,31 +85,25 @@ impl HardnessLines {
         }
         let mut at_rest = tracker.clone();
         let tracked = at_rest.track(0, &frame);
-        let rest = Rest {
-            rigid: rigid(tracked, at_mm),
-            dots_px: moved_px(tracked).map(|dot| dot.map(|(_, moved)| moved)).collect(),
-        };
-        if rest.rigid.iter().any(|value| !value.is_finite()) {
+        let rest = TrackedRest::new(tracked, at_mm);
+        if !rest.is_known() {
             return Err(fault(format!("has no wrench (status \"{}\")", tracked.status())));
         }
         let (every, height_px) = (arguments.hardness_every, frame.height() as f64);
         let (readings, seen) = (Vec::new(), Vec::new());
-        Ok(Some(Self { reader, columns, rest, at_mm, height_px, every, readings, seen }))
+        Ok(Some(Self { reader, columns, rest, height_px, every, readings, seen }))
     }
 
     /// The frame's numbers as the data sets have them: less those at rest.
     fn read(&mut self, tracked: &Tracked) {
-        let now = rigid(tracked, self.at_mm);
+        let rigid = self.rest.rigid(tracked);
         self.seen.clear();
-        self.seen.extend(moved_px(tracked).zip(&self.rest.dots_px).map(|(dot, rest_px)| {
-            let ((at_px, moved_px), rest_px) = dot.zip(*rest_px)?;
-            Some(SeenDot { at_px, moved_px: moved_px - rest_px })
-        }));
+        self.seen.extend(self.rest.dots(tracked));
         let [mean, radial, divergence, found] = dots_features(&self.seen, self.height_px);
         let dots = if found > 0.0 { [mean, radial, divergence] } else { [f64::NAN; 3] };
         self.readings.clear();
-        self.readings.extend(self.columns.iter().map(|at| match at.checked_sub(RIGID) {
-            None => now[*at] - self.rest.rigid[*at],
+        self.readings.extend(self.columns.iter().map(|column| match column.checked_sub(DOT_COLUMNS.start) {
+            None => rigid.as_flattened()[column - RIGID_COLUMNS.start],
             Some(at) => dots[at],
         }));
     }

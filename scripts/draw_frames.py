@@ -5,6 +5,8 @@ the layers is found by bisection on Snell's law, and the lens is OpenCV's formul
 filled at four times the frame's resolution. A skin that moves is a function from places on the dome to places in the sensor
 frame.
 """
+import copy
+
 import cv2
 import numpy as np
 
@@ -38,6 +40,9 @@ class Sensor:
         self.diameters = np.array([dot["diameter_mm"] for dot in dots])
         self.markers = np.array([marker["position_mm"] for marker in constants["white_markers"]]).reshape(-1, 3)
         self.marker_diameters = [marker["diameter_mm"] for marker in constants["white_markers"]]
+        y, x = np.ogrid[:self.size[1], :self.size[0]]
+        away = (x - self.matrix[0, 2]) ** 2 + (y - self.matrix[1, 2]) ** 2
+        self.shade = (1 - 0.25 * away / self.size[1]**2).astype(np.float32)
 
     def project(self, points, turn=(0, 0, 0), shift=(0, 0, 0)):
         """Pixels of points in the sensor frame, the platform turned (rotation vector) and shifted (mm) from rest."""
@@ -49,7 +54,7 @@ class Sensor:
         sheet = sum(thickness for _, thickness in self.sheets)
         air = -pupil[2] - sheet
         low, high = np.zeros_like(reach), np.full_like(reach, np.pi / 2 - 1e-9)
-        for _ in range(60):
+        for _ in range(50):
             angle = 0.5 * (low + high)
             sine = np.sin(angle)
             there = air * np.tan(angle)
@@ -104,43 +109,38 @@ class Sensor:
         dots that came out not at all; `hidden`: markers under a cover; `specks`: dirt as (place on the dome, diameter);
         `white`: the markers' level, where 60 is what is around them."""
         width, height = self.size
-        fine = np.full((height * FINE, width * FINE), 60, np.float32)
+        # levels are whole numbers; the light changes by a thousandth over a pixel, so that it may come after
+        fine = np.full((height * FINE, width * FINE), 60, np.uint8)
         around = np.linspace(0, 2 * np.pi, 240, endpoint=False)
         rim_radius = np.sqrt(self.radius**2 - min(self.center[2], 0.0) ** 2)
         rim = rim_radius * np.stack([np.cos(around), np.sin(around), 0 * around], -1)
 
-        def fill(corners, level):
+        def fill(outlines, level):
             # the centre of a pixel is a whole number; of a fine one, at (i + 0.5) / FINE - 0.5
-            corners = (np.asarray(corners) + 0.5) * FINE - 0.5
-            cv2.fillPoly(fine, [np.round(corners * 16).astype(np.int32)], level, cv2.LINE_8, 4)
+            outlines = np.round(((np.asarray(outlines) + 0.5) * FINE - 0.5) * 16).astype(np.int32)
+            for corners in outlines:
+                # one by one: where two lie over each other, one call would leave a hole
+                cv2.fillPoly(fine, [corners], level, cv2.LINE_8, 4)
 
         def seen(points):
             return self.project(skin(points) if skin else points, turn, shift)
 
-        fill(self.project(rim, turn, shift), 165)
-        y, x = np.mgrid[0:height * FINE, 0:width * FINE].astype(np.float32) / FINE
-        shade = 1 - 0.25 * (((x - self.matrix[0, 2]) ** 2 + (y - self.matrix[1, 2]) ** 2) / height**2)
+        fill(self.project(rim, turn, shift)[None], 165)
         rims, markers = self.outlines()
         pixels = seen(rims)
-        centers = []
-        for index, corners in enumerate(pixels):
-            ahead = np.roll(corners, -1, 0)
-            cross = corners[:, 0] * ahead[:, 1] - ahead[:, 0] * corners[:, 1]
-            centers.append(((corners + ahead) * cross[:, None]).sum(0) / (3 * cross.sum()))
-            if index not in without:
-                fill(corners, 25)
+        ahead = np.roll(pixels, -1, 1)
+        cross = pixels[..., 0] * ahead[..., 1] - ahead[..., 0] * pixels[..., 1]
+        centers = ((pixels + ahead) * cross[..., None]).sum(1) / (3 * cross.sum(1))[:, None]
+        fill(np.delete(pixels, list(without), axis=0), 25)
         for place, diameter in specks:
-            place = np.asarray(place, float)
-            spot = Sensor.__new__(Sensor)
-            spot.__dict__ = {**self.__dict__, "dots": place[None], "diameters": np.array([diameter])}
-            fill(seen(spot.outlines()[0])[0], 25)
-        for index, corners in enumerate(markers):
-            if index not in hidden:
-                fill(self.project(corners, turn, shift), white)
-        frame = cv2.resize(fine * shade, (width, height), interpolation=cv2.INTER_AREA)
+            spot = copy.copy(self)
+            spot.dots, spot.diameters = np.asarray(place, float)[None], np.array([diameter])
+            fill(seen(spot.outlines()[0]), 25)
+        fill([self.project(corners, turn, shift) for index, corners in enumerate(markers) if index not in hidden], white)
+        frame = cv2.resize(fine.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA) * self.shade
         frame = cv2.GaussianBlur(frame, (0, 0), 0.6)
         frame += np.random.default_rng(seed).normal(0, noise, frame.shape)
-        return np.clip(np.round(frame), 0, 255).astype(np.uint8), np.array(centers)
+        return np.clip(np.round(frame), 0, 255).astype(np.uint8), centers
 
 
 def turn_picture(frame, clockwise_deg, mirrored, center):

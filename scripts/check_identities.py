@@ -10,7 +10,8 @@ with the build's constants, and every frame is held to the truth:
 - the status of the frames is one of those that the scenario names;
 - no more dots are withheld than the scenario allows.
 
-`--random N` adds N frames under touches drawn from the seed, each unlike the one before: no dot called `ok` is another.
+`--random N` adds N frames under touches drawn from the seed, each unlike the one before, and half as many with a patch of the
+skin beside its place: no dot called `ok` is another.
 """
 import copy
 import json
@@ -59,6 +60,23 @@ def slip(sensor, axis, angle):
     return lambda points: (points - sensor.center) @ turn.T + sensor.center
 
 
+def patch(sensor, middle, turn, radius, stretch=1.0):
+    """A patch with a sharp edge moved over the dome as a whole: `turn` about the sphere's centre (a rotation vector), of the
+    dots within a radius, or in a box that is longer along the turn."""
+    turned = rotation(turn)
+    along = np.asarray(turn) / np.linalg.norm(turn)
+
+    def skin(points):
+        # a dot moves whole or not at all
+        away = (points.mean(-2, keepdims=True) if points.ndim > 2 else points) - middle
+        part = away @ along
+        across = np.sqrt(np.maximum((away**2).sum(-1) - part**2, 0))
+        inside = np.hypot(part, across) < radius if stretch == 1.0 else (np.abs(part) < radius * stretch) & (across < radius / stretch)
+        return np.where(inside[..., None], (points - sensor.center) @ turned.T + sensor.center, points)
+
+    return skin
+
+
 class Build:
     def __init__(self, program, folder):
         self.program = program
@@ -81,6 +99,17 @@ class Build:
         dots = (self.sensor.dots - self.sensor.center) / self.sensor.radius
         middle = dots[np.argmax(dots[:, 2])]
         return np.sort(np.arccos(np.clip(dots @ middle, -1, 1)))[1]
+
+    def patch(self, place, way, moved, steps, stretch=1.0):
+        """A patch about the dot nearest to a place, so many steps of the pattern wide to each side, that lies so many steps
+        beside its place towards its neighbour number `way`, or anywhere (a vector)."""
+        sensor = self.sensor
+        dots = (sensor.dots - sensor.center) / sensor.radius
+        middle = np.argmax(dots @ (place - sensor.center))
+        nearest = np.argsort(-(dots @ dots[middle]))
+        axis = np.cross(dots[middle], dots[nearest[1 + way]] if np.isscalar(way) else way)
+        step = np.arccos(np.clip(dots[middle] @ dots[nearest[1 + way if np.isscalar(way) else 1]], -1, 1))
+        return patch(sensor, sensor.dots[middle], axis / np.linalg.norm(axis) * step * moved, step * steps * sensor.radius, stretch)
 
     def track(self, frames, *options, constants=None):
         with tempfile.TemporaryDirectory() as folder:
@@ -203,6 +232,14 @@ def scenarios(build):
         slid = slip(sensor, [-np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth)), 0], build.pitch_rad())
         yield plain(f"skin slips by a pitch to {azimuth} deg", [{}, {"skin": slid}, {"skin": slid}], usual + ["key_unsure"], 0.35)
         yield plain(f"start slipped by a pitch to {azimuth} deg", [{"skin": slid}] * 3, start + ["key_unsure"], 0.35)
+    # silicone does not move so; a number that is wrong in silence is the worse for it
+    for polar in (0, 35):
+        for moved in (0.65, 0.8, 1.2):
+            skin = build.patch(build.at(polar), 0, moved, 2.4)
+            yield plain(f"a patch beside its place by {moved:g} steps at {polar} deg", [{}, {"skin": skin}, {"skin": skin}, {}], usual, 0.4)
+            # where the patch covers an image of the key, all numbers are withheld
+            named = start + ["key_unsure", "mirrored", "turned"]
+            yield plain(f"start with that, {moved:g} at {polar} deg", [{"skin": skin}] * 2, named, 1.0)
     if build.is_rigid:
         return
     # markers
@@ -253,11 +290,18 @@ def random_skin(build, random):
     return skin
 
 
-def random_touches(build, count, seed):
+def random_patch(build, random):
+    """A patch with a sharp edge anywhere, of any size and way, that lies 0.5 to 0.9 steps beside its place."""
+    way = random.integers(4) if random.random() < 0.6 else random.normal(size=3)
+    stretch = random.uniform(1, 2) if random.random() < 0.4 else 1.0
+    return build.patch(build.at(random.uniform(0, 50), random.uniform(0, 360)), way, random.uniform(0.5, 0.9), random.uniform(0.6, 5), stretch)
+
+
+def random_frames(build, count, seed, name, skin):
     """Frames that have nothing to do with each other but their sensor: whatever may jump, jumps."""
     global failed
     random = np.random.default_rng(seed)
-    drawn = [build.sensor.draw(seed=i, skin=random_skin(build, random)) for i in range(count)]
+    drawn = [build.sensor.draw(seed=i, skin=skin(build, random)) for i in range(count)]
     lines, _ = build.track([frame for frame, _ in drawn])
     wrong, named, seen = [], 0, 0
     for i, (line, (_, truth)) in enumerate(zip(lines, drawn)):
@@ -270,7 +314,7 @@ def random_touches(build, count, seed):
             if off > 0.4 * build.spacing[index]:
                 wrong.append((i, index, round(float(off), 1)))
     failed += bool(wrong) or len(lines) != count
-    print(f"{'FAIL' if wrong else 'ok  '} {count} random touches, seed {seed}: {len(wrong)} swapped of {seen}, {named} withheld "
+    print(f"{'FAIL' if wrong else 'ok  '} {count} random {name}, seed {seed}: {len(wrong)} swapped of {seen}, {named} withheld "
           f"{wrong[:12]}", flush=True)
 
 
@@ -295,7 +339,8 @@ def main(program, *builds):
             if only is None or only in name:
                 run()
         if count:
-            random_touches(build, count, seed)
+            random_frames(build, count, seed, "touches", random_skin)
+            random_frames(build, count // 2, seed, "patches", random_patch)
     print("every mark is itself, or named" if failed == 0 else f"{failed} faults")
     return 1 if failed else 0
 

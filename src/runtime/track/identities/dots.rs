@@ -11,6 +11,7 @@ use super::dot_track::DotTrack;
 use super::false_dots::{MAX_FALSE_DOTS, find_false_dots};
 use super::groups::Groups;
 use super::key_check::{KeyCheck, KeyFrame, Orientation};
+use super::shifted_rows::ShiftedRows;
 use crate::track::frame::{Mask, Plane};
 use crate::track::marks::{BlobScan, DarkBlob, SpotMeter};
 use crate::track::model::{DotModel, SensorModel};
@@ -110,6 +111,7 @@ pub(in crate::track) struct DotIdentities {
     false_dots: Vec<DVec2>,
     key: KeyCheck,
     faults: DotFaults,
+    shifted: ShiftedRows,
     /// Frames so far.
     turn: usize,
 }
@@ -147,6 +149,7 @@ impl DotIdentities {
             false_dots: Vec::with_capacity(MAX_FALSE_DOTS),
             key: KeyCheck::new(options.camera_turned_rad.is_some(), width, height),
             faults: DotFaults::new(count),
+            shifted: ShiftedRows::new(count),
             turn: 0,
         }
     }
@@ -175,6 +178,14 @@ impl DotIdentities {
             }
         }
         self.faults.judge(models, &mut self.dots.tracks);
+        let Dots { meter, tracks, .. } = &mut self.dots;
+        self.shifted.judge(models, tracks, |tracks, index, at| {
+            let reach_px = BLOB_REACH * models[index].spacing_px;
+            let spot = meter.measure(plane, at, &tracks[index].outline, reach_px, None);
+            let is_other =
+                |at: DVec2| tracks.iter().filter_map(DotTrack::now_px).all(|p| p.distance(at) > reach_px);
+            spot.is_ok_and(|spot| is_other(spot.at_px))
+        });
         self.dots.tracks.iter_mut().for_each(DotTrack::remember);
         self.now()
     }

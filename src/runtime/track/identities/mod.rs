@@ -17,6 +17,7 @@ mod groups;
 mod key_check;
 mod marker_hypotheses;
 mod markers;
+mod shifted_rows;
 mod skin;
 
 pub(super) use dot_track::DotTrack;

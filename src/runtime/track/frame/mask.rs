@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::camera_frame::MAX_PIXELS;
 use crate::constants::{CameraConstants, MaskConstants};
-use domecast_optics::camera::Lens;
+use domecast_optics::camera::{Lens, LensLimit};
 
 /// Pixels of the raw frame that the circle of the undistorted frame holds.
 #[derive(Debug, Clone)]
@@ -24,10 +24,16 @@ impl Mask {
         let center = DVec2::from_array(mask.center_px);
         let mut inside = vec![false; width * height];
         let mut spans = vec![[0, 0]; height];
+        // Row by row: many rays at a time cost a part of what they do one by one.
+        let mut pixels: Vec<DVec2> = (0..width).map(|x| DVec2::new(x as f64, 0.0)).collect();
+        let mut rays = vec![Err(LensLimit::NotFinite); width];
         for y in 0..height {
+            pixels.iter_mut().for_each(|pixel| pixel.y = y as f64);
+            // Both are as long as a row is wide.
+            let Ok(()) = lens.unproject_all(&pixels, &mut rays) else { continue };
             let mut span = [u32::MAX, 0];
-            for x in 0..width {
-                let Ok(ray) = lens.unproject(DVec2::new(x as f64, y as f64)) else { continue };
+            for (x, ray) in rays.iter().enumerate() {
+                let Ok(ray) = ray else { continue };
                 if ray.z <= 0.0 {
                     continue;
                 }

@@ -291,10 +291,12 @@ def random_skin(build, random):
 
 
 def random_patch(build, random):
-    """A patch with a sharp edge anywhere, of any size and way, that lies 0.5 to 0.9 steps beside its place."""
+    """A patch with a sharp edge anywhere, of a third of the dots at most, that lies 0.5 to 0.9 steps beside its place: of one of
+    half of the dots it is not clear which half moved."""
+    widest = min(5.0, np.sqrt(len(build.sensor.dots) / 3 / np.pi))
     way = random.integers(4) if random.random() < 0.6 else random.normal(size=3)
     stretch = random.uniform(1, 2) if random.random() < 0.4 else 1.0
-    return build.patch(build.at(random.uniform(0, 50), random.uniform(0, 360)), way, random.uniform(0.5, 0.9), random.uniform(0.6, 5), stretch)
+    return build.patch(build.at(random.uniform(0, 50), random.uniform(0, 360)), way, random.uniform(0.5, 0.9), random.uniform(0.6, widest), stretch)
 
 
 def random_frames(build, count, seed, name, skin):

@@ -24,15 +24,20 @@ impl Mask {
         let center = DVec2::from_array(mask.center_px);
         let mut inside = vec![false; width * height];
         let mut spans = vec![[0, 0]; height];
-        // Row by row: many rays at a time cost a part of what they do one by one.
+        // Row by row, as far as the lens sees: many rays at a time cost a part of what they do one by one.
+        let [[_, _, lens_x], [_, _, lens_y], _] = lens.spec().matrix;
         let mut pixels: Vec<DVec2> = (0..width).map(|x| DVec2::new(x as f64, 0.0)).collect();
         let mut rays = vec![Err(LensLimit::NotFinite); width];
         for y in 0..height {
+            let half = (lens.max_radius_px().powi(2) - (y as f64 - lens_y).powi(2)).max(0.0).sqrt() + 1.0;
+            let start = ((lens_x - half).max(0.0) as usize).min(width);
+            let end = ((lens_x + half).max(0.0) as usize).saturating_add(1).clamp(start, width);
+            let (pixels, rays) = (&mut pixels[start..end], &mut rays[start..end]);
             pixels.iter_mut().for_each(|pixel| pixel.y = y as f64);
-            // Both are as long as a row is wide.
-            let Ok(()) = lens.unproject_all(&pixels, &mut rays) else { continue };
+            // Both are of one length.
+            let Ok(()) = lens.unproject_all(pixels, rays) else { continue };
             let mut span = [u32::MAX, 0];
-            for (x, ray) in rays.iter().enumerate() {
+            for (x, ray) in (start..).zip(&*rays) {
                 let Ok(ray) = ray else { continue };
                 if ray.z <= 0.0 {
                     continue;

@@ -170,3 +170,104 @@ impl ShiftedRows {
         has_blob(tracks, *last, place_px + step_px + off_px) || has_blob(tracks, *last, place_px)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::marks::{DarkSpot, SpotOutline};
+
+    const SPACING_PX: f64 = 20.0;
+    const COLUMNS: usize = 9;
+
+    /// A lattice of dots that are found at rest but for what `change` does.
+    fn judged(change: impl Fn(usize, usize, &mut DotTrack), blobs: &[DVec2]) -> Vec<DotTrack> {
+        let outline = SpotOutline { radius_px: 4.0, area_px: 50.0, spread_px2: 8.0, elongation: DVec2::ZERO };
+        let models = DotModel::lattice(COLUMNS, 7, SPACING_PX, outline);
+        let mut tracks: Vec<DotTrack> = models
+            .iter()
+            .enumerate()
+            .map(|(index, model)| {
+                let spot = DarkSpot { at_px: model.rest_px, area_px: 50.0, ..DarkSpot::default() };
+                let expected_px = Some(model.rest_px);
+                let state = MarkState::Ok;
+                let mut track =
+                    DotTrack { expected_px, outline, state, spot: Some(spot), ..DotTrack::default() };
+                change(index % COLUMNS, index / COLUMNS, &mut track);
+                track
+            })
+            .collect();
+        ShiftedRows::new(models.len())
+            .judge(&models, &mut tracks, |_, _, at| blobs.iter().any(|blob| blob.distance(at) < 4.0));
+        tracks
+    }
+
+    fn unsure(tracks: &[DotTrack]) -> Vec<usize> {
+        let is_unsure = |index: &usize| tracks[*index].fault == Some(MarkState::IdentityUnsure);
+        (0..tracks.len()).filter(is_unsure).collect()
+    }
+
+    /// Dots of columns 3 to 5 and rows 2 to 4 are one further in truth: what is taken for them is `off` beside their places,
+    /// and nothing is where the one in column 2 should be.
+    fn patch(off: f64) -> impl Fn(usize, usize, &mut DotTrack) {
+        move |x, y, track| {
+            if (2..5).contains(&y) && x == 2 {
+                track.lose(MarkState::Lost);
+            }
+            if (2..5).contains(&y)
+                && (3..6).contains(&x)
+                && let Some(spot) = &mut track.spot
+            {
+                spot.at_px.x += off * SPACING_PX;
+            }
+        }
+    }
+
+    #[test]
+    fn rows_between_a_gap_and_a_dot_too_many_are_unsure() {
+        let rows: Vec<usize> = (2..5).flat_map(|y| (3..6).map(move |x| y * COLUMNS + x)).collect();
+        // Moved by 0.6, 0.8, 1.2 of the spacing: the dots before the patch are double, or its last ones stand beside them.
+        for off in [-0.4, -0.2, 0.2] {
+            let double = |x: usize, y: usize, track: &mut DotTrack| {
+                patch(off)(x, y, track);
+                if (2..5).contains(&y) && x == 6 {
+                    track.fault = Some(MarkState::Smeared);
+                }
+            };
+            assert_eq!(unsure(&judged(double, &[])), rows, "{off}");
+            let blobs = [2.0, 3.0, 4.0].map(|y| DVec2::new(6.0 + off, y) * SPACING_PX);
+            assert_eq!(unsure(&judged(patch(off), &blobs)), rows, "{off}");
+        }
+        // Moved by a whole step but for the turn of the patch: the middle row looks as if nothing were.
+        let turned = |x: usize, y: usize, track: &mut DotTrack| {
+            patch(0.08 * (y as f64 - 3.0))(x, y, track);
+            if (2..5).contains(&y)
+                && x == 6
+                && let Some(spot) = &mut track.spot
+            {
+                spot.area_px *= 1.1;
+            }
+        };
+        assert_eq!(unsure(&judged(turned, &[])), rows);
+    }
+
+    #[test]
+    fn a_gap_or_a_dot_too_many_alone_makes_nothing_unsure() {
+        assert_eq!(unsure(&judged(patch(0.0), &[])), [0; 0]);
+        // Dots are broken, others dirty, the skin is at rest.
+        let dirty = |x: usize, y: usize, track: &mut DotTrack| {
+            patch(0.0)(x, y, track);
+            if x == 7 {
+                track.fault = Some(MarkState::Dirty);
+            }
+        };
+        assert_eq!(unsure(&judged(dirty, &[])), [0; 0]);
+        // The skin is pulled smoothly over a broken dot.
+        let pulled = |x: usize, y: usize, track: &mut DotTrack| {
+            patch(0.0)(x, y, track);
+            if let Some(spot) = &mut track.spot {
+                spot.at_px.x += 0.1 * SPACING_PX * (4.0 - (x as f64 - 4.0).abs());
+            }
+        };
+        assert_eq!(unsure(&judged(pulled, &[])), [0; 0]);
+    }
+}

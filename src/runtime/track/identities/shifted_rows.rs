@@ -111,9 +111,10 @@ impl ShiftedRows {
             let track = &tracks[**other];
             track.spot.is_some() && track.fault.is_none() && self.steps[**other].is_none()
         };
-        let steps = around.iter().filter_map(|other| self.steps[*other]);
+        let mut steps = around.iter().filter_map(|other| self.steps[*other]);
         let count = steps.clone().count();
-        (count >= 2 && count > around.iter().filter(is_clear).count()).then(|| steps.last()).flatten()
+        let is_within = count >= 2 && count > around.iter().filter(is_clear).count();
+        steps.next().filter(|_| is_within)
     }
 
     /// Whether a row's next spot may be two dots'; `beyond`: the dot after it.

@@ -128,7 +128,7 @@ def main():
     parser.add_argument("--all", action="store_true")
     parser.add_argument("--wheel", type=Path)
     parser.add_argument("--keep", type=Path)
-    parser.add_argument("--inputs", type=int, help="random wrong inputs [default: 3,000; with --all 20,000]")
+    parser.add_argument("--inputs", type=int, help="random wrong inputs [default: 3,000; with --all 100,000]")
     parser.add_argument("--frames", type=int, help="frames that must leave the memory as it was [default: 1,500; with --all 20,000]")
     asked = parser.parse_args()
     domecast = Path(asked.domecast).resolve()
@@ -151,7 +151,7 @@ def main():
         beside = {**os.environ, "PYTHONPATH": str(site), "PYTHONDONTWRITEBYTECODE": "1"}
         check_types(site)
         constants = base / "work/by-cli/constants/constants.json"
-        inputs = asked.inputs or (20_000 if asked.all else 3_000)
+        inputs = asked.inputs or (100_000 if asked.all else 3_000)
         run(sys.executable, HERE / "wrong_inputs.py", constants, REPOSITORY, inputs, env=beside, cwd=base)
         run(sys.executable, HERE / "run_notebooks.py", REPOSITORY, base / "notebooks", env=beside)
         run(sys.executable, HERE / "ros_node.py", constants, base / "work/simulated-push", env=beside, cwd=base)

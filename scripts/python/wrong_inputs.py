@@ -1,154 +1,163 @@
-"""Random wrong inputs to every call: exceptions with words, never a panic, never a crash.
+"""Random wrong inputs to every public call: exceptions with words, never a panic, never a crash.
 
-    wrong_inputs.py CONSTANTS REPOSITORY COUNT
+    wrong_inputs.py CONSTANTS REPOSITORY COUNT [--drawn N] [--only NAME]
+
+Every parameter of every entry (python/entries.py) has a good value and wrong ones. A first part of the calls is drawn by hypothesis,
+which shrinks what fails; the rest puts the values that it drew together anew, which costs it nothing: hypothesis' own work is
+milliseconds a call. The same numbers give the same calls. At the end what the calls shared must still give what it gave at first.
 """
 
-import json
+import argparse
+import faulthandler
+import importlib
+import inspect
+import os
+import random
 import sys
 import tempfile
+import time
 import warnings
 from collections import Counter
 from pathlib import Path
 
 import domecast
-import numpy as np
+import domecast.live
+from entries import Edits, entries
 from hypothesis import HealthCheck, Phase, given, settings, strategies as some
-from hypothesis.extra import numpy as arrays
 
-CONSTANTS, REPOSITORY, COUNT = Path(sys.argv[1]).read_text(), Path(sys.argv[2]), int(sys.argv[3])
 # what a caller's mistake may raise; a panic is a BaseException that is none of them
-ALLOWED = (ValueError, TypeError, OverflowError, AttributeError, KeyError, IndexError)
-SENSOR = domecast.Sensor.from_str(CONSTANTS)
-DESIGN = domecast.Design.load(REPOSITORY / "designs/thumb24.json")
-OPTICS = DESIGN.optics()
-SCENE = json.loads((REPOSITORY / "designs/scenes/push.json").read_text())
-TREES = {"design": json.loads(DESIGN.text), "constants": json.loads(CONSTANTS), "scene": SCENE}
-TRACKER = domecast.Tracker(SENSOR)
-READING = TRACKER.update(np.zeros((480, 640, 3), np.uint8), rgb=True)
-SHAPE = domecast.Shape(SENSOR, TRACKER)
-TRACTION = domecast.Traction(SENSOR)
-FOLDER = tempfile.TemporaryDirectory()
-SEEN: Counter = Counter()
-
-numbers = some.one_of(some.floats(), some.integers(), some.sampled_from([0, -1, 2**31, 2**63, 2**64, 1e308, float("nan"), float("inf")]))
-scalars = some.one_of(numbers, some.none(), some.booleans(), some.text(max_size=8), some.binary(max_size=8))
-anything = some.recursive(scalars, lambda inner: some.one_of(some.lists(inner, max_size=4), some.dictionaries(some.text(max_size=6), inner, max_size=4)), max_leaves=8)
-shapes = some.one_of(some.sampled_from([(480, 640, 3), (480, 640), (0, 0, 3), (1, 1, 3), (480, 640, 4), (3,), ()]), arrays.array_shapes(max_dims=4, max_side=6))
-ndarrays = some.builds(lambda shape, dtype, turn: np.zeros(shape, dtype)[tuple([slice(None, None, turn)] * len(shape))], shapes,
-                       some.sampled_from(["u1", "i1", "f4", "f8", "c16", "O", "U4", "?", "u2", ">f8", "M8[s]"]), some.sampled_from([1, -1, 2]))
-points = some.one_of(ndarrays, anything, arrays.arrays("f8", some.tuples(some.integers(0, 5), some.integers(0, 4)), elements=some.floats()))
-frames = some.one_of(ndarrays, anything)
-words = some.one_of(scalars, some.sampled_from(["luma", "green", "wrench", "dots"]))
+ALLOWED = (ValueError, TypeError, OverflowError, AttributeError, KeyError, IndexError, RecursionError, StopIteration, UserWarning)
+# each call leaves at least so many calls to hypothesis
+MIN_DRAWN = 12
+# of the calls that are put together anew, the part of parameters that are good beside one that is not
+GOOD_PART = 0.6
+# files with several faults at once
+MAX_EDITS = 3
 
 
-@some.composite
-def broken(draw, kind):
-    """A file in which one place has another value, or none."""
-    tree = json.loads(json.dumps(TREES[kind]))
-    at = tree
-    while True:
-        keys = list(at) if isinstance(at, dict) else list(range(len(at)))
-        key = draw(some.sampled_from(keys))
-        inner = at[key]
-        if not (isinstance(inner, (dict, list)) and inner) or draw(some.booleans()):
-            break
-        at = inner
-    if draw(some.booleans()):
-        at[key] = draw(anything)
-    else:
-        del at[key]
-    return tree
+class Judge:
+    def __init__(self):
+        self.seen, self.times, self.slowest = Counter(), {}, {}
+
+    def attempt(self, name, call, values):
+        began = time.perf_counter()
+        try:
+            call(*values)
+            self.seen["accepted"] += 1
+        except domecast.DomecastError as error:
+            self.seen["DomecastError"] += 1
+            assert str(error) and "panicked" not in str(error), (name, values, error)
+        except ALLOWED as error:
+            self.seen[type(error).__name__] += 1
+            assert str(error) or isinstance(error, StopIteration), (name, values)
+        except (RuntimeError, AssertionError) as error:
+            # "a fault in domecast itself" is one
+            raise AssertionError(f"{name}: {values!r}: {error}") from error
+        except BaseException as error:
+            raise AssertionError(f"{name}: {values!r}: {type(error).__name__}: {error}") from error
+        took = time.perf_counter() - began
+        count, whole = self.times.get(name, (0, 0.0))
+        self.times[name] = count + 1, whole + took
+        if took > self.slowest.get(name, (0.0, ""))[0]:
+            self.slowest[name] = took, repr(values)[:200]
 
 
-def text_of(tree):
-    return json.dumps(tree, default=str)
+def public_calls():
+    """Every public class, method and function of the wheel that takes anything from its caller."""
+    found = set()
+    for module in (domecast, domecast.live, importlib.import_module("domecast.ros")):
+        for name, one in vars(module).items():
+            own = getattr(one, "__module__", "") in (module.__name__, "domecast", "domecast._commands", "domecast._design", "domecast._scene")
+            if name.startswith("_") or not own or inspect.ismodule(one):
+                continue
+            if not inspect.isclass(one):
+                if callable(one) and inspect.signature(one).parameters:
+                    found.add(name)
+                continue
+            if issubclass(one, BaseException):
+                continue
+            for method, what in vars(one).items():
+                what = getattr(one, method) if isinstance(what, (classmethod, staticmethod)) else what
+                if method in ("__new__", "__init__"):
+                    # where one has neither, it cannot be made by its callers
+                    found.add(name)
+                elif callable(what) and not method.startswith("_"):
+                    if set(inspect.signature(what).parameters) - {"self"}:
+                        found.add(f"{name}.{method}")
+    return found
 
 
-def edit(tree):
-    design = DESIGN.copy()
-    design.tree = tree
-    design.resolve()
+def drawn(judge, name, entry, count):
+    """Calls that hypothesis draws; the values of each parameter."""
+    pools = [[] for _ in entry.columns]
+    column = [some.one_of(some.just(good), wrong) for good, wrong in entry.columns]
+
+    @settings(max_examples=count, deadline=None, database=None, derandomize=True, suppress_health_check=list(HealthCheck),
+              phases=[Phase.generate, Phase.shrink])
+    @given(some.tuples(*column))
+    def judged(values):
+        for pool, value, (good, _) in zip(pools, values, entry.columns):
+            if value is not good:
+                pool.append(value)
+        judge.attempt(name, entry.call, values)
+    judged()
+    return [pool or [good] for pool, (good, _) in zip(pools, entry.columns)]
 
 
-def scene_of(tree):
-    if isinstance(tree.get("frames"), dict):
-        tree["frames"]["count"] = 1
-    domecast.Scene(tree, design=DESIGN, folder=REPOSITORY / "designs/scenes")
+def together(judge, name, entry, pools, count):
+    """Calls of the same values, each parameter's taken by itself."""
+    chance = random.Random(name)
+    goods = [good for good, _ in entry.columns]
 
-
-def track_other(text):
-    """Constants that are still some must make a tracker, or say why not; and what they make must work."""
-    sensor = domecast.Sensor.from_str(text)
-    tracker = domecast.Tracker(sensor)
-    width, height = sensor.size
-    if width * height <= 2_000_000:
-        tracker.update(np.full((height, width, 3), 128, np.uint8), rgb=True).json()
-    domecast.Traction(sensor)
-    domecast.Shape(sensor, tracker)
-
-
-CALLS = {
-    "Optics.trace": (lambda a: OPTICS.trace(a), points),
-    "Optics.project": (lambda a: OPTICS.project(a), points),
-    "Optics.at_pose": (lambda a: OPTICS.at_pose(a), points),
-    "Tracker.update": (lambda a: TRACKER.update(a[0], rgb=a[1], time=a[2], number=a[3]), some.tuples(frames, words, words, words)),
-    "Tracker.skip": (lambda a: TRACKER.skip(time=a[0], number=a[1]), some.tuples(words, words)),
-    "Tracker": (lambda a: domecast.Tracker(SENSOR, channel=a[0], reference=a[1], search_every=a[2], max_residual_px=a[3], camera_turned_deg=a[4]),
-                some.tuples(words, anything, some.one_of(some.just(30), words), some.one_of(some.just(2.0), numbers), words)),
-    "Shape": (lambda a: domecast.Shape(SENSOR, TRACKER, cell_px=a[0], max_passes=a[1]), some.tuples(numbers, numbers)),
-    "Shape.set_rest": (lambda a: SHAPE.set_rest(a[0], rgb=a[1]), some.tuples(frames, words)),
-    "Shape.update": (lambda a: SHAPE.update(a[0], a[1], rgb=True), some.tuples(frames, some.one_of(some.just(READING), anything))),
-    "Traction.update": (lambda a: TRACTION.update(a[0], shape=a[1]), some.tuples(some.one_of(some.just(READING), anything), words)),
-    "Reading.json": (lambda a: READING.json(a), anything),
-    "Reading.overlay_png": (lambda a: READING.overlay_png(a[0], rgb=True, magnify=a[1]), some.tuples(frames, words)),
-    "Sensor.from_str": (lambda a: domecast.Sensor.from_str(a), some.one_of(some.text(), broken("constants").map(text_of))),
-    "Tracker of other constants": (track_other, broken("constants").map(text_of)),
-    "Camera": (lambda a: domecast.Camera(a[0], SENSOR, rate=a[1], exposure_ms=a[2], gain=a[3]), some.tuples(some.one_of(scalars, some.text(max_size=6).map("player:".__add__)), words, words, words)),
-    "Sensor.load": (lambda a: domecast.Sensor.load(a), scalars),
-    "Design.from_str": (lambda a: domecast.Design.from_str(a), some.one_of(some.text(), anything)),
-    "Design edits": (edit, some.one_of(broken("design"), some.dictionaries(some.text(max_size=6), anything, max_size=3))),
-    "Scene": (scene_of, broken("scene")),
-    "calibrate_force": (lambda a: domecast.calibrate_force(a[0], a[1], out=Path(FOLDER.name) / "out.json", motion_sd=a[2]), some.tuples(scalars, scalars, anything)),
-    "accuracy": (lambda a: domecast.accuracy(a[0], out=a[1]), some.tuples(scalars, scalars)),
-}
-# these take milliseconds, not microseconds
-SLOW = {"Design edits": 0.1, "Scene": 0.03, "Tracker": 0.1, "Shape": 0.02, "Reading.overlay_png": 0.05, "Tracker of other constants": 0.1}
-
-
-def attempt(name, call, value):
-    try:
-        call(value)
-        SEEN["accepted"] += 1
-    except domecast.DomecastError as error:
-        SEEN["DomecastError"] += 1
-        assert str(error) and "panicked" not in str(error), (name, error)
-    except ALLOWED as error:
-        SEEN[type(error).__name__] += 1
-        assert str(error), (name, value)
-    except RuntimeError as error:
-        # "a fault in domecast itself" is one
-        raise AssertionError(f"{name}: {value!r}: {error}") from error
-    except BaseException as error:
-        if type(error).__name__ == "PanicException":
-            raise AssertionError(f"{name} panicked: {value!r}: {error}") from error
-        raise
+    def value(good, pool, is_wrong):
+        if isinstance(good, Edits):
+            return good.of([one for _ in range(chance.randint(1, MAX_EDITS)) for one in chance.choice(pool)])
+        return chance.choice(pool) if is_wrong or chance.random() > GOOD_PART else good
+    for _ in range(count):
+        # one at least is wrong
+        wrong = chance.randrange(len(goods))
+        judge.attempt(name, entry.call, tuple(value(good, pool, k == wrong) for k, (good, pool) in enumerate(zip(goods, pools))))
 
 
 def main():
-    # an input that is taken with a part of it lost is a fault too
+    parser = argparse.ArgumentParser()
+    parser.add_argument("constants", type=Path)
+    parser.add_argument("repository", type=Path)
+    parser.add_argument("count", type=int)
+    parser.add_argument("--drawn", type=float, default=0.08, help="the part that hypothesis draws")
+    parser.add_argument("--only")
+    asked = parser.parse_args()
+    faulthandler.enable()
+    # an input that is taken with a part of it lost is a fault too; that infinite numbers stay what they are is none
     warnings.simplefilter("error")
-    share = COUNT / sum(SLOW.get(name, 1) for name in CALLS)
-    for name, (call, inputs) in CALLS.items():
-        count = max(20, round(share * SLOW.get(name, 1)))
-
-        @settings(max_examples=count, deadline=None, database=None, derandomize=True, suppress_health_check=list(HealthCheck), phases=[Phase.generate, Phase.shrink])
-        @given(inputs)
-        def judged(value):
-            attempt(name, call, value)
-        judged()
-    total = sum(SEEN.values())
-    FOLDER.cleanup()
-    print(f"wrong inputs: {total} calls, none panicked: {dict(SEEN)}")
+    warnings.simplefilter("ignore", RuntimeWarning)
+    with tempfile.TemporaryDirectory() as folder:
+        home = os.getcwd()
+        constants, repository = asked.constants.resolve(), asked.repository.resolve()
+        # whatever writes by a name alone writes there
+        os.chdir(folder)
+        calls, same = entries(constants, repository, Path(folder))
+        missing = public_calls() - set(calls)
+        assert not missing, f"no wrong inputs for {sorted(missing)}"
+        judge, whole = Judge(), sum(entry.weight for entry in calls.values())
+        for name, entry in calls.items():
+            if asked.only and asked.only != name:
+                continue
+            count = max(MIN_DRAWN, round(asked.count * entry.weight / whole))
+            first = max(MIN_DRAWN, round(asked.drawn * count))
+            began = time.perf_counter()
+            pools = drawn(judge, name, entry, first)
+            after = time.perf_counter()
+            together(judge, name, entry, pools, max(0, count - first))
+            number, took = judge.times[name]
+            print(f"     {name:28} {number:6} calls, {1e3 * took / number:8.3f} ms each; hypothesis {after - began:5.1f} s, the rest "
+                  f"{time.perf_counter() - after:5.1f} s; slowest {judge.slowest[name][0]:.2f} s", flush=True)
+        same()
+        os.chdir(home)
+    for name, (took, what) in judge.slowest.items():
+        if took > 5:
+            print(f"     slow: {name} took {took:.1f} s: {what}")
+    print(f"wrong inputs: {sum(judge.seen.values())} calls of {len(calls)} entries, none panicked: {dict(judge.seen)}")
     return 0
 
 

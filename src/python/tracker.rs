@@ -14,6 +14,9 @@ use crate::error::Fault;
 use crate::frame::FrameArray;
 use crate::reading::{PyReading, SensorAtRest};
 
+/// A benchmark repeats a frame so often at most: nothing ends it before.
+const MAX_REPEATS: u32 = 1000;
+
 /// What a runtime must know of one sensor: the content of a `constants.json`.
 #[pyclass(name = "Sensor", module = "domecast", frozen)]
 pub(crate) struct PySensor {
@@ -235,6 +238,10 @@ impl PyTracker {
     /// Median time of `track` alone on a frame, s: what `update` is measured against.
     #[pyo3(signature = (frame, *, rgb, repeats))]
     fn benchmark(&self, py: Python<'_>, frame: &Bound<'_, PyAny>, rgb: bool, repeats: u32) -> PyResult<f64> {
+        if !(1..=MAX_REPEATS).contains(&repeats) {
+            let allowed = format!("1 to {MAX_REPEATS}");
+            return Err(Fault::argument("repeats", repeats, "is beyond its range", &allowed).into());
+        }
         let array = FrameArray::new(frame, rgb)?;
         let bytes = array.bytes();
         let seen = array.over(&bytes)?;
@@ -245,7 +252,7 @@ impl PyTracker {
                 std::hint::black_box(tracker.track(number, &seen));
                 began.elapsed().as_secs_f64()
             };
-            (0..u64::from(repeats.max(1))).map(one).collect()
+            (0..u64::from(repeats)).map(one).collect()
         });
         times.sort_by(f64::total_cmp);
         Ok(times[times.len() / 2])

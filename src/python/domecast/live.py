@@ -15,11 +15,23 @@ import numpy as np
 from . import _native
 from ._arrays import Frame
 from ._design import Design
+from ._error import DomecastError
 from ._scene import Scene
 from ._types import Floats
 
 MAX_OBJECTS = 16
 PLANNED_FRAMES = 64
+
+
+def _array(field: str, given: Any, shape: tuple[int, ...], kinds: str = "iuf") -> Any:
+    """The numbers of an argument, of numpy's `kinds` of type; -1 in `shape` is any length."""
+    found: Any = np.asarray(given)
+    is_shaped = found.ndim == len(shape) and all(side in (-1, own) for side, own in zip(shape, found.shape))
+    if not is_shaped or found.dtype.kind not in kinds or not np.isfinite(found).all():
+        sides = " x ".join("N" if side < 0 else str(side) for side in shape)
+        allowed = f"{sides} {'finite' if 'f' in kinds else 'whole'} numbers"
+        raise DomecastError(f"`{field}` does not hold {allowed}", field=field, value=repr(given)[:100], allowed=allowed)
+    return found
 
 
 def _pressing(index: int, count: int, shape: Mapping[str, Any], end_s: float) -> dict[str, Any]:
@@ -92,6 +104,9 @@ class LiveSensor:
     ) -> None:
         if not 1 <= len(shapes) <= MAX_OBJECTS:
             raise ValueError(f"{len(shapes)} objects: 1 to {MAX_OBJECTS} are possible")
+        if not 1e-3 <= rate_hz <= 1e6:
+            raise DomecastError(f"`rate_hz` is {rate_hz}; allowed: 0.001 to 1000000", field="rate_hz", value=repr(rate_hz),
+                                allowed="0.001 to 1000000")
         # the plan must take every object for one that presses; where each stands is each step's own
         count = len(shapes)
         tree: dict[str, Any] = {
@@ -112,9 +127,10 @@ class LiveSensor:
         rows = np.full((self._count, 16), np.nan)
         if len(poses) != self._count:
             raise ValueError(f"{len(poses)} poses for {self._count} objects")
-        for row, pose in zip(rows, poses):
+        for index, (row, pose) in enumerate(zip(rows, poses)):
+            # one that is away has no pose: a number that is none must not pass for it
             if pose is not None:
-                row[:] = np.asarray(pose, dtype=np.float64).reshape(16)
+                row[:] = _array(f"poses[{index}]", pose, (4, 4)).ravel()
         image, line = self._live.step(rows)
         return Touch(None if image is None else image.view(Frame), json.loads(line))
 
@@ -129,7 +145,7 @@ class LiveSensor:
 
 def write_stl(path: Path, vertices: Floats, faces: Any) -> None:
     """A closed mesh as binary STL, in the unit of its vertices."""
-    corners = np.asarray(vertices, dtype=np.float32)[np.asarray(faces, dtype=np.int64)]
+    corners = _array("vertices", vertices, (-1, 3)).astype(np.float32)[_array("faces", faces, (-1, 3), "iu")]
     records = np.zeros(len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
     records["corners"] = corners
     path.write_bytes(b"\0" * 80 + struct.pack("<I", len(corners)) + records.tobytes())
@@ -137,6 +153,10 @@ def write_stl(path: Path, vertices: Floats, faces: Any) -> None:
 
 def turned_profile(radii: Floats, heights: Floats, sides: int = 128) -> tuple[Floats, Any]:
     """Vertices and triangles of a profile turned about z; its first and last radius are 0."""
+    radii, heights = _array("radii", radii, (-1,)), _array("heights", heights, (-1,))
+    if len(radii) != len(heights) or len(radii) < 3:
+        raise DomecastError(f"{len(radii)} radii and {len(heights)} heights; allowed: as many of both, three at least", field="radii",
+                            value=str(len(radii)), allowed="as many radii as heights, three at least")
     angles = np.arange(sides) * (2 * np.pi / sides)
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     inner = [np.column_stack([radius * ring, np.full(sides, height)]) for radius, height in zip(radii[1:-1], heights[1:-1])]
@@ -155,6 +175,7 @@ def turned_profile(radii: Floats, heights: Floats, sides: int = 128) -> tuple[Fl
 
 def capsule(radius: float, half_length: float, rings: int = 32) -> tuple[Floats, Any]:
     """A capsule along z: a cylinder of this half length with a half ball at each end."""
+    radius, half_length = _array("radius and half length", [radius, half_length], (2,)).tolist()
     angles = np.linspace(0, np.pi / 2, rings + 1)
     radii = radius * np.sin(np.concatenate([angles, np.pi / 2 + angles]))
     heights = np.concatenate([-half_length - radius * np.cos(angles), half_length + radius * np.sin(angles)])
@@ -166,7 +187,7 @@ def ellipsoid(radii: Floats, rings: int = 64) -> tuple[Floats, Any]:
     """An ellipsoid along the axes."""
     angles = np.linspace(0, np.pi, rings + 1)
     vertices, faces = turned_profile(np.sin(angles) * (angles % np.pi > 0), -np.cos(angles))
-    return vertices * np.asarray(radii), faces
+    return vertices * _array("radii", radii, (3,)), faces
 
 
 def mesh_folder() -> tempfile.TemporaryDirectory[str]:

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Builds the wheel and judges it from outside.
 
-    check_python.py DOMECAST [--profile release] [--all] [--wheel FILE] [--keep FOLDER] [--inputs N] [--frames N]
+    check_python.py DOMECAST [--profile release] [--all] [--wheel FILE] [--keep FOLDER] [--inputs N] [--frames N] [--accuracy FOLDER]
 
 The wheel is built by maturin with the cargo profile that DOMECAST was built with, at most 10 MB, and installed with numpy and
 nothing else into a fresh virtual environment. There
 
-- its command line builds a sensor;
+- its command line builds a sensor, where no other program can be found and no variable is set;
 - every call gives what DOMECAST writes, bit for bit; two threads at once; flat memory (`python/same_as_cli.py`).
 
 Then, beside the test's own packages,
@@ -65,17 +65,25 @@ def check_wheel(wheel):
 
 
 def bare_environment(folder, wheel):
-    """A virtual environment with the wheel and what it asks for; its Python."""
+    """A virtual environment with the wheel and what it asks for; its Python. As in a container that has Python only: no other program can
+    be found, no variable says anything, and the design stands alone in a folder."""
     began = time.monotonic()
     run(sys.executable, "-m", "venv", folder)
     python = folder / "bin/python"
+    home = folder / "home"
+    home.mkdir(exist_ok=True)
+    nothing = {"PATH": str(folder / "bin"), "HOME": str(home)}
+    assert not any(shutil.which(name, path=nothing["PATH"]) for name in ("cargo", "rustc", "maturin", "cc", "git"))
     numpy = next(line for line in (REPOSITORY / "scripts/requirements.txt").read_text().splitlines() if line.startswith("numpy=="))
-    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", numpy, wheel)
+    # where the packages come from is the machine's own affair
+    index = {name: value for name, value in os.environ.items() if name.startswith("PIP_") or name.lower().endswith("_proxy")}
+    run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", numpy, wheel, env={**nothing, **index}, cwd=home)
     installed = time.monotonic() - began
-    out = folder / "thumb24"
-    took = run(folder / "bin/domecast", "build", REPOSITORY / "designs/thumb24.json", "--out", out, "--quiet")
-    assert (out / "report/index.html").exists()
-    print(f"virtual environment with the wheel in {installed:.1f} s, domecast build in {took:.1f} s")
+    shutil.copy(REPOSITORY / "designs/thumb24.json", home)
+    took = run(folder / "bin/domecast", "build", "thumb24.json", "--out", "thumb24", "--quiet", env=nothing, cwd=home)
+    assert (home / "thumb24/report/index.html").exists()
+    print(f"nothing but Python: virtual environment with the wheel in {installed:.1f} s, domecast build in {took:.1f} s, "
+          f"{installed + took:.1f} s in all")
     return python
 
 
@@ -128,8 +136,9 @@ def main():
     parser.add_argument("--all", action="store_true")
     parser.add_argument("--wheel", type=Path)
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--accuracy", type=Path, help="what `domecast accuracy --quick` made of thumb24 [default: it is made]")
     parser.add_argument("--inputs", type=int, help="random wrong inputs [default: 3,000; with --all 100,000]")
-    parser.add_argument("--frames", type=int, help="frames that must leave the memory as it was [default: 1,500; with --all 20,000]")
+    parser.add_argument("--frames", type=int, help="frames that must leave the memory as it was, as often in two threads, a twentieth of them for shapes [default: 800; with --all 10,000]")
     asked = parser.parse_args()
     domecast = Path(asked.domecast).resolve()
     with tempfile.TemporaryDirectory() as base:
@@ -141,8 +150,9 @@ def main():
         (base / "work").mkdir(exist_ok=True)
         check_program(domecast, python.parent / "domecast", base / "work")
         check_interrupt(python.parent / "domecast", base / "work")
-        frames = asked.frames or (20_000 if asked.all else 1_500)
-        run(python, HERE / "same_as_cli.py", domecast, REPOSITORY, base / "work", frames, cwd=base)
+        frames = asked.frames or (10_000 if asked.all else 800)
+        measured = [asked.accuracy.resolve()] if asked.accuracy else []
+        run(python, HERE / "same_as_cli.py", domecast, REPOSITORY, base / "work", frames, *measured, cwd=base)
         # beside the packages of the tests: the installed files alone
         site = base / "site"
         shutil.rmtree(site, ignore_errors=True)

@@ -1,8 +1,9 @@
 """The installed wheel gives what the command line gives, bit for bit; it runs where only the wheel and numpy are installed.
 
-    same_as_cli.py DOMECAST REPOSITORY WORK FRAMES
+    same_as_cli.py DOMECAST REPOSITORY WORK FRAMES [ACCURACY]
 
-FRAMES: how many frames must leave the memory as it was.
+FRAMES: how many frames must leave the memory as it was. ACCURACY: the folder of `domecast accuracy --quick` of thumb24, which is made
+where it is not given.
 """
 
 import importlib.util
@@ -251,11 +252,48 @@ def prints():
     check(texts[0] == texts[1] and told[0] == told[1], "calibrate-print: file and result")
 
 
+# what the clock says of a sample of a sweep, and what is chosen by it; among its notes those that are named seconds
+TIMES = {"time", "per_item_s", "dominated", "meets"}
+
+
+def timeless(tree):
+    """A measurement of accuracy without its times."""
+    if isinstance(tree, dict):
+        notes = {"notes": [one for one in tree["notes"] if not one[0].startswith("seconds ")]} if "notes" in tree else {}
+        return {key: timeless(value) for key, value in {**tree, **notes}.items() if key not in TIMES}
+    return [timeless(one) for one in tree] if isinstance(tree, list) else tree
+
+
+def accuracies(folder):
+    """What accuracy costs: every number that is no time, bit for bit."""
+    if folder is None:
+        folder = WORK / "accuracy-1"
+        cli("accuracy", DESIGN, "--quick", "--out", folder, "--quiet")
+    known = json.loads((folder / "accuracy.json").read_text())
+    found = domecast.accuracy(DESIGN, out=WORK / "accuracy-2", quick=True)
+    check(json.loads((WORK / "accuracy-2/accuracy.json").read_text()) == found["accuracy"], "accuracy: the result is its file's")
+    samples = [sample for sweep in found["accuracy"]["sweeps"] for sample in sweep["samples"]]
+    same = json.dumps(timeless(known)) == json.dumps(timeless(found["accuracy"]))
+    check(same and len(samples) > 50, f"accuracy: {len(samples)} samples, all but times")
+    names = [sorted(one.name for one in place.iterdir()) for place in (folder, WORK / "accuracy-2")]
+    check(names[0] == names[1], f"accuracy: {len(names[0])} files")
+
+
 def resident_mb():
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def memory(sensor, frames):
+def flat(what, count, run):
+    """Runs `count` frames after some that warm up; the memory must be where it was."""
+    run(min(300, count))
+    before, began = resident_mb(), time.perf_counter()
+    run(count)
+    took, after = time.perf_counter() - began, resident_mb()
+    check(after - before < 2.0, f"memory of {what}, {count} frames in {took:.0f} s: {before:.1f} to {after:.1f} MB")
+
+
+def follow(sensor, frames):
+    """What tracks frames from one array that is written anew, and asks for everything now and then; a frame that is none beside it."""
     tracker, place = domecast.Tracker(sensor), np.empty_like(frames[0])
 
     def run(count):
@@ -269,11 +307,30 @@ def memory(sensor, frames):
                     tracker.update(place[:, :, :2], rgb=True)
                 except domecast.DomecastError:
                     pass
-    run(min(300, FRAMES))
-    before = resident_mb()
-    run(FRAMES)
-    grown = resident_mb() - before
-    check(grown < 2.0, f"memory after {FRAMES} frames: {grown:+.2f} MB")
+    return run
+
+
+def memory(sensor, frames, rest, pressed):
+    flat("a tracker", FRAMES, follow(sensor, frames))
+    both = [follow(sensor, frames) for _ in range(2)]
+
+    def at_once(count):
+        running = [threading.Thread(target=run, args=(count // 2,)) for run in both]
+        [one.start() for one in running]
+        [one.join() for one in running]
+    flat("trackers in two threads", FRAMES, at_once)
+    tracker = domecast.Tracker(sensor)
+    shape, forces = domecast.Shape(sensor, tracker), domecast.Traction(sensor)
+    shape.set_rest(rest, rgb=True)
+
+    def feel(count):
+        for number in range(count):
+            frame = pressed[number % len(pressed)]
+            reading = tracker.update(frame, rgb=True)
+            skin = shape.update(frame, reading, rgb=True)
+            if number % 10 == 0:
+                assert len(forces.update(reading, shape=skin).json(shape=skin)) + skin.height_mm.size + len(skin.surface()) > 0
+    flat("tracker, shape and forces", max(FRAMES // 20, 50), feel)
 
 
 def threads(sensor, frames, lines):
@@ -341,8 +398,9 @@ def main():
     shapes(balls, pressed, rest / "frame_0000.png")
     calibrations(pushed)
     prints()
+    accuracies(Path(sys.argv[5]) if len(sys.argv) > 5 else None)
     threads(sensor, frames, lines)
-    memory(sensor, frames)
+    memory(sensor, frames, read_png(rest / "frame_0000.png"), pressed)
     overhead(sensor, frames)
     print(f"same as the command line: {len(FAULTS)} faults")
     return 1 if FAULTS else 0

@@ -2,6 +2,7 @@
 
 mod capture;
 mod loads;
+mod noise;
 mod outcome;
 mod page;
 mod session;
@@ -141,6 +142,10 @@ impl Wizard<'_> {
         if let Some(knowledge) = &self.outcome.knowledge {
             self.output.say(&format!("springs: {}", words::known(knowledge)))?;
         }
+        if let Some(sd_px) = self.outcome.centroid_px.filter(|_| !self.outcome.loads.is_empty()) {
+            self.output
+                .say(&format!("markers: {sd_px:.3} px, one standard deviation, by the frames so far"))?;
+        }
         match self.next(self.best().as_ref()) {
             Some(next) => self.output.say(&format!("helps most next: {next}")),
             None => Ok(()),
@@ -235,6 +240,7 @@ impl Wizard<'_> {
             "steps": self.session.steps.iter().map(step).collect::<Vec<_>>(),
             "known": self.outcome.knowledge.as_ref().map(words::known_json),
             "next": self.next(best.as_ref()),
+            "centroid_px": self.outcome.centroid_px,
             "next_gain": best.map(|(_, gain)| gain),
             "surprises": self.outcome.loads.iter().map(|load| load.surprise).collect::<Vec<_>>(),
             "constants": written(MEASURED),

@@ -7,6 +7,7 @@ use nalgebra::Matrix6;
 use serde_json::json;
 
 use super::loads::{self, Load, LoadNoise};
+use super::noise::CentroidNoise;
 use super::session::Step;
 use crate::commands::input::input_fault;
 use crate::commands::output::Failure;
@@ -54,6 +55,8 @@ pub struct Outcome {
     pub history: Vec<[f64; 6]>,
     /// Covariance of the motion that one load's frames show.
     pub motion: Option<Matrix6<f64>>,
+    /// Standard deviation of a step's mean centroid of a marker, px: learned from the frames.
+    pub centroid_px: Option<f64>,
     /// Sentences that the user should read.
     pub notes: Vec<String>,
 }
@@ -147,13 +150,18 @@ pub fn kind_of(step: &Step) -> &str {
     step.name.split_once('-').map_or("", |(_, kind)| kind)
 }
 
-/// Where the platform is in a step's frames, by the mean of each marker's centroids, and the covariance of the displacement. That
-/// of a single frame: what stays of a centroid's error in a still picture no mean takes out.
-fn pose_of(
-    solver: &PoseSolver,
-    constants: &Constants,
-    marks: &[Observation],
-) -> Result<(Rigid, Matrix6<f64>), String> {
+/// Where the platform is in a step's frames.
+struct StepPose {
+    pose: Rigid,
+    /// Of the displacement, for a noise of [`CENTROID_NOISE_PX`], and for that of these frames.
+    nominal_covariance: Matrix6<f64>,
+    covariance: Matrix6<f64>,
+    rms_px: f64,
+    markers: usize,
+}
+
+/// Where the platform is, by the mean of each marker's centroids.
+fn pose_of(solver: &PoseSolver, constants: &Constants, marks: &[Observation]) -> Result<StepPose, String> {
     let sightings: Vec<Sighting> = solver
         .markers()
         .iter()
@@ -166,9 +174,45 @@ fn pose_of(
         .collect();
     let found = solver.solve(&sightings).map_err(|error| error.to_string())?;
     let at_mm = constants.springs.as_ref().map_or(DVec3::ZERO, |s| DVec3::from_array(s.at_mm));
-    let centroid_px = constants.tolerances.map_or(CENTROID_SD_PX, |t| t.white_centroid_px);
-    let factor = (centroid_px / CENTROID_NOISE_PX).powi(2);
-    Ok((found.pose, found.displacement_covariance(at_mm) * factor))
+    let covariance = found.displacement_covariance(at_mm);
+    Ok(StepPose {
+        pose: found.pose,
+        nominal_covariance: covariance,
+        covariance,
+        rms_px: found.rms_px,
+        markers: sightings.len(),
+    })
+}
+
+/// How far a centroid may be off by the constants, px.
+fn tolerance_px(constants: &Constants) -> f64 {
+    constants.tolerances.map_or(CENTROID_SD_PX, |t| t.white_centroid_px)
+}
+
+/// The pose of each step that has marks, their covariances by the centroids' noise that all of them show, and that noise, px.
+fn poses_of<'a>(
+    solver: &PoseSolver,
+    constants: &Constants,
+    steps: &'a [Step],
+) -> Result<(Vec<(&'a Step, StepPose)>, f64), String> {
+    let mut noise = CentroidNoise::default();
+    let mut found = Vec::new();
+    let mut rest_frames = None;
+    for step in steps.iter().filter(|step| !step.marks.is_empty()) {
+        let one = pose_of(solver, constants, &step.marks)?;
+        let is_first = rest_frames.is_none();
+        let rest_frames = *rest_frames.get_or_insert_with(|| frames_of(&step.marks));
+        noise.add_scatter(&step.marks, solver.markers(), rest_frames);
+        if !is_first {
+            noise.add_residuals(one.rms_px, one.markers);
+        }
+        found.push((step, one));
+    }
+    let sd_px = noise.sd_px(tolerance_px(constants));
+    for (_, one) in &mut found {
+        one.covariance *= (sd_px / CENTROID_NOISE_PX).powi(2);
+    }
+    Ok((found, sd_px))
 }
 
 /// A weight that is not at rest after it was taken off, or was never off.
@@ -209,6 +253,7 @@ pub fn solve(nominal: &Constants, steps: &[Step], noise: &LoadNoise, at: &Path) 
         knowledge: None,
         loads: Vec::new(),
         motion: None,
+        centroid_px: None,
         notes,
         constants,
     };
@@ -218,8 +263,10 @@ pub fn solve(nominal: &Constants, steps: &[Step], noise: &LoadNoise, at: &Path) 
         let options = PoseOptions::new(CENTROID_NOISE_PX, reach);
         let solver = PoseSolver::new(&spec, &outcome.constants.markers(), options)
             .map_err(|e| refused(e.to_string()))?;
-        for step in steps.iter().filter(|step| !step.marks.is_empty()) {
-            take_motion(&mut outcome, &mut knowledge, &solver, step, noise).map_err(refused)?;
+        let (poses, centroid_px) = poses_of(&solver, &outcome.constants, steps).map_err(refused)?;
+        outcome.centroid_px = Some(centroid_px);
+        for (step, pose) in &poses {
+            take_motion(&mut outcome, &mut knowledge, step, pose, noise).map_err(refused)?;
         }
     }
     outcome.knowledge = knowledge;
@@ -230,15 +277,20 @@ pub fn solve(nominal: &Constants, steps: &[Step], noise: &LoadNoise, at: &Path) 
 fn take_motion(
     outcome: &mut Outcome,
     knowledge: &mut Option<SpringKnowledge>,
-    solver: &PoseSolver,
     step: &Step,
+    seen: &StepPose,
     noise: &LoadNoise,
 ) -> Result<(), String> {
     let constants = &outcome.constants;
     let at_mm = constants.springs.as_ref().map_or(DVec3::ZERO, |s| DVec3::from_array(s.at_mm));
-    let (pose, covariance) = pose_of(solver, constants, &step.marks)?;
+    let StepPose { pose, covariance, .. } = *seen;
     if kind_of(step) == "rest" {
-        outcome.motion.get_or_insert(covariance);
+        if outcome.motion.is_none() {
+            outcome.motion = Some(covariance);
+            // scatter does not show it, nor do loads' residuals more than a part: the whole tolerance stands
+            let whole = (tolerance_px(constants) / CENTROID_NOISE_PX).powi(2) * seen.nominal_covariance;
+            knowledge.iter_mut().for_each(|springs| springs.open_rest(&whole));
+        }
         return back_at_rest(&pose, at_mm);
     }
     let words: Vec<&str> = step.said.split_whitespace().skip(1).collect();

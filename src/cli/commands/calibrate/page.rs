@@ -60,10 +60,17 @@ fn force_chapter(knowledge: &SpringKnowledge, outcome: &Outcome) -> Html {
     let chart = history(&outcome.history)
         .map(|chart| figure(&chart.to_html(), "What is open of the reading along each axis after each load."))
         .unwrap_or_default();
+    let markers = outcome.centroid_px.filter(|_| !outcome.loads.is_empty()).map(|sd_px| {
+        html!(
+            "<p class=\"soft\">By these frames a marker's mean place in a step is known to {} px.</p>\n",
+            significant(sd_px)
+        )
+    });
     html!(
         "<h2>How well a force is read</h2>\n<p>Standard deviation of the reading of a load along one axis alone, as far as the springs \
-         are open; noise of a frame comes beside it.</p>\n{}{}",
+         are open; noise of a frame comes beside it.</p>\n{}{}{}",
         table("", &heads, &rows),
+        markers.unwrap_or_default(),
         chart
     )
 }

@@ -6,6 +6,10 @@
 //! place and direction, and of the motion that the camera saw. Their update is Kalman's (Transactions of the ASME 82, 1960), in Joseph's
 //! form, which keeps the covariance positive. From the first load on everything has a standard deviation; [`super::fit`], which
 //! takes nothing from the geometry, needs several times more loads than there are numbers.
+//!
+//! All motions are from one rest, and what its picture is off by (a marker whose edge something bright touches is off by the same in each
+//! of its frames) is in all of them alike: no number of loads takes that out of a mean. So it is six unknowns more, `d0`, which begin with
+//! the covariance of the rest's pose: `wrench - law(d) = dK d - K d0`.
 
 use nalgebra::{DMatrix, Matrix6, SMatrix, SVector, Vector6};
 
@@ -26,7 +30,11 @@ const STEP_SDS: f64 = 0.1;
 /// An axis is known once less than this part of the deviation that it started with is left.
 const KNOWN_SHARE: f64 = 0.9;
 
+/// The entries, and what the rest is off by.
+const UNKNOWNS: usize = ENTRIES + 6;
+
 type Covariance36 = SMatrix<f64, ENTRIES, ENTRIES>;
+type Covariance42 = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
 /// A load that is known, and what it did.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,8 +56,9 @@ pub struct SpringKnowledge {
     /// The 6x6 at rest of the constants, and of the law itself.
     nominal: Matrix6<f64>,
     of_law: Matrix6<f64>,
-    difference: SVector<f64, ENTRIES>,
-    covariance: Covariance36,
+    /// The entries beyond the nominal ones, then what the rest is off by, mm and rad.
+    unknowns: SVector<f64, UNKNOWNS>,
+    covariance: Covariance42,
     prior_parts: [f64; 6],
     loads: usize,
 }
@@ -59,9 +68,28 @@ fn entries(matrix: &Matrix6<f64>) -> SVector<f64, ENTRIES> {
     SVector::from_fn(|k, _| matrix[(k / 6, k % 6)])
 }
 
-/// What multiplies the entries in the six equations of a load.
-fn equations(displacement: &[f64; 6]) -> SMatrix<f64, 6, ENTRIES> {
-    SMatrix::from_fn(|row, k| if k / 6 == row { displacement[k % 6] } else { 0.0 })
+/// What multiplies the unknowns in the six equations of a load; `slope`: of the wrench by the displacement.
+fn equations(displacement: &[f64; 6], slope: &Matrix6<f64>) -> SMatrix<f64, 6, UNKNOWNS> {
+    SMatrix::from_fn(|row, k| match k {
+        k if k >= ENTRIES => -slope[(row, k - ENTRIES)],
+        k if k / 6 == row => displacement[k % 6],
+        _ => 0.0,
+    })
+}
+
+/// Knowledge of the entries alone.
+fn widened(covariance: &Covariance36) -> Covariance42 {
+    Covariance42::from_fn(|i, j| if i < ENTRIES && j < ENTRIES { covariance[(i, j)] } else { 0.0 })
+}
+
+/// A load beside what is known.
+struct Innovation {
+    /// Its wrench beyond what is known.
+    left: Vector6<f64>,
+    /// Covariance of that, and the load's own share.
+    whole: Matrix6<f64>,
+    noise: Matrix6<f64>,
+    equations: SMatrix<f64, 6, UNKNOWNS>,
 }
 
 /// Covariance of the entries by the springs' tolerances.
@@ -127,8 +155,8 @@ impl SpringKnowledge {
             law,
             nominal,
             of_law,
-            difference: SVector::zeros(),
-            covariance,
+            unknowns: SVector::zeros(),
+            covariance: widened(&covariance),
             prior_parts: [0.0; 6],
             loads: 0,
         };
@@ -139,9 +167,14 @@ impl SpringKnowledge {
         Ok(made)
     }
 
+    /// Says how far the rest that all motions are from may be off; before the first load.
+    pub fn open_rest(&mut self, covariance: &Matrix6<f64>) {
+        self.covariance.fixed_view_mut::<6, 6>(ENTRIES, ENTRIES).copy_from(covariance);
+    }
+
     /// The 6x6 at rest.
     pub fn stiffness(&self) -> Matrix6<f64> {
-        self.nominal + Matrix6::from_fn(|i, j| self.difference[6 * i + j])
+        self.nominal + Matrix6::from_fn(|i, j| self.unknowns[6 * i + j])
     }
 
     /// The law, where the constants have one.
@@ -162,40 +195,40 @@ impl SpringKnowledge {
         own.iter().all(|v| v.is_finite()).then(|| own.into())
     }
 
-    /// What a load's wrench is beyond what is known, and the covariance of that.
-    fn innovation(&self, load: &KnownLoad) -> Option<(Vector6<f64>, Matrix6<f64>, Matrix6<f64>)> {
-        let own = Vector6::from(self.wrench(&load.displacement)?);
+    fn innovation(&self, load: &KnownLoad) -> Option<Innovation> {
         let slope = match &self.law {
             Some(law) => law.tangent_at(&Displacement::from_array(load.displacement)).ok()?,
             None => self.stiffness(),
         };
+        let rest = self.unknowns.fixed_rows::<6>(ENTRIES);
+        let own = Vector6::from(self.wrench(&load.displacement)?) - slope * rest;
         let noise = load.wrench_covariance + slope * load.displacement_covariance * slope.transpose();
-        let h = equations(&load.displacement);
-        Some((Vector6::from(load.wrench) - own, noise + h * self.covariance * h.transpose(), noise))
+        let equations = equations(&load.displacement, &slope);
+        let whole = noise + equations * self.covariance * equations.transpose();
+        Some(Innovation { left: Vector6::from(load.wrench) - own, whole, noise, equations })
     }
 
     /// How far a load is from what is known, as a sum of six squares of standard normal numbers; `None` where the springs cannot
     /// be where it has them.
     pub fn surprise(&self, load: &KnownLoad) -> Option<f64> {
-        let (left, whole, _) = self.innovation(load)?;
+        let Innovation { left, whole, .. } = self.innovation(load)?;
         Some(left.dot(&whole.cholesky()?.solve(&left)))
     }
 
     /// By how much a load like this would lower the logarithm of the covariance's determinant.
     pub fn gain(&self, load: &KnownLoad) -> Option<f64> {
-        let (_, whole, noise) = self.innovation(load)?;
+        let Innovation { whole, noise, .. } = self.innovation(load)?;
         let log = |m: Matrix6<f64>| Some(m.cholesky()?.l().diagonal().map(f64::ln).sum() * 2.0);
         Some(log(whole)? - log(noise)?)
     }
 
     /// Takes a load in; whether it says anything.
     pub fn add(&mut self, load: &KnownLoad) -> bool {
-        let Some((left, whole, noise)) = self.innovation(load) else { return false };
+        let Some(Innovation { left, whole, noise, equations }) = self.innovation(load) else { return false };
         let Some(inverse) = whole.cholesky().map(|c| c.inverse()) else { return false };
-        let h = equations(&load.displacement);
-        let weight = self.covariance * h.transpose() * inverse;
-        self.difference += weight * left;
-        let stays = Covariance36::identity() - weight * h;
+        let weight = self.covariance * equations.transpose() * inverse;
+        self.unknowns += weight * left;
+        let stays = Covariance42::identity() - weight * equations;
         let next = stays * self.covariance * stays.transpose() + weight * noise * weight.transpose();
         self.covariance = 0.5 * (next + next.transpose());
         self.loads += 1;
@@ -207,7 +240,7 @@ impl SpringKnowledge {
         let Some(softness) = self.stiffness().try_inverse() else { return [f64::NAN; 6] };
         std::array::from_fn(|axis| {
             let d: [f64; 6] = std::array::from_fn(|j| softness[(j, axis)]);
-            let h = equations(&d);
+            let h = equations(&d, &Matrix6::zeros());
             (h * self.covariance * h.transpose())[(axis, axis)].max(0.0).sqrt()
         })
     }
@@ -269,11 +302,11 @@ mod tests {
             law: None,
             nominal,
             of_law: nominal,
-            difference: SVector::zeros(),
-            covariance: Covariance36::from_fn(|i, j| {
+            unknowns: SVector::zeros(),
+            covariance: widened(&Covariance36::from_fn(|i, j| {
                 let size = nominal[(i / 6, i / 6)] * nominal[(i % 6, i % 6)];
                 if i == j { 0.01 * size } else { 0.0 }
-            }),
+            })),
             prior_parts: [0.0; 6],
             loads: 0,
         };
@@ -289,11 +322,34 @@ mod tests {
     }
 
     #[test]
+    fn a_rest_that_is_off_is_found_and_is_no_stiffness() {
+        let truth = fresh().nominal * 1.05;
+        let off = [0.01, -0.02, 0.015, 1e-3, -5e-4, 2e-4];
+        let errors = [0.0, 1e-2].map(|open| {
+            let mut springs = fresh();
+            springs.open_rest(&Matrix6::from_diagonal(
+                &Vector6::from([1.0, 1.0, 1.0, 0.1, 0.1, 0.1]).map(|v: f64| (v * open).powi(2)),
+            ));
+            for way in 0..12 {
+                let mut d = [0.0; 6];
+                d[way % 6] = if way % 6 < 3 { 0.2 } else { 0.03 } * if way < 6 { 1.0 } else { -1.0 };
+                let mut seen = load(&truth, d);
+                seen.displacement = std::array::from_fn(|i| d[i] + off[i]);
+                assert!(springs.add(&seen));
+            }
+            (0..6).map(|i| (springs.stiffness()[(i, i)] / truth[(i, i)] - 1.0).abs()).fold(0.0, f64::max)
+        });
+        assert!(errors[1] < 0.01 && errors[0] > 2.0 * errors[1], "{errors:?}");
+    }
+
+    #[test]
     fn exact_loads_bring_the_truth_and_each_axis_when_it_is_loaded() {
         let mut springs = fresh();
         let truth = springs.nominal * 1.15;
-        let log_det =
-            |s: &SpringKnowledge| s.covariance.cholesky().unwrap().l().diagonal().map(f64::ln).sum() * 2.0;
+        let log_det = |s: &SpringKnowledge| -> f64 {
+            let entries = s.covariance.fixed_view::<ENTRIES, ENTRIES>(0, 0).into_owned();
+            entries.cholesky().unwrap().l().diagonal().map(f64::ln).sum() * 2.0
+        };
         for axis in 0..6 {
             assert!(!springs.is_known()[axis], "{axis}");
             let mut d = [0.0; 6];

@@ -151,7 +151,8 @@ pub fn kind_of(step: &Step) -> &str {
 }
 
 /// Where the platform is in a step's frames.
-struct StepPose {
+struct StepPose<'a> {
+    step: &'a Step,
     pose: Rigid,
     /// Of the displacement, for a noise of [`CENTROID_NOISE_PX`], and for that of these frames.
     nominal_covariance: Matrix6<f64>,
@@ -161,7 +162,8 @@ struct StepPose {
 }
 
 /// Where the platform is, by the mean of each marker's centroids.
-fn pose_of(solver: &PoseSolver, constants: &Constants, marks: &[Observation]) -> Result<StepPose, String> {
+fn pose_of<'a>(solver: &PoseSolver, constants: &Constants, step: &'a Step) -> Result<StepPose<'a>, String> {
+    let marks = &step.marks;
     let sightings: Vec<Sighting> = solver
         .markers()
         .iter()
@@ -176,6 +178,7 @@ fn pose_of(solver: &PoseSolver, constants: &Constants, marks: &[Observation]) ->
     let at_mm = constants.springs.as_ref().map_or(DVec3::ZERO, |s| DVec3::from_array(s.at_mm));
     let covariance = found.displacement_covariance(at_mm);
     Ok(StepPose {
+        step,
         pose: found.pose,
         nominal_covariance: covariance,
         covariance,
@@ -194,22 +197,22 @@ fn poses_of<'a>(
     solver: &PoseSolver,
     constants: &Constants,
     steps: &'a [Step],
-) -> Result<(Vec<(&'a Step, StepPose)>, f64), String> {
+) -> Result<(Vec<StepPose<'a>>, f64), String> {
     let mut noise = CentroidNoise::default();
     let mut found = Vec::new();
     let mut rest_frames = None;
     for step in steps.iter().filter(|step| !step.marks.is_empty()) {
-        let one = pose_of(solver, constants, &step.marks)?;
+        let one = pose_of(solver, constants, step)?;
         let is_first = rest_frames.is_none();
         let rest_frames = *rest_frames.get_or_insert_with(|| frames_of(&step.marks));
         noise.add_scatter(&step.marks, solver.markers(), rest_frames);
         if !is_first {
             noise.add_residuals(one.rms_px, one.markers);
         }
-        found.push((step, one));
+        found.push(one);
     }
     let sd_px = noise.sd_px(tolerance_px(constants));
-    for (_, one) in &mut found {
+    for one in &mut found {
         one.covariance *= (sd_px / CENTROID_NOISE_PX).powi(2);
     }
     Ok((found, sd_px))
@@ -265,8 +268,8 @@ pub fn solve(nominal: &Constants, steps: &[Step], noise: &LoadNoise, at: &Path) 
             .map_err(|e| refused(e.to_string()))?;
         let (poses, centroid_px) = poses_of(&solver, &outcome.constants, steps).map_err(refused)?;
         outcome.centroid_px = Some(centroid_px);
-        for (step, pose) in &poses {
-            take_motion(&mut outcome, &mut knowledge, step, pose, noise).map_err(refused)?;
+        for pose in &poses {
+            take_motion(&mut outcome, &mut knowledge, pose, noise).map_err(refused)?;
         }
     }
     outcome.knowledge = knowledge;
@@ -277,13 +280,12 @@ pub fn solve(nominal: &Constants, steps: &[Step], noise: &LoadNoise, at: &Path) 
 fn take_motion(
     outcome: &mut Outcome,
     knowledge: &mut Option<SpringKnowledge>,
-    step: &Step,
     seen: &StepPose,
     noise: &LoadNoise,
 ) -> Result<(), String> {
     let constants = &outcome.constants;
     let at_mm = constants.springs.as_ref().map_or(DVec3::ZERO, |s| DVec3::from_array(s.at_mm));
-    let StepPose { pose, covariance, .. } = *seen;
+    let StepPose { step, pose, covariance, .. } = *seen;
     if kind_of(step) == "rest" {
         if outcome.motion.is_none() {
             outcome.motion = Some(covariance);

@@ -94,6 +94,7 @@ pub fn template(dataset: &Dataset, own: &SensorDraw, element_mm: f64, scale: f64
             leds: Some(LedLight {
                 power: middle(spec.light.power),
                 each: own.each.clone(),
+                moved: Vec::new(),
                 level_per_mw_mm2: spec.light.level_per_mw_mm2,
                 stray_level: middle(spec.light.stray_level),
                 gloss: false,

@@ -1,6 +1,6 @@
 //! From the design's lights and the scene's to the sources of a field.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
 use super::cavity::Cavities;
 use super::direct::Emitter;
@@ -10,6 +10,7 @@ use super::parts::LightUse;
 use super::tables::{Source, Ways};
 use crate::SimError;
 use crate::scene::Scene;
+use crate::scene::light::MovedLed;
 use domecast_design::parts;
 use domecast_design::parts::Measures;
 use domecast_design::sections::{LedColor, LedsSection};
@@ -47,12 +48,18 @@ pub fn crosstalk_matrix(crosstalk: f64) -> DMat3 {
 /// The brightness that the scene gives each light of the design.
 fn drives(scene: &Scene, count: usize) -> Result<Vec<f64>, SimError> {
     let Some(light) = &scene.file().light.leds else { return Ok(Vec::new()) };
-    if !light.each.is_empty() && light.each.len() != count {
+    let lists = [
+        ("light.leds.each", serde_json::json!(light.each), light.each.len(), "number"),
+        ("light.leds.moved", serde_json::json!(light.moved), light.moved.len(), "entry"),
+    ];
+    if let Some((field, value, given, what)) =
+        lists.into_iter().find(|(_, _, given, _)| *given != 0 && *given != count)
+    {
         return Err(DesignError::at(
-            "light.leds.each",
-            serde_json::json!(light.each),
-            format!("{} numbers for {count} lights", light.each.len()),
-            format!("one number for each of the design's {count} lights, or none at all"),
+            field,
+            value,
+            format!("{given} for {count} lights"),
+            format!("one {what} for each of the design's {count} lights, or none at all"),
         )
         .into());
     }
@@ -105,6 +112,7 @@ pub fn sources_of(scene: &Scene, leds: &LedsSection, lobe: &Lobe) -> Result<Vec<
     let Some(light) = &scene.file().light.leds else { return Ok(Vec::new()) };
     let design = scene.design();
     for (i, top) in emitter_tops_mm(leds).into_iter().enumerate() {
+        let top = top + light.moved.get(i).map_or(0.0, |moved| moved.up_mm);
         let bottom = design.sheet_underside_z_mm();
         if top >= bottom {
             return Err(DesignError::at(
@@ -123,6 +131,9 @@ pub fn sources_of(scene: &Scene, leds: &LedsSection, lobe: &Lobe) -> Result<Vec<
         let mut pose = parts::platform_from_led(leds, i);
         // The tape's outer face is what shines.
         pose.translation += pose.matrix3.z_axis * front_mm;
+        if let Some(moved) = light.moved.get(i) {
+            pose = beside(pose, moved);
+        }
         for &color in colors(led.color) {
             out.push(Source {
                 emitter: Emitter {
@@ -137,6 +148,18 @@ pub fn sources_of(scene: &Scene, leds: &LedsSection, lobe: &Lobe) -> Result<Vec<
         }
     }
     Ok(out)
+}
+
+/// A light's pose where it stands beside that of the design.
+fn beside(pose: DAffine3, moved: &MovedLed) -> DAffine3 {
+    let out = pose.translation.with_z(0.0).normalize_or(DVec3::X);
+    let along = DVec3::Z.cross(out);
+    let across = pose.matrix3.z_axis.cross(along).normalize_or(DVec3::Z);
+    let turn = along * moved.tilt_deg.to_radians() + across * moved.turn_deg.to_radians();
+    DAffine3 {
+        matrix3: DMat3::from_quat(DQuat::from_scaled_axis(turn)) * pose.matrix3,
+        translation: pose.translation + out * moved.out_mm + along * moved.along_mm + DVec3::Z * moved.up_mm,
+    }
 }
 
 /// The ways of the light of a scene, for the effects that take part.

@@ -70,7 +70,9 @@ impl ShadedDome {
         let ways = setup::ways(scene, used)?;
         let optics = &ways.optics;
         let lights = ways.sources.len() as u64;
-        let key = format!("{} {} {} {}", used.diffuser, used.fresnel, used.platform_shadow, design.text());
+        let moved = serde_json::json!(light.moved);
+        let key =
+            format!("{} {} {} {moved} {}", used.diffuser, used.fresnel, used.platform_shadow, design.text());
         let prepared = tables::prepared(&key);
         let parts = FieldParts {
             falloff: used.falloff,

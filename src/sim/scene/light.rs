@@ -44,6 +44,11 @@ pub struct LedLight {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 24), inner(range(min = 0.0, max = 1000.0)))]
     pub each: Vec<f64>,
+    /// How each light stands beside where the design has it, in the design's order, while the platform is as designed; left out:
+    /// where it belongs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 24))]
+    pub moved: Vec<MovedLed>,
     /// Exposure and gain in one number: level that the image of a white surface in air gets for each mW/mm^2 of
     /// light on it.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1e9))]
@@ -63,6 +68,27 @@ pub struct LedLight {
     /// Reasons and sources, by field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<Why>,
+}
+
+/// How a built light stands beside where the design has it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MovedLed {
+    /// Away from the axis, mm.
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub out_mm: f64,
+    /// Along its ring, counter-clockwise from above, mm.
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub along_mm: f64,
+    /// Up, mm.
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub up_mm: f64,
+    /// Its face turned about the direction along the ring, degrees.
+    #[schemars(range(min = -20.0, max = 20.0))]
+    pub tilt_deg: f64,
+    /// Its face turned about the direction across that and across the way that it faces, degrees.
+    #[schemars(range(min = -20.0, max = 20.0))]
+    pub turn_deg: f64,
 }
 
 fn one() -> f64 {

@@ -1,6 +1,7 @@
 //! Tables of light over the dome, and bounds of its effects.
 
 use super::*;
+use crate::scene::light::MovedLed;
 use domecast_optics::DomeShape;
 
 fn scene(more: &str) -> crate::Scene {
@@ -182,6 +183,33 @@ fn numbers_for_lights_that_are_not_there_are_refused() {
     let scene = crate::Scene::new(file, &folder, design).unwrap();
     let error = setup::sources(&scene, &ALL).unwrap_err().to_string();
     assert!(error.contains("light.leds.each"), "{error}");
+}
+
+#[test]
+fn lights_that_stand_aside_move_alone() {
+    let file = scene("").file().clone();
+    let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs");
+    let design = domecast_design::Design::load(&folder.join("thumb24.json")).unwrap();
+    let with = |moved: Vec<MovedLed>| {
+        let mut file = file.clone();
+        file.light.leds.as_mut().unwrap().moved = moved;
+        let scene = crate::Scene::new(file, &folder, design.clone()).unwrap();
+        setup::sources(&scene, &ALL)
+    };
+    let (before, mut moved) = (with(Vec::new()).unwrap(), vec![MovedLed::default(); 6]);
+    moved[2] = MovedLed { out_mm: 0.1, along_mm: -0.2, up_mm: 0.05, tilt_deg: 2.0, turn_deg: 0.0 };
+    let after = with(moved).unwrap();
+    for (i, (a, b)) in before.iter().zip(&after).enumerate() {
+        let [a, b] = [a, b].map(|source| source.emitter.platform_from_emitter);
+        let out = a.translation.with_z(0.0).normalize();
+        let expected =
+            if i == 2 { out * 0.1 - DVec3::Z.cross(out) * 0.2 + DVec3::Z * 0.05 } else { DVec3::ZERO };
+        assert!((b.translation - a.translation - expected).length() < 1e-12, "light {i}");
+        let turned = b.matrix3.z_axis.angle_between(a.matrix3.z_axis).to_degrees();
+        assert!((turned - if i == 2 { 2.0 } else { 0.0 }).abs() < 1e-6, "light {i}: {turned}");
+    }
+    let error = with(vec![MovedLed::default(); 2]).unwrap_err().to_string();
+    assert!(error.contains("light.leds.moved"), "{error}");
 }
 
 /// Largest change of a code between two light fields, of what the camera sees: of the resting membrane, or of one that lies

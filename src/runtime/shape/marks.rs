@@ -62,7 +62,7 @@ impl Marks {
             let seen = dot.centroid_px.filter(|_| dot.state == MarkState::Ok);
             let margin_px = if seen.is_some() { MARGIN_PX } else { LOST_MARGIN_PX };
             // A dot that is not sure may be at either place.
-            for at in [seen.or(dot.undeformed_px), dot.centroid_px].into_iter().flatten() {
+            for at in [seen.or(dot.undeformed_px), dot.ink_px].into_iter().flatten() {
                 ellipse.cover(at, margin_px, cells, covered);
             }
         }
@@ -103,5 +103,38 @@ impl Ellipse {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::DotResult;
+
+    #[test]
+    fn ink_is_no_skin_whatever_the_tracker_thinks_of_it() {
+        let radii_px = [DVec2::X * 4.0, DVec2::Y * 4.0];
+        let marks = Marks { dots: vec![Some(Ellipse { radii_px })], markers: Vec::new() };
+        let cells = Cells { px: 2, width: 40, height: 40, rays: Vec::new() };
+        let covered = |dot: DotResult| {
+            let mut covered = vec![false; cells.count()];
+            marks.cover(&Tracked { black_dots: vec![dot], ..Tracked::default() }, &cells, &mut covered);
+            move |x: usize, y: usize| covered[y / 2 * 40 + x / 2]
+        };
+        let (rest, ink) = (Some(DVec2::new(20.0, 20.0)), Some(DVec2::new(50.0, 40.0)));
+        for state in [MarkState::Dirty, MarkState::IdentityUnsure] {
+            let is_covered =
+                covered(DotResult { state, undeformed_px: rest, ink_px: ink, ..DotResult::default() });
+            assert!(is_covered(20, 20) && is_covered(50, 40) && !is_covered(35, 60), "{state:?}");
+        }
+        let seen = DotResult {
+            state: MarkState::Ok,
+            centroid_px: ink,
+            ink_px: ink,
+            undeformed_px: rest,
+            ..DotResult::default()
+        };
+        let is_covered = covered(seen);
+        assert!(is_covered(50, 40) && !is_covered(20, 20));
     }
 }

@@ -157,13 +157,22 @@ impl Reporter {
                 image_px: track.center_px(),
                 centroid_px: track.now_px(),
                 sd_px: track.spot.map(|spot| spot.sd_px),
-                undeformed_px: None,
+                ink_px: track.now_px(),
                 motion_px: track.motion_px,
                 ..DotResult::default()
             };
+            if displacements.is_some() && track.is_wanted() {
+                to.undeformed_px = track.expected_px.map(|p| p - track.offset_px);
+            }
             let unsure = track.is_unsure.then_some(MarkState::IdentityUnsure);
             if let Some(state) = unsure.or(track.fault).filter(|_| track.spot.is_some()) {
-                *to = DotResult { id: to.id, state, ..DotResult::default() };
+                *to = DotResult {
+                    id: to.id,
+                    state,
+                    undeformed_px: to.undeformed_px,
+                    ink_px: to.ink_px,
+                    ..DotResult::default()
+                };
                 continue;
             }
             if let Some(displacements) = displacements {
@@ -171,9 +180,6 @@ impl Reporter {
                     to.displacement_mm = Some(found.displacement_mm);
                     to.displacement_sd_random_mm = Some(found.sd_random_mm);
                     to.ray = Some(found.ray);
-                }
-                if track.is_wanted() {
-                    to.undeformed_px = track.expected_px.map(|p| p - track.offset_px);
                 }
             }
         }

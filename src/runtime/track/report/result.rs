@@ -24,6 +24,8 @@ pub struct DotResult {
     pub sd_px: Option<f64>,
     /// Where the undeformed dome would show its centre at this pose, raw px; there for every dot that can be seen.
     pub undeformed_px: Option<DVec2>,
+    /// Where what was taken for it lies, whatever its state: the picture shows ink there, not skin; raw px.
+    pub ink_px: Option<DVec2>,
     /// Motion of the centroid since the last frame, px.
     pub motion_px: Option<DVec2>,
     /// Its ray met with the undeformed dome, the platform's motion removed, less its rest position; mm. Where the skin is

@@ -51,7 +51,7 @@ pub(super) fn marks_at_rest(constants: &Constants, tracked: &Tracked) -> Result<
         return Err(LightFitError::in_frame(0, format!("is {status}"), cure));
     }
     let focal_px = constants.camera.matrix[0][0].abs();
-    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(*v));
+    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |max, v| max.max(*v));
     let slack_px = constants.tolerances.map_or(1.0, |open| {
         let away_mm = constants.camera.camera_from_sensor[2][3].abs().max(1.0);
         let place_mm = open.white_marker_mm.max(open.black_dot_mm) + largest(&open.pupil_mm);
@@ -152,13 +152,13 @@ pub(super) fn spread(
         let squares: f64 = ways.iter().map(|way| way.dot(across).asin().powi(2)).sum();
         (squares / ways.len().max(1) as f64).sqrt()
     };
-    let least = (0..32).map(reach).fold(f64::INFINITY, f64::min).to_degrees();
-    if least >= MIN_SPREAD_DEG {
+    let reach_deg = (0..32).map(reach).fold(f64::INFINITY, f64::min).to_degrees();
+    if reach_deg >= MIN_SPREAD_DEG {
         return Ok(());
     }
     let [polar, azimuth] = farthest(&ways, REACH_DEG.min(0.8 * rim_deg));
     let problem = format!(
-        "the presses are too similar: they reach {least:.0} degrees across the dome, {MIN_SPREAD_DEG:.0} are needed"
+        "the presses are too similar: they reach {reach_deg:.0} degrees across the dome, {MIN_SPREAD_DEG:.0} are needed"
     );
     let cure = format!("press also at {polar:.0} degrees from the pole, azimuth {azimuth:.0}");
     Err(LightFitError::new(problem, cure))

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::model::LightModel;
 use super::observed::{CapPlace, Observed, depth_on_ball};
-use super::physics::{Lit, Physics};
+use super::physics::{Physics, ShadedDome};
 use super::scatter::{Group, Scatter};
 
 /// Step of a number for its derivative, prior deviations.
@@ -99,12 +99,12 @@ impl Problem<'_> {
     }
 
     /// The light of some values.
-    pub fn lit(&self, values: &Values) -> Option<Lit> {
+    pub fn lit(&self, values: &Values) -> Option<ShadedDome> {
         self.physics.lit(self.model.light(&values.numbers))
     }
 
     /// Levels that the camera would have at every place: at rest, then the caps.
-    fn predict(&self, values: &Values, lit: &Lit) -> Vec<DVec3> {
+    fn predict(&self, values: &Values, lit: &ShadedDome) -> Vec<DVec3> {
         let (gain, falloff) = self.model.camera(&values.numbers);
         let gain = DVec3::from_array(std::array::from_fn(|c| {
             let nominal = self.model.nominal.reflectance[c].max(1e-9);
@@ -126,7 +126,7 @@ impl Problem<'_> {
     }
 
     /// Level of a place of a cap: that at rest, by the ratio of the light on the ball's skin to that on the undeformed one.
-    fn cap_level(&self, place: &CapPlace, lit: &Lit, center_mm: DVec3, radius_mm: f64) -> DVec3 {
+    fn cap_level(&self, place: &CapPlace, lit: &ShadedDome, center_mm: DVec3, radius_mm: f64) -> DVec3 {
         let mut level = [0.0; 3];
         for (c, value) in level.iter_mut().enumerate() {
             let own = place.channels[c];
@@ -145,7 +145,7 @@ impl Problem<'_> {
     }
 
     /// What was seen less what the values give, three rows to a place.
-    pub fn off(&self, values: &Values, lit: &Lit) -> DVector<f64> {
+    pub fn off(&self, values: &Values, lit: &ShadedDome) -> DVector<f64> {
         let seen = self.seen.rest.iter().map(|p| p.level).chain(self.seen.caps.iter().map(|p| p.level));
         let predicted = self.predict(values, lit);
         let rows = predicted
@@ -212,7 +212,7 @@ impl Problem<'_> {
     }
 
     /// Levels as rows; 0 where they say nothing.
-    fn rows(&self, values: &Values, lit: &Lit) -> Option<DVector<f64>> {
+    fn rows(&self, values: &Values, lit: &ShadedDome) -> Option<DVector<f64>> {
         let levels = self.predict(values, lit);
         let rows = levels.iter().zip(self.known());
         let rows = rows.flat_map(|(level, known)| (*level * known).to_array());
@@ -221,7 +221,7 @@ impl Problem<'_> {
     }
 
     /// Puts the derivatives by the balls' centres and radius beside those by the light's numbers.
-    pub fn add_ball_slopes(&self, values: &Values, lit: &Lit, slopes: &mut DMatrix<f64>) {
+    pub fn add_ball_slopes(&self, values: &Values, lit: &ShadedDome, slopes: &mut DMatrix<f64>) {
         let (numbers, count) = (self.model.count(), self.seen.presses.len());
         let radius_mm = self.radius_mm * values.radius.exp();
         let centers_mm = self.centers_mm(values);

@@ -27,7 +27,7 @@ const FREE_RADIUS: f64 = 0.5;
 /// Fits the light of a sensor to a frame at rest and presses of one ball.
 ///
 /// # Errors
-/// [`LightFitError`]: frames that cannot be this sensor's, or from which its light cannot be told.
+/// [`LightFitError`]: frames that cannot be this sensor's, or from which its light cannot be found.
 pub fn fit(
     constants: &Constants,
     rest: &CameraFrame<'_>,

@@ -156,8 +156,8 @@ impl LightModel {
                     }
                 }
                 Number::Reflectance(c) => {
-                    let most = MAX_REFLECTANCE / light.mean_reflectance[c].max(1e-3);
-                    let part = part(step).min(most.max(1.0));
+                    let max_part = MAX_REFLECTANCE / light.mean_reflectance[c].max(1e-3);
+                    let part = part(step).min(max_part.max(1.0));
                     light.reflectance[c] *= part;
                     light.mean_reflectance[c] *= part;
                 }

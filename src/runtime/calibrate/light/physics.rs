@@ -16,7 +16,7 @@ use domecast_optics::SensorOptics;
 const SLOPE_RULE: [usize; 2] = [10, 2];
 
 /// The light of some constants.
-pub(super) struct Lit {
+pub(super) struct ShadedDome {
     pub light: LightConstants,
     pub shaded: ShapeLight,
     ways: Ways,
@@ -47,12 +47,16 @@ impl Physics {
     }
 
     /// The light of some constants.
-    pub fn lit(&self, light: LightConstants) -> Option<Lit> {
+    pub fn lit(&self, light: LightConstants) -> Option<ShadedDome> {
         self.computed(light, &EmitterRule::default(), None)
     }
 
     /// The same for derivatives; `beside` is another light of which it differs in the shape of some lights only.
-    pub fn lit_for_slopes(&self, light: LightConstants, beside: Option<(&Lit, &[usize])>) -> Option<Lit> {
+    pub fn lit_for_slopes(
+        &self,
+        light: LightConstants,
+        beside: Option<(&ShadedDome, &[usize])>,
+    ) -> Option<ShadedDome> {
         self.computed(light, &EmitterRule::with_lines(SLOPE_RULE[0], SLOPE_RULE[1]), beside)
     }
 
@@ -60,8 +64,8 @@ impl Physics {
         &self,
         light: LightConstants,
         rule: &EmitterRule,
-        beside: Option<(&Lit, &[usize])>,
-    ) -> Option<Lit> {
+        beside: Option<(&ShadedDome, &[usize])>,
+    ) -> Option<ShadedDome> {
         let other = beside.map(|(other, _)| (&other.light, &other.ways));
         let ways = light.ways_beside(&self.optics, other).ok()?;
         let kept = |i: usize| {
@@ -76,6 +80,6 @@ impl Physics {
         let each: Vec<&SourceTables> = tables.iter().map(Arc::as_ref).collect();
         let prepared = Prepared::of(&ways, &each, &self.rooms);
         let shaded = ShapeLight::with(&light, &self.optics, &ways, &prepared);
-        Some(Lit { light, shaded, ways, tables })
+        Some(ShadedDome { light, shaded, ways, tables })
     }
 }

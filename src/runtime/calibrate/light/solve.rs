@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::{Problem, Values};
-use super::physics::Lit;
+use super::physics::ShadedDome;
 use super::scatter::{Group, Said, Scatter, likeliest};
 use super::types::LightFitError;
 
@@ -14,8 +14,8 @@ const FIRST_DAMPING: f64 = 1e-3;
 const MAX_DAMPING: f64 = 1e7;
 /// A step of so many of the unknowns' own deviations, root mean square, says nothing: there the fit has ended.
 const END: f64 = 0.1;
-/// By how much the cost may fall otherwise than foreseen, a part, before derivatives are taken anew.
-const UNFORESEEN: f64 = 0.2;
+/// By how much the cost may fall otherwise than predicted, a part, before derivatives are taken anew.
+const MAX_MISPREDICTED: f64 = 0.2;
 
 /// Where a fit ended.
 pub(super) struct Solved {
@@ -109,7 +109,7 @@ pub(super) enum Open {
 pub(super) fn solve(problem: &Problem<'_>, start: Values, open: Open) -> Result<Solved, LightFitError> {
     let weighed = Weighed::new(problem).ok_or_else(not_positive)?;
     let mut values = start;
-    let mut lit: Lit = problem.lit(&values).ok_or_else(out_of_range)?;
+    let mut lit: ShadedDome = problem.lit(&values).ok_or_else(out_of_range)?;
     let mut off = problem.off(&values, &lit);
     let mut cost = weighed.cost(&values, &off);
     let before = rms_of(problem, &off);
@@ -148,7 +148,7 @@ pub(super) fn solve(problem: &Problem<'_>, start: Values, open: Open) -> Result<
                 is_done |= cost - after <= end;
                 (values, lit, off, cost) = (next, next_lit, next_off, after);
                 damping = (0.1 * damping).max(1e-9);
-                if !is_done && (part - 1.0).abs() > UNFORESEEN {
+                if !is_done && (part - 1.0).abs() > MAX_MISPREDICTED {
                     slopes = number_slopes(&values).ok_or_else(out_of_range)?;
                 }
                 problem.add_ball_slopes(&values, &lit, &mut slopes);

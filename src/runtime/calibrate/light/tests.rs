@@ -141,7 +141,8 @@ fn errors_that_neighbours_share_are_found_and_count_once() {
     let slopes = DMatrix::from_element(3 * count as usize, 1, 1.0);
     let prior = (DMatrix::identity(1, 1), DVector::zeros(1));
     let start = Scatter { common: 0.001, own: 0.001, ..Scatter::first(1.0) };
-    let found = likeliest(&[own.clone()], start, [0.2, 20.0], &slopes, &off, (&prior.0, &prior.1));
+    let found =
+        likeliest(std::slice::from_ref(&own), start, [0.2, 20.0], &slopes, &off, (&prior.0, &prior.1));
     assert!((0.01..0.04).contains(&found.common) && found.own < 8e-3, "{found:?}");
     let sd = |scatter: &Scatter| {
         let said = own.says(&own.factor(scatter).expect("a factor"), &slopes, &off).expect("equations");

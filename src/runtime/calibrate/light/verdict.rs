@@ -84,8 +84,8 @@ pub(super) fn touched_at_rest(
     let off: Vec<&SeenCell> =
         seen.iter().filter(|(_, r)| chroma(*r) > MAX_CHROMA).map(|(cell, _)| *cell).collect();
     let near = |a: &SeenCell, b: &SeenCell| a.column.abs_diff(b.column) <= 8 && a.row.abs_diff(b.row) <= 8;
-    let most = off.iter().map(|cell| (off.iter().filter(|other| near(cell, other)).count(), *cell));
-    match most.max_by_key(|(count, _)| *count) {
+    let neighbors = off.iter().map(|cell| (off.iter().filter(|other| near(cell, other)).count(), *cell));
+    match neighbors.max_by_key(|(count, _)| *count) {
         Some((count, cell)) if count >= MIN_TOUCHED => {
             let [polar, azimuth] = super::types::place_deg(cell.point_mm - dome_center_mm);
             let problem = format!(

@@ -175,12 +175,10 @@ impl Reporter {
                 };
                 continue;
             }
-            if let Some(displacements) = displacements {
-                if let Some(found) = displacements[index] {
-                    to.displacement_mm = Some(found.displacement_mm);
-                    to.displacement_sd_random_mm = Some(found.sd_random_mm);
-                    to.ray = Some(found.ray);
-                }
+            if let Some(found) = displacements.and_then(|displacements| displacements[index]) {
+                to.displacement_mm = Some(found.displacement_mm);
+                to.displacement_sd_random_mm = Some(found.sd_random_mm);
+                to.ray = Some(found.ray);
             }
         }
     }

@@ -51,10 +51,9 @@ pub struct DirectLight<'a> {
     pub fresnel: bool,
 }
 
-/// The rule across the emitter, made once: Gauss's lines, his places on each, and what interpolates between these.
+/// The rule across the emitter, made once: Gauss's places, and what interpolates between them.
 #[derive(Debug, Clone)]
 pub struct EmitterRule {
-    lines: GaussRule,
     rule: GaussRule,
     /// Barycentric weights of the polynomial through the places.
     weights: Vec<f64>,
@@ -67,14 +66,8 @@ impl Default for EmitterRule {
 }
 
 impl EmitterRule {
-    /// A rule with another number of places each way, to see how much the number matters.
+    /// A rule with another number of places, to see how much the number matters.
     pub fn with_places(count: usize) -> Self {
-        Self::with_lines(count, count)
-    }
-
-    /// A rule with so many lines and places on each. A shadow's edge that moves along the lines is followed; one that moves across them
-    /// takes line after line.
-    pub fn with_lines(lines: usize, count: usize) -> Self {
         let rule = GaussRule::new(count);
         let nodes = rule.nodes();
         let product = |i: usize| -> f64 {
@@ -83,7 +76,7 @@ impl EmitterRule {
             others.map(|(_, (v, _))| 4.0 * (nodes[i].0 - v)).product()
         };
         let weights = (0..nodes.len()).map(|i| 1.0 / product(i)).collect();
-        Self { lines: GaussRule::new(lines), rule, weights }
+        Self { rule, weights }
     }
 
     fn nodes(&self) -> &[(f64, f64)] {
@@ -128,10 +121,10 @@ impl DirectLight<'_> {
         let place =
             |u: f64, v: f64| pose.transform_point3(DVec3::new((u - 0.5) * side, (v - 0.5) * side, 0.0));
         let indices = self.indices(point_mm.z);
-        let (lines, count) = (rule.lines.nodes(), rule.nodes().len());
-        let mut shares = Vec::with_capacity(lines.len() * count);
+        let count = rule.nodes().len();
+        let mut shares = Vec::with_capacity(count * count);
         let (mut near, mut low, mut high) = (0.0, DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for &(u, _) in lines {
+        for &(u, _) in rule.nodes() {
             for &(v, _) in rule.nodes() {
                 let source = place(u, v);
                 let Some(share) = self.share(emitter, source, point_mm, &indices, &mut near) else {
@@ -146,7 +139,7 @@ impl DirectLight<'_> {
         let open = if self.cavities.is_some() { self.through_platform } else { 1.0 };
         let mut sum = DVec3::ZERO;
         let mut gather = |part: f64, is_free: &dyn Fn(DVec3, DVec3) -> bool| {
-            for (line, &(u, across)) in shares.chunks_exact(count).zip(lines) {
+            for (line, &(u, across)) in shares.chunks_exact(count).zip(rule.nodes()) {
                 let along = |of: &dyn Fn(&Share) -> DVec3, v: f64| rule.interpolate(line.iter().map(of), v);
                 let is_free = |v: f64| {
                     let source = place(u, v);

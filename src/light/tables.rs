@@ -179,51 +179,14 @@ fn dome_tables(ways: &Ways) -> Tables {
 /// Vector irradiance of each source on the sphere of a part of the dome's radius.
 fn tables(ways: &Ways, part: f64, grid: DomeGrid) -> Tables {
     let rule = EmitterRule::default();
-    let sources = ways.sources.iter().map(|source| table(ways, source, part, &grid, &rule)).collect();
+    let fill = |source| {
+        grid.fill_in_parallel(|direction| {
+            let flux = ways.flux(source, ways.point(direction, part), &rule);
+            flux.extend(flux.dot(grid.face.normal(direction)).max(0.0)).to_array()
+        })
+    };
+    let sources = ways.sources.iter().map(fill).collect();
     Tables { grid, sources, error: 0.0, evaluations: grid.evaluations() }
-}
-
-fn table(ways: &Ways, source: &Source, part: f64, grid: &DomeGrid, rule: &EmitterRule) -> Vec<Node> {
-    grid.fill_in_parallel(|direction| {
-        let flux = ways.flux(source, ways.point(direction, part), rule);
-        flux.extend(flux.dot(grid.face.normal(direction)).max(0.0)).to_array()
-    })
-}
-
-/// The tables of one light: on the dome, then on the shells inside it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SourceTables(Vec<Vec<Node>>);
-
-impl SourceTables {
-    /// Computes them for one of the ways' sources, with a rule over the emitter.
-    pub fn new(ways: &Ways, source: &Source, rule: &EmitterRule) -> Self {
-        let of = |(shell, part): (usize, &f64)| {
-            table(ways, source, ways.shell(*part), &shell_grid(ways, shell), rule)
-        };
-        Self(SHELLS.iter().enumerate().map(of).collect())
-    }
-}
-
-/// The grid of a shell's table; the first shell is the dome.
-fn shell_grid(ways: &Ways, shell: usize) -> DomeGrid {
-    DomeGrid::with_cells(if shell == 0 { DOME_CELLS } else { SHELL_CELLS }).over(ways.face())
-}
-
-impl Prepared {
-    /// Puts together what was computed light by light, and the dome as a room.
-    pub fn of(ways: &Ways, sources: &[&SourceTables], rooms: &[DomeRoom]) -> Self {
-        let gathered = |shell: usize| Tables {
-            grid: shell_grid(ways, shell),
-            sources: sources.iter().filter_map(|own| own.0.get(shell).cloned()).collect(),
-            error: 0.0,
-            evaluations: 0,
-        };
-        Self {
-            dome: OnceLock::from(gathered(0)),
-            shells: OnceLock::from((1..SHELLS.len()).map(gathered).collect::<Vec<_>>()),
-            rooms: OnceLock::from(rooms.to_vec()),
-        }
-    }
 }
 
 /// Exact evaluations of each source, with or without shells.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use super::noise::{centroids_of, tolerance_px};
 use crate::commands::calibrate_optics::{observations_of, table_of};
 use crate::commands::input::input_fault;
 use crate::commands::live::{Device, cure_of, open_device};
@@ -157,12 +158,10 @@ pub fn take(wish: &FrameWish, constants: &Constants) -> Result<Taken, Failure> {
 
 /// Whether nothing moved while the frames were taken.
 fn still(marks: &[Observation], constants: &Constants) -> Result<(), String> {
-    let allowed_px = MAX_SCATTER_SDS * constants.tolerances.map_or(0.1, |t| t.white_centroid_px);
+    let allowed_px = MAX_SCATTER_SDS * tolerance_px(constants);
     for marker in &constants.white_markers {
-        let own = || marks.iter().filter(|o| o.kind == Kind::White && o.id == marker.id);
-        let count = own().count().max(1) as f64;
-        let mean = own().map(|o| o.centroid_px).sum::<glam::DVec2>() / count;
-        let far = own().map(|o| o.centroid_px.distance(mean)).fold(0.0, f64::max);
+        let Some((own, mean)) = centroids_of(marks, marker.id) else { continue };
+        let far = own.iter().map(|at| at.distance(mean)).fold(0.0, f64::max);
         if far > allowed_px {
             return Err(format!(
                 "the sensor moved while the frames were taken: white marker {} by {far:.2} px, {allowed_px:.2} are allowed; \

@@ -11,11 +11,28 @@ use glam::DVec2;
 
 use domecast_optics::pose::Marker;
 use domecast_runtime::calibrate::optics::{Kind, Observation};
+use domecast_runtime::constants::Constants;
 
 /// As how many numbers the tolerance counts.
 const PRIOR_COUNT: f64 = 2.0;
 /// Numbers that a pose takes.
 const POSE_NUMBERS: f64 = 6.0;
+
+/// Standard deviation of a centroid where the constants do not say it, px.
+const CENTROID_SD_PX: f64 = 0.1;
+
+/// How far a centroid may be off by the constants, px.
+pub fn tolerance_px(constants: &Constants) -> f64 {
+    constants.tolerances.map_or(CENTROID_SD_PX, |t| t.white_centroid_px)
+}
+
+/// The centroids of a white marker, where there are any, and their mean, px.
+pub fn centroids_of(marks: &[Observation], marker: usize) -> Option<(Vec<DVec2>, DVec2)> {
+    let own = marks.iter().filter(|mark| mark.kind == Kind::White && mark.id == marker);
+    let all: Vec<DVec2> = own.map(|mark| mark.centroid_px).collect();
+    let mean = all.iter().sum::<DVec2>() / all.len() as f64;
+    (!all.is_empty()).then_some((all, mean))
+}
 
 /// A sum of squares, px^2, and how many independent numbers are in it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -46,15 +63,11 @@ impl CentroidNoise {
     /// Takes in how a step's centroids scatter from frame to frame; `rest_frames`: of the rest that all is compared with.
     pub fn add_scatter(&mut self, marks: &[Observation], markers: &[Marker], rest_frames: usize) {
         for marker in markers {
-            let mine = marks.iter().filter(|o| o.kind == Kind::White && o.id == marker.id as usize);
-            let own: Vec<DVec2> = mine.map(|o| o.centroid_px).collect();
-            let mean = own.iter().sum::<DVec2>() / own.len().max(1) as f64;
+            let Some((own, mean)) = centroids_of(marks, marker.id as usize) else { continue };
             let sum = own.iter().map(|at| at.distance_squared(mean)).sum();
             self.scatter.add(sum, 2.0 * (own.len() as f64 - 1.0));
-            if !own.is_empty() {
-                let part = 1.0 / own.len() as f64 + 1.0 / rest_frames.max(1) as f64;
-                self.mean_part = self.mean_part.max(part);
-            }
+            let part = 1.0 / own.len() as f64 + 1.0 / rest_frames.max(1) as f64;
+            self.mean_part = self.mean_part.max(part);
         }
     }
 

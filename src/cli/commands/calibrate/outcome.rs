@@ -7,7 +7,7 @@ use nalgebra::Matrix6;
 use serde_json::json;
 
 use super::loads::{self, Load, LoadNoise};
-use super::noise::CentroidNoise;
+use super::noise::{CentroidNoise, centroids_of, tolerance_px};
 use super::session::Step;
 use crate::commands::input::input_fault;
 use crate::commands::output::Failure;
@@ -22,8 +22,6 @@ use domecast_springs::Displacement;
 
 /// Noise that a marker's centroid may have for the solver, px.
 const CENTROID_NOISE_PX: f64 = 0.5;
-/// Standard deviation of a centroid where the constants do not say it, px.
-const CENTROID_SD_PX: f64 = 0.1;
 /// Frames of a load that go into the fit of the optics: more of one pose say the same.
 const OPTICS_FRAMES: usize = 2;
 /// A load is refused beyond this: six squares of standard normal numbers are beyond 30.7 once in 30,000.
@@ -154,45 +152,41 @@ pub fn kind_of(step: &Step) -> &str {
 struct StepPose<'a> {
     step: &'a Step,
     pose: Rigid,
-    /// Of the displacement, for a noise of [`CENTROID_NOISE_PX`], and for that of these frames.
-    nominal_covariance: Matrix6<f64>,
-    covariance: Matrix6<f64>,
+    /// Of the displacement, for centroids that are off by [`CENTROID_NOISE_PX`].
+    solver_covariance: Matrix6<f64>,
     rms_px: f64,
     markers: usize,
 }
 
+impl StepPose<'_> {
+    /// Of the displacement, for centroids with this standard deviation, px.
+    fn covariance(&self, sd_px: f64) -> Matrix6<f64> {
+        self.solver_covariance * (sd_px / CENTROID_NOISE_PX).powi(2)
+    }
+}
+
 /// Where the platform is, by the mean of each marker's centroids.
 fn pose_of<'a>(solver: &PoseSolver, constants: &Constants, step: &'a Step) -> Result<StepPose<'a>, String> {
-    let marks = &step.marks;
     let sightings: Vec<Sighting> = solver
         .markers()
         .iter()
         .filter_map(|marker| {
-            let own = || marks.iter().filter(|o| o.kind == Kind::White && o.id == marker.id as usize);
-            let count = own().count();
-            let sum: DVec2 = own().map(|o| o.centroid_px).sum();
-            (count > 0).then(|| Sighting { id: marker.id, centroid_px: sum / count as f64 })
+            let (_, centroid_px) = centroids_of(&step.marks, marker.id as usize)?;
+            Some(Sighting { id: marker.id, centroid_px })
         })
         .collect();
     let found = solver.solve(&sightings).map_err(|error| error.to_string())?;
     let at_mm = constants.springs.as_ref().map_or(DVec3::ZERO, |s| DVec3::from_array(s.at_mm));
-    let covariance = found.displacement_covariance(at_mm);
     Ok(StepPose {
         step,
         pose: found.pose,
-        nominal_covariance: covariance,
-        covariance,
+        solver_covariance: found.displacement_covariance(at_mm),
         rms_px: found.rms_px,
         markers: sightings.len(),
     })
 }
 
-/// How far a centroid may be off by the constants, px.
-fn tolerance_px(constants: &Constants) -> f64 {
-    constants.tolerances.map_or(CENTROID_SD_PX, |t| t.white_centroid_px)
-}
-
-/// The pose of each step that has marks, their covariances by the centroids' noise that all of them show, and that noise, px.
+/// The pose of each step that has marks, and the centroids' noise that all of them show, px.
 fn poses_of<'a>(
     solver: &PoseSolver,
     constants: &Constants,
@@ -211,11 +205,7 @@ fn poses_of<'a>(
         }
         found.push(one);
     }
-    let sd_px = noise.sd_px(tolerance_px(constants));
-    for one in &mut found {
-        one.covariance *= (sd_px / CENTROID_NOISE_PX).powi(2);
-    }
-    Ok((found, sd_px))
+    Ok((found, noise.sd_px(tolerance_px(constants))))
 }
 
 /// A weight that is not at rest after it was taken off, or was never off.
@@ -269,7 +259,7 @@ pub fn solve(nominal: &Constants, steps: &[Step], noise: &LoadNoise, at: &Path) 
         let (poses, centroid_px) = poses_of(&solver, &outcome.constants, steps).map_err(refused)?;
         outcome.centroid_px = Some(centroid_px);
         for pose in &poses {
-            take_motion(&mut outcome, &mut knowledge, pose, noise).map_err(refused)?;
+            take_motion(&mut outcome, &mut knowledge, (pose, centroid_px), noise).map_err(refused)?;
         }
     }
     outcome.knowledge = knowledge;
@@ -280,17 +270,18 @@ pub fn solve(nominal: &Constants, steps: &[Step], noise: &LoadNoise, at: &Path) 
 fn take_motion(
     outcome: &mut Outcome,
     knowledge: &mut Option<SpringKnowledge>,
-    seen: &StepPose,
+    (seen, centroid_px): (&StepPose, f64),
     noise: &LoadNoise,
 ) -> Result<(), String> {
     let constants = &outcome.constants;
     let at_mm = constants.springs.as_ref().map_or(DVec3::ZERO, |s| DVec3::from_array(s.at_mm));
-    let StepPose { step, pose, covariance, .. } = *seen;
+    let StepPose { step, pose, .. } = *seen;
+    let covariance = seen.covariance(centroid_px);
     if kind_of(step) == "rest" {
         if outcome.motion.is_none() {
             outcome.motion = Some(covariance);
             // scatter does not show it, nor do loads' residuals more than a part: the whole tolerance stands
-            let whole = (tolerance_px(constants) / CENTROID_NOISE_PX).powi(2) * seen.nominal_covariance;
+            let whole = seen.covariance(tolerance_px(constants));
             knowledge.iter_mut().for_each(|springs| springs.open_rest(&whole));
         }
         return back_at_rest(&pose, at_mm);

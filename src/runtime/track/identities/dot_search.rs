@@ -105,7 +105,7 @@ impl DotSearch<'_, '_> {
                 let spacing = self.models[index].spacing_px;
                 let guess = expected + track.displaced_px.map_or(displaced, |own| own + moved);
                 let at = |other: usize| self.tracks[other].expected_px;
-                let by = |other: usize| Some(self.tracks[other].now_px()? - self.tracks[other].expected_px?);
+                let by = |other: usize| self.tracks[other].off_px();
                 let lead = skin::estimate(index, self.models, at, by);
                 let starts = [expected + lead.map_or(displaced, |lead| lead.displaced_px), guess];
                 for start in starts {
@@ -188,7 +188,7 @@ impl DotSearch<'_, '_> {
             let (models, tracks) = (self.models, &*self.tracks);
             let Some(now) = tracks[index].now_px() else { continue };
             let at = |other: usize| tracks[other].expected_px;
-            let by = |other: usize| Some(tracks[other].now_px()? - tracks[other].expected_px?);
+            let by = |other: usize| tracks[other].off_px();
             let off_px = |dot: usize| {
                 let lead = skin::estimate(dot, models, at, by)?;
                 Some(now.distance(at(dot)? + lead.displaced_px))
@@ -218,7 +218,7 @@ impl DotSearch<'_, '_> {
             let unlike = (now - start).distance(moved) > MAX_UNLIKE * spacing;
             let own = track.expected_px.map_or(displaced, |expected| now - expected);
             let at = |other: usize| self.tracks[other].expected_px;
-            let by = |other: usize| Some(self.tracks[other].now_px()? - self.tracks[other].expected_px?);
+            let by = |other: usize| self.tracks[other].off_px();
             let rough = own.distance(displaced) > SURELY_SMOOTH * spacing;
             let torn = rough && skin::is_torn(index, self.models, at, by);
             if count >= 2 && (unlike || torn) {
@@ -236,7 +236,7 @@ impl DotSearch<'_, '_> {
     /// beside its place, and fit its neighbours' blobs. Loses the others; how many.
     fn lose_islands(&mut self) -> usize {
         let tracks = &*self.tracks;
-        let by = |index: usize| Some(tracks[index].now_px()? - tracks[index].expected_px?);
+        let by = |index: usize| tracks[index].off_px();
         self.groups.find(
             self.models,
             |index| by(index).is_some(),

@@ -36,6 +36,11 @@ impl DotTrack {
         self.spot.map(|s| s.at_px)
     }
 
+    /// By how much it is beside where the undeformed dome would show it, px; where it is found.
+    pub fn off_px(&self) -> Option<DVec2> {
+        Some(self.now_px()? - self.expected_px?)
+    }
+
     /// Image of its centre: the centroid less what a disc on the dome has its centroid off, px.
     pub fn center_px(&self) -> Option<DVec2> {
         Some(self.spot?.at_px - self.offset_px)

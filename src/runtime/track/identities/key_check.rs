@@ -85,7 +85,7 @@ impl KeyFrame<'_, '_> {
     /// What is where the found dots around a dot put it.
     fn look(&mut self, model: &DotModel, expected_px: DVec2, outline: &SpotOutline) -> Found {
         let at = |other: usize| self.tracks[other].expected_px;
-        let by = |other: usize| Some(self.tracks[other].now_px()? - self.tracks[other].expected_px?);
+        let by = |other: usize| self.tracks[other].off_px();
         let lead = skin::beside(model, expected_px, usize::MAX, self.models, at, by);
         let Some(lead) = lead.filter(|lead| lead.neighbors >= 2) else { return Found::Unclear };
         match self.meter.measure(

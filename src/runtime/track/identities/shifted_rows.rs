@@ -38,11 +38,6 @@ fn beside(models: &[DotModel], index: usize, step_px: DVec2) -> Option<usize> {
     (off_px(&nearest) < STEP_REACH * from.spacing_px).then_some(nearest)
 }
 
-/// By how much a found dot is beside its place.
-fn displaced(track: &DotTrack) -> Option<DVec2> {
-    Some(track.now_px()? - track.expected_px?)
-}
-
 impl ShiftedRows {
     /// For so many dots.
     pub fn new(dots: usize) -> Self {
@@ -97,7 +92,7 @@ impl ShiftedRows {
             let step_px = self.steps[*other]?;
             let away_px = models[*other].rest_px - models[index].rest_px;
             let is_beside = away_px.dot(step_px) > -BESIDE * step_px.length_squared();
-            let apart_px = displaced(&tracks[index])?.distance(displaced(&tracks[*other])?);
+            let apart_px = tracks[index].off_px()?.distance(tracks[*other].off_px()?);
             let is_alike = apart_px < 0.5 * ALIKE * models[index].spacing_px;
             let before = beside(models, index, -step_px)?;
             (is_beside && is_alike && (is_gap(before) || self.steps[before].is_some())).then_some(step_px)
@@ -142,7 +137,7 @@ impl ShiftedRows {
         self.row.clear();
         let mut step_px = models[first].rest_px - models[gap].rest_px;
         // What is behind the gap did not move with the row.
-        let behind = beside(models, gap, -step_px).and_then(|behind| displaced(&tracks[behind]));
+        let behind = beside(models, gap, -step_px).and_then(|behind| tracks[behind].off_px());
         let still_px = behind.unwrap_or(DVec2::ZERO);
         let mut row_px: Option<DVec2> = None;
         let mut next = Some(first);
@@ -151,7 +146,7 @@ impl ShiftedRows {
             if self.is_double(tracks, index, beside(models, index, step_px)) {
                 return !self.row.is_empty();
             }
-            let Some(off_px) = displaced(track).map(|by| by - still_px) else { return false };
+            let Some(off_px) = track.off_px().map(|by| by - still_px) else { return false };
             let spacing_px = models[index].spacing_px;
             let is_off = off_px.length() > MIN_OFF * spacing_px;
             let is_alike = row_px.is_none_or(|row_px| row_px.distance(off_px) < ALIKE * spacing_px);

@@ -66,10 +66,7 @@ impl DriftCheck {
 /// seen to tell. What is affine over the whole skin does not count: a camera that has moved shows what the calibration left
 /// of the optics' errors from another side, a touch moves some places beside others.
 fn is_touched(tracks: &[DotTrack], models: &[DotModel], middle_px: DVec2, max_still_px: f64) -> bool {
-    let moved = |track: &DotTrack| {
-        let (now, expected) = (track.now_px()?, track.expected_px?);
-        Some((row_of(expected, middle_px), now - expected))
-    };
+    let moved = |track: &DotTrack| Some((row_of(track.expected_px?, middle_px), track.off_px()?));
     let mut sums = AffineSums::default();
     tracks.iter().filter_map(moved).for_each(|(row, motion)| sums.add(&row, motion));
     let Some(affine) = sums.solve() else { return true };

@@ -151,30 +151,26 @@ impl Reporter {
         self.result.false_dots.clear();
         self.result.false_dots.extend_from_slice(dots.false_dots);
         for (index, (track, to)) in dots.tracks.iter().zip(&mut self.result.black_dots).enumerate() {
-            *to = DotResult {
+            let is_expected = displacements.is_some() && track.is_wanted();
+            let place = DotResult {
                 id: to.id,
+                undeformed_px: track.expected_px.filter(|_| is_expected).map(|p| p - track.offset_px),
+                ink_px: track.now_px(),
+                ..DotResult::default()
+            };
+            let unsure = track.is_unsure.then_some(MarkState::IdentityUnsure);
+            if let Some(state) = unsure.or(track.fault).filter(|_| track.spot.is_some()) {
+                *to = DotResult { state, ..place };
+                continue;
+            }
+            *to = DotResult {
                 state: track.state,
                 image_px: track.center_px(),
                 centroid_px: track.now_px(),
                 sd_px: track.spot.map(|spot| spot.sd_px),
-                ink_px: track.now_px(),
                 motion_px: track.motion_px,
-                ..DotResult::default()
+                ..place
             };
-            if displacements.is_some() && track.is_wanted() {
-                to.undeformed_px = track.expected_px.map(|p| p - track.offset_px);
-            }
-            let unsure = track.is_unsure.then_some(MarkState::IdentityUnsure);
-            if let Some(state) = unsure.or(track.fault).filter(|_| track.spot.is_some()) {
-                *to = DotResult {
-                    id: to.id,
-                    state,
-                    undeformed_px: to.undeformed_px,
-                    ink_px: to.ink_px,
-                    ..DotResult::default()
-                };
-                continue;
-            }
             if let Some(found) = displacements.and_then(|displacements| displacements[index]) {
                 to.displacement_mm = Some(found.displacement_mm);
                 to.displacement_sd_random_mm = Some(found.sd_random_mm);

@@ -219,7 +219,8 @@ pub(crate) fn tidy(base: &Path, folder: &Path, rest: &Path) -> io::Result<Tidied
         }
     }
     fs::remove_file(folder.join(TARGET)).or_else(none_is_fine)?;
-    fs::remove_dir(folder)?;
+    // another run may have seen it empty, and removed it
+    fs::remove_dir(folder).or_else(none_is_fine)?;
     // folders that were made for a result which then did not come
     for parent in rest.ancestors().skip(1).filter(|parent| !parent.as_os_str().is_empty()) {
         if fs::remove_dir(base.join(parent)).is_err() {
@@ -282,8 +283,9 @@ pub(crate) fn recover_one(folder: &Path) -> Option<String> {
     let removed = |place: &Path, what: &str| format!("{}: a run was stopped here; {what}", place.display());
     let target = folder.join(TARGET);
     if fs::symlink_metadata(&target).is_err() {
-        // stopped before it began or after it ended: an empty folder
-        return fs::remove_dir(folder).ok().map(|()| removed(base, "its empty temporary folder is removed"));
+        // before a run began or after it ended: whether it was stopped cannot be seen, and nothing is lost
+        let _ = fs::remove_dir(folder);
+        return None;
     }
     let mut lock = File::open(&target).ok()?;
     lock.try_lock().ok()?;
@@ -297,6 +299,11 @@ pub(crate) fn recover_one(folder: &Path) -> Option<String> {
         return None;
     }
     let place = base.join(&rest);
+    if text.is_empty() {
+        // a run that is just starting, or was stopped there: as above
+        let _ = tidy(base, folder, &rest);
+        return None;
+    }
     Some(match tidy(base, folder, &rest) {
         Err(error) => {
             removed(&place, &format!("what it left in {} cannot be removed ({error})", folder.display()))

@@ -244,6 +244,34 @@ fn the_next_run_ends_what_a_stopped_one_began() {
 }
 
 #[test]
+fn a_run_that_only_begins_or_ends_is_not_called_stopped() {
+    let place = tempfile::tempdir().unwrap();
+    // the moments before `target` is there, before it is locked, and after it is gone
+    fs::create_dir(place.path().join(".domecast-000000000000")).unwrap();
+    fs::create_dir(place.path().join(".domecast-111111111111")).unwrap();
+    fs::write(place.path().join(".domecast-111111111111/target"), "").unwrap();
+    assert!(recover([place.path().as_os_str().to_owned()]).is_empty());
+    assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
+
+    // a result is placed although others remove whatever looks abandoned
+    let (out, done) = (place.path().join("out"), std::sync::atomic::AtomicBool::new(false));
+    let others = std::thread::scope(|scope| {
+        let others = scope.spawn(|| {
+            let mut notes = Vec::new();
+            while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                notes.extend(recover([place.path().as_os_str().to_owned()]));
+            }
+            notes
+        });
+        let made: Result<(), WriteError> = (0..200).try_for_each(|_| result(&out, "new", &ANY).map(drop));
+        done.store(true, std::sync::atomic::Ordering::Relaxed);
+        made.unwrap();
+        others.join().unwrap()
+    });
+    assert_eq!(others, [""; 0]);
+}
+
+#[test]
 fn what_only_looks_like_a_stopped_run_is_left_alone() {
     let place = tempfile::tempdir().unwrap();
     let at = |name: &str| place.path().join(name);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::output::{Failure, Output};
 use domecast_files::{GrowingFile, OutputRules};
 use domecast_live::decode::PictureFormat;
-use domecast_live::record::{McapError, McapRecorder, RecordedPicture};
+use domecast_live::record::{BehindWriter, McapError, McapRecorder, RecordedPicture};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::ShapeMap;
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
@@ -17,7 +17,7 @@ const FRAMES_PER_S: f64 = 30.0;
 /// A recording that grows in its place: what is in it counts, even if the program is killed.
 pub struct Recording {
     path: PathBuf,
-    recorder: McapRecorder<BufWriter<GrowingFile>>,
+    recorder: McapRecorder<BufWriter<BehindWriter<GrowingFile>>>,
 }
 
 impl Recording {
@@ -32,6 +32,7 @@ impl Recording {
     ) -> Result<Self, Failure> {
         let (file, kept) = GrowingFile::new(path, command, rules)?;
         output.kept(kept);
+        let file = BehindWriter::start(file).map_err(Failure::Print)?;
         let recorder = McapRecorder::new(BufWriter::new(file), constants, tracker);
         let recorder = recorder.map_err(|error| fault(path, &error))?;
         Ok(Self { path: path.to_path_buf(), recorder })
@@ -56,8 +57,9 @@ impl Recording {
     /// Ends it with its index.
     pub fn end(self) -> Result<(), Failure> {
         let file = self.recorder.finish().map_err(|error| fault(&self.path, &error))?;
-        let file = file.into_inner().map_err(|error| Failure::Record(self.path, error.to_string()))?;
-        Ok(file.end()?)
+        let file = file.into_inner().map_err(|error| error.into_error()).and_then(BehindWriter::into_inner);
+        let named = |error| Failure::Record(self.path, format!("the recording cannot be written ({error})"));
+        Ok(file.map_err(named)?.end()?)
     }
 }
 

@@ -10,7 +10,7 @@
 //! use domecast_live::page::LivePage;
 //! use domecast_optics::numeric::Rigid;
 //!
-//! let page = LivePage::start(0, Rigid::identity(), None)?;
+//! let page = LivePage::start(0, Rigid::identity())?;
 //! assert!(page.url().starts_with("http://127.0.0.1:"));
 //! # Ok::<(), std::io::Error>(())
 //! ```
@@ -27,13 +27,12 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::thread;
 
+use crate::reading::LiveReading;
 use domecast_optics::numeric::Rigid;
-use domecast_runtime::shape::ShapeFromColor;
+use domecast_runtime::track::Tracked;
 use painter::paint;
 use server::serve;
 use shared::{MAX_SAMPLES, Shared};
-
-pub use shared::LiveReading;
 
 /// The page and its server.
 pub struct LivePage {
@@ -42,19 +41,16 @@ pub struct LivePage {
 }
 
 impl LivePage {
-    /// Starts the server at a port of 127.0.0.1; 0: any that is free. Forces are drawn as the camera sees them; with `skin` the depth of the skin is measured in the
-    /// frames that are shown.
+    /// Starts the server at a port of 127.0.0.1; 0: any that is free. Forces are drawn as the camera sees them.
     ///
     /// # Errors
     /// The port is taken, or the system has no threads.
-    pub fn start(port: u16, rest_from_camera: Rigid, skin: Option<ShapeFromColor>) -> io::Result<Self> {
+    pub fn start(port: u16, rest_from_camera: Rigid) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         let address = listener.local_addr()?;
         let shared = Arc::new(Shared::default());
         let of_painter = Arc::clone(&shared);
-        thread::Builder::new()
-            .name("painter".into())
-            .spawn(move || paint(&of_painter, rest_from_camera, skin))?;
+        thread::Builder::new().name("painter".into()).spawn(move || paint(&of_painter, rest_from_camera))?;
         let of_server = Arc::clone(&shared);
         thread::Builder::new().name("page".into()).spawn(move || serve(&listener, &of_server))?;
         Ok(Self { shared, address })
@@ -65,19 +61,23 @@ impl LivePage {
         format!("http://{}/", self.address)
     }
 
-    /// Shows a reading, if anybody looks; never waits for a browser.
-    pub fn show(&self, reading: impl FnOnce() -> LiveReading) {
-        if self.shared.browsers.load(Ordering::Relaxed) == 0 {
-            return;
-        }
-        let reading = reading();
+    /// Whether anybody looks.
+    pub fn is_watched(&self) -> bool {
+        self.shared.browsers.load(Ordering::Relaxed) > 0
+    }
+
+    /// Adds the wrench of a frame to the curves.
+    pub fn add_sample(&self, tracked: &Tracked) {
         let mut samples = self.shared.samples.lock().unwrap_or_else(PoisonError::into_inner);
         if samples.len() >= MAX_SAMPLES {
             samples.pop_front();
         }
-        let time_s = reading.tracked.time_s.unwrap_or(0.0);
-        samples.push_back((time_s, reading.tracked.wrench.map(|wrench| wrench.to_array())));
-        drop(samples);
+        let time_s = tracked.time_s.unwrap_or(0.0);
+        samples.push_back((time_s, tracked.wrench.map(|wrench| wrench.to_array())));
+    }
+
+    /// Shows a reading; never waits for a browser.
+    pub fn show(&self, reading: LiveReading) {
         self.shared.reading.set(reading);
     }
 }

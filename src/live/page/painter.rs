@@ -10,12 +10,13 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::shared::{LiveReading, Sample, Shared};
+use super::shared::{Sample, Shared};
 use crate::decode::Picture;
+use crate::reading::LiveReading;
 use domecast_optics::numeric::Rigid;
 use domecast_runtime::overlay::{depth_range_mm, viridis};
-use domecast_runtime::shape::{ShapeFromColor, ShapeMap};
-use domecast_runtime::track::{CameraFrame, MarkState};
+use domecast_runtime::shape::ShapeMap;
+use domecast_runtime::track::MarkState;
 
 /// From picture to picture at least: what eyes need, and little of a core.
 const STEP: Duration = Duration::from_millis(50);
@@ -24,7 +25,7 @@ const JPEG_QUALITY: u8 = 75;
 const SKIN_STEP: usize = 2;
 
 /// Paints the newest reading until the page is dropped.
-pub(super) fn paint(shared: &Arc<Shared>, rest_from_camera: Rigid, mut skin: Option<ShapeFromColor>) {
+pub(super) fn paint(shared: &Arc<Shared>, rest_from_camera: Rigid) {
     let camera_from_rest = rest_from_camera.inverse();
     let (mut last, mut deepest_mm) = (0, 0.0_f64);
     while !shared.is_stopped.load(Ordering::Relaxed) {
@@ -33,10 +34,9 @@ pub(super) fn paint(shared: &Arc<Shared>, rest_from_camera: Rigid, mut skin: Opt
         last = number;
         let samples = mem::take(&mut *shared.samples.lock().unwrap_or_else(PoisonError::into_inner));
         let samples: Vec<Sample> = samples.into();
-        let map = skin.as_mut().and_then(|skin| measure(skin, &reading));
-        let touch = map.and_then(|map| map.contact.as_ref());
+        let touch = reading.skin.as_deref().and_then(|map| map.contact.as_ref());
         deepest_mm = touch.map_or(deepest_mm, |touch| deepest_mm.max(touch.depth_mm));
-        let mut event = event(&reading, &samples, map, deepest_mm);
+        let mut event = event(&reading, &samples, deepest_mm);
         let force_n = reading.tracked.wrench.map(|wrench| camera_from_rest.vector(wrench.force_n));
         event["camera_force_n"] = json!(force_n.map(|force_n| force_n.to_array()));
         shared.event.set(event.to_string().into());
@@ -44,15 +44,6 @@ pub(super) fn paint(shared: &Arc<Shared>, rest_from_camera: Rigid, mut skin: Opt
             thread::sleep(left);
         }
     }
-}
-
-fn frame_of(picture: &Picture) -> Option<CameraFrame<'_>> {
-    CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes).ok()
-}
-
-fn measure<'a>(skin: &'a mut ShapeFromColor, reading: &LiveReading) -> Option<&'a ShapeMap> {
-    let frame = frame_of(reading.picture.as_deref()?)?;
-    skin.measure(&frame, &reading.tracked).ok()
 }
 
 fn data_url(kind: &str, bytes: &[u8]) -> String {
@@ -64,7 +55,8 @@ fn px(at: glam::DVec2) -> [f64; 2] {
     [at.x, at.y].map(|v| (100.0 * v).round() / 100.0)
 }
 
-fn event(reading: &LiveReading, samples: &[Sample], map: Option<&ShapeMap>, deepest_mm: f64) -> Value {
+fn event(reading: &LiveReading, samples: &[Sample], deepest_mm: f64) -> Value {
+    let map = reading.skin.as_deref();
     let tracked = &reading.tracked;
     let dots: Vec<Value> = tracked
         .black_dots

@@ -15,11 +15,11 @@
 //! What a frame does not say has no message: no wrench of a frame without a pose. Chunks are written whole, one after the
 //! other, so that a recording that is cut off anywhere can be read to its last whole chunk.
 
+mod behind;
 mod cdr;
-mod heights;
 mod messages;
 mod recorder;
 mod schemas;
 
-pub use heights::HeightReader;
+pub use behind::BehindWriter;
 pub use recorder::{MCAP_CHUNK_BYTES, McapError, McapRecorder, RecordedPicture};

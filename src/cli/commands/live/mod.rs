@@ -15,13 +15,12 @@ use domecast_files::StopWish;
 use domecast_live::decode::picture;
 use domecast_live::frame_files::read_whole;
 use domecast_live::page::LivePage;
-use domecast_live::record::HeightReader;
 use domecast_live::source::{CameraRequest, ControlRequest, LiveSource, open_device as open_named};
-use domecast_live::{LiveEvent, LiveReader};
+use domecast_live::{HeightReader, LiveEvent, LiveReader};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeFromColor, ShapeOptions};
 use domecast_runtime::track::{CameraFrame, Tracker};
-use session::Session;
+use session::{Outlets, Session};
 
 pub use arguments::{LiveArguments, milliseconds, rate};
 pub use health::cure as cure_of;
@@ -110,17 +109,11 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
     let source = open_device(&device, &constants)?;
     check_size(&*source, arguments, &constants)?;
     let page = match arguments.show {
-        Some(port) => {
-            let shown = skin.clone();
-            Some(LivePage::start(port, *tracker.optics().rest_from_camera(), shown).map_err(|error| {
-                let problem = format!("cannot be used ({error})");
-                input_fault(
-                    Path::new(&format!("--show {port}")),
-                    problem,
-                    "a port that is free, or none for any",
-                )
-            })?)
-        }
+        Some(port) => Some(LivePage::start(port, *tracker.optics().rest_from_camera()).map_err(|error| {
+            let problem = format!("cannot be used ({error})");
+            let named = format!("--show {port}");
+            input_fault(Path::new(&named), problem, "a port that is free, or none for any")
+        })?),
         None => None,
     };
     let inputs = [arguments.constants.as_path()];
@@ -128,12 +121,11 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
     let begin =
         |path: &std::path::PathBuf| Recording::begin(output, path, "live", &rules, &constants, &tracker);
     let recording = arguments.record.as_ref().map(begin).transpose()?;
-    let heights = skin.filter(|_| recording.is_some()).map(HeightReader::start).transpose();
-    let heights = heights.map_err(Failure::Print)?;
+    let heights = skin.map(HeightReader::start).transpose().map_err(Failure::Print)?;
     // the first Ctrl-C ends the reading in good order, with the recording's index and the summary
     let wish = StopWish::heed();
-    let mut session =
-        Session::begin(output, arguments, tracker, source.info(), page, recording.map(|r| (r, heights)))?;
+    let outlets = Outlets { page, recording, heights };
+    let mut session = Session::begin(output, arguments, tracker, source.info(), outlets)?;
     let reader = LiveReader::start(source, MAX_WAITING).map_err(Failure::Print)?;
     let mut heard = Instant::now();
     let mut is_stalled = false;

@@ -12,16 +12,23 @@ use super::terminal::{TerminalView, ViewedReading};
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
 use crate::commands::recording::{Recording, recorded};
-use domecast_live::AgeStatistics;
 use domecast_live::decode::Picture;
-use domecast_live::page::{LivePage, LiveReading};
-use domecast_live::record::HeightReader;
+use domecast_live::page::LivePage;
 use domecast_live::source::{ArrivedFrame, SourceInfo};
+use domecast_live::{AgeStatistics, HeightReader, LiveReading};
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker, write_json_fields};
 use std::sync::Arc;
 
 /// How fast the shown rate follows.
 const FOLLOW: f64 = 0.05;
+
+/// Where readings go beside standard output.
+pub struct Outlets {
+    pub page: Option<LivePage>,
+    pub recording: Option<Recording>,
+    /// What measures the skin for both.
+    pub heights: Option<HeightReader>,
+}
 
 /// A run of `live`.
 pub struct Session<'a> {
@@ -30,7 +37,6 @@ pub struct Session<'a> {
     tracker: Tracker,
     page: Option<LivePage>,
     recording: Option<Recording>,
-    /// What measures the skin for the recording.
     heights: Option<HeightReader>,
     is_recording_lost: bool,
     view: Option<TerminalView>,
@@ -76,10 +82,8 @@ impl<'a> Session<'a> {
         arguments: &'a LiveArguments,
         tracker: Tracker,
         info: &SourceInfo,
-        page: Option<LivePage>,
-        recording: Option<(Recording, Option<HeightReader>)>,
+        Outlets { page, recording, heights }: Outlets,
     ) -> Result<Self, Failure> {
-        let (recording, heights) = recording.unzip();
         let is_seen = io::stdout().is_terminal() && !output.is_json();
         let began = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let url = page.as_ref().map(LivePage::url);
@@ -89,7 +93,7 @@ impl<'a> Session<'a> {
             tracker,
             page,
             recording,
-            heights: heights.flatten(),
+            heights,
             is_recording_lost: false,
             view: is_seen.then(TerminalView::default),
             head: head(info),
@@ -174,7 +178,7 @@ impl<'a> Session<'a> {
         self.age_ms = 1e3 * age.as_secs_f64();
         self.keep_pace(frame.complete);
         let file = frame.file.as_deref().filter(|_| !is_mirrored);
-        self.record(frame, seen.as_ref().ok().copied(), file, decoded.as_ref().ok())?;
+        self.record(frame.time_s, seen.as_ref().ok().copied(), file)?;
         self.look(frame.complete, decoded.ok())
     }
 
@@ -193,22 +197,23 @@ impl<'a> Session<'a> {
 
     fn record(
         &mut self,
-        frame: &ArrivedFrame,
+        time_s: f64,
         seen: Option<CameraFrame<'_>>,
         file: Option<&[u8]>,
-        picture: Option<&Arc<Picture>>,
     ) -> Result<(), Failure> {
+        let time_ns = self.time_ns(time_s);
         let Some(recording) = &mut self.recording else { return Ok(()) };
-        let time_ns = self.began_ns.saturating_add((1e9 * frame.time_s).max(0.0) as u64);
-        let mut added = recording.add(time_ns, recorded(seen, file), self.tracker.result(), None);
-        if let Some(heights) = &mut self.heights {
-            if let Some(picture) = picture {
-                heights.offer(time_ns, picture, self.tracker.result());
-            }
-            while let (Ok(()), Some((time_ns, map))) = (&added, heights.take()) {
-                added = recording.add_height(time_ns, &map);
-            }
-        }
+        let added = recording.add(time_ns, recorded(seen, file), self.tracker.result(), None);
+        self.keep(added)
+    }
+
+    /// When a frame was taken, nanoseconds since 1970.
+    fn time_ns(&self, time_s: f64) -> u64 {
+        self.began_ns.saturating_add((1e9 * time_s).max(0.0) as u64)
+    }
+
+    /// Goes on without a recording that takes no more.
+    fn keep(&mut self, added: Result<(), Failure>) -> Result<(), Failure> {
         if let Err(failure) = added {
             // reading goes on: a full disk must not stop a robot
             self.recording = None;
@@ -227,12 +232,9 @@ impl<'a> Session<'a> {
             let about = json!({ "status": found.status });
             self.event("no_measurement", about, Some(&found.message))?;
         }
+        self.show(picture, device)?;
         let rate_hz = self.rate_hz();
         let tracked = self.tracker.result();
-        if let Some(page) = &self.page {
-            let (age_ms, dropped) = (self.age_ms, self.dropped);
-            page.show(|| LiveReading { picture, tracked: tracked.clone(), age_ms, rate_hz, dropped, device });
-        }
         let Some(view) = &mut self.view else { return Ok(()) };
         let quantile = |share| self.ages.quantile_ms(share).unwrap_or(0.0);
         let around = ViewedReading {
@@ -245,6 +247,50 @@ impl<'a> Session<'a> {
             dropped: self.dropped,
         };
         Ok(view.show(tracked, &around)?)
+    }
+
+    /// To the page, and to what measures the skin: a frame whose skin is measured is shown and recorded with it, once it is.
+    fn show(&mut self, picture: Option<Arc<Picture>>, device: &'static str) -> Result<(), Failure> {
+        let page = self.page.as_ref().filter(|page| page.is_watched());
+        if let Some(page) = page {
+            page.add_sample(self.tracker.result());
+        }
+        let (age_ms, rate_hz, dropped) = (self.age_ms, self.rate_hz(), self.dropped);
+        let tracked = self.tracker.result();
+        let reading = || LiveReading {
+            picture,
+            tracked: tracked.clone(),
+            skin: None,
+            age_ms,
+            rate_hz,
+            dropped,
+            device,
+        };
+        let Some(heights) = &mut self.heights else {
+            if let Some(page) = page {
+                page.show(reading());
+            }
+            return Ok(());
+        };
+        let measured = heights.take();
+        if page.is_some() || self.recording.is_some() {
+            heights.offer(reading);
+        }
+        measured.map_or(Ok(()), |measured| self.measured(measured))
+    }
+
+    /// A reading whose skin is measured.
+    fn measured(&mut self, reading: LiveReading) -> Result<(), Failure> {
+        let time_ns = self.time_ns(reading.tracked.time_s.unwrap_or(0.0));
+        let added = match (&mut self.recording, &reading.skin) {
+            (Some(recording), Some(skin)) => recording.add_height(time_ns, skin),
+            _ => Ok(()),
+        };
+        self.keep(added)?;
+        if let Some(page) = &self.page {
+            page.show(reading);
+        }
+        Ok(())
     }
 
     pub fn unplugged(&mut self, why: &str) -> Result<(), Failure> {
@@ -280,10 +326,10 @@ impl<'a> Session<'a> {
 
     /// The summary.
     pub fn end(mut self) -> Result<(), Failure> {
-        if let Some(mut recording) = self.recording.take() {
-            for (time_ns, map) in self.heights.take().into_iter().flat_map(HeightReader::finish) {
-                recording.add_height(time_ns, &map)?;
-            }
+        if let Some(last) = self.heights.take().and_then(HeightReader::finish) {
+            self.measured(last)?;
+        }
+        if let Some(recording) = self.recording.take() {
             recording.end()?;
         }
         let ms = |share| self.ages.quantile_ms(share).map(|ms| (1e3 * ms).round() / 1e3);

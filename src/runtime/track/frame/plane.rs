@@ -19,14 +19,9 @@ pub struct Plane<'a> {
     bytes: &'a [u8],
 }
 
-/// Luma of ITU-R BT.601 in 256ths, the grey of OpenCV's `cvtColor`.
-fn luma(pixel: &[u8]) -> u8 {
-    match pixel {
-        [r, g, b, ..] => {
-            ((77 * u32::from(*r) + 150 * u32::from(*g) + 29 * u32::from(*b) + 128) >> 8).min(255) as u8
-        }
-        _ => 0,
-    }
+/// Luma of ITU-R BT.601 in 256ths, the grey of OpenCV's `cvtColor`: in 16 bits, which white just does not fill.
+fn luma([r, g, b]: [u8; 3]) -> u8 {
+    ((77 * u16::from(r) + 150 * u16::from(g) + 29 * u16::from(b) + 128) >> 8) as u8
 }
 
 impl<'a> Plane<'a> {
@@ -64,7 +59,7 @@ impl<'a> Plane<'a> {
         let at = (y * self.width + x) * self.step;
         match self.pick {
             Pick::Byte(offset) => self.bytes.get(at + offset).copied().unwrap_or(0),
-            Pick::Luma => self.bytes.get(at..at + 3).map_or(0, luma),
+            Pick::Luma => self.bytes.get(at..).and_then(<[u8]>::first_chunk).map_or(0, |pixel| luma(*pixel)),
         }
     }
 
@@ -84,9 +79,10 @@ impl<'a> Plane<'a> {
                     *to = T::from(from[offset]);
                 }
             }
+            // only frames of three channels have one to be made
             Pick::Luma => {
-                for (to, from) in out.iter_mut().zip(row.chunks_exact(self.step)) {
-                    *to = T::from(luma(from));
+                for (to, from) in out.iter_mut().zip(row.as_chunks().0) {
+                    *to = T::from(luma(*from));
                 }
             }
         }

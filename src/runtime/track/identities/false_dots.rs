@@ -26,15 +26,17 @@ pub(super) fn find_false_dots(
         let mut own = false;
         let mut nearest = (f64::INFINITY, 0);
         for (index, (track, model)) in tracks.iter().zip(models).enumerate() {
-            own |= track.now_px().is_some_and(|p| p.distance(blob.at_px) < OWN_REACH * model.spacing_px);
-            let from = track.expected_px.map_or(f64::INFINITY, |p| p.distance(blob.at_px));
+            let square_px2 = |at: DVec2| at.distance_squared(blob.at_px);
+            let own_px = OWN_REACH * model.spacing_px;
+            own |= track.now_px().is_some_and(|at| square_px2(at) < own_px * own_px);
+            let from = track.expected_px.map_or(f64::INFINITY, square_px2);
             if from < nearest.0 {
                 nearest = (from, index);
             }
         }
         let Some(model) = models.get(nearest.1).filter(|_| nearest.0.is_finite()) else { continue };
         let ratio = blob.area_px / model.outline.area_px;
-        let near = nearest.0 < PATTERN_REACH * model.spacing_px;
+        let near = nearest.0.sqrt() < PATTERN_REACH * model.spacing_px;
         if !own && near && AREA_RATIO.contains(&ratio) && out.len() < MAX_FALSE_DOTS {
             out.push(blob.at_px);
         }

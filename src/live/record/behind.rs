@@ -11,11 +11,11 @@ const MAX_WAITING: usize = 64;
 /// What is written behind one's back.
 enum Behind<W> {
     Writing(SyncSender<Vec<u8>>, JoinHandle<io::Result<W>>),
-    /// The thread has ended, and its fault was told.
+    /// The thread has ended, and its fault was reported.
     Failed,
 }
 
-/// Hands what is written to a thread, in order: a disk that stands still for a moment holds no reading up. A fault is told
+/// Hands what is written to a thread, in order: a disk that stands still for a moment holds no reading up. A fault is reported
 /// by the next write, or at the end.
 pub struct BehindWriter<W>(Behind<W>);
 

@@ -1,6 +1,6 @@
 //! The recording of `track --mcap` and `live --record`.
 
-use std::io::BufWriter;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::output::{Failure, Output};
@@ -17,7 +17,40 @@ const FRAMES_PER_S: f64 = 30.0;
 /// A recording that grows in its place: what is in it counts, even if the program is killed.
 pub struct Recording {
     path: PathBuf,
-    recorder: McapRecorder<BufWriter<BehindWriter<GrowingFile>>>,
+    recorder: McapRecorder<BufWriter<RecordingFile>>,
+}
+
+/// How the file is written.
+enum RecordingFile {
+    /// At once: when a frame's line is out, its chunk is in the file.
+    AtOnce(GrowingFile),
+    /// Behind the reading, which waits for no disk; a kill costs what the disk is behind.
+    Behind(BehindWriter<GrowingFile>),
+}
+
+impl Write for RecordingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::AtOnce(file) => file.write(bytes),
+            Self::Behind(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::AtOnce(file) => file.flush(),
+            Self::Behind(file) => file.flush(),
+        }
+    }
+}
+
+/// Who waits while a chunk is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecordingPace {
+    /// Whoever adds a frame.
+    WithFrames,
+    /// A thread.
+    BehindFrames,
 }
 
 impl Recording {
@@ -29,10 +62,16 @@ impl Recording {
         rules: &OutputRules<'_>,
         constants: &Constants,
         tracker: &Tracker,
+        pace: RecordingPace,
     ) -> Result<Self, Failure> {
         let (file, kept) = GrowingFile::new(path, command, rules)?;
         output.kept(kept);
-        let file = BehindWriter::start(file).map_err(Failure::Print)?;
+        let file = match pace {
+            RecordingPace::WithFrames => RecordingFile::AtOnce(file),
+            RecordingPace::BehindFrames => {
+                RecordingFile::Behind(BehindWriter::start(file).map_err(Failure::Print)?)
+            }
+        };
         let recorder = McapRecorder::new(BufWriter::new(file), constants, tracker);
         let recorder = recorder.map_err(|error| fault(path, &error))?;
         Ok(Self { path: path.to_path_buf(), recorder })
@@ -57,7 +96,10 @@ impl Recording {
     /// Ends it with its index.
     pub fn end(self) -> Result<(), Failure> {
         let file = self.recorder.finish().map_err(|error| fault(&self.path, &error))?;
-        let file = file.into_inner().map_err(|error| error.into_error()).and_then(BehindWriter::into_inner);
+        let file = file.into_inner().map_err(|error| error.into_error()).and_then(|file| match file {
+            RecordingFile::AtOnce(file) => Ok(file),
+            RecordingFile::Behind(file) => file.into_inner(),
+        });
         let named = |error| Failure::Record(self.path, format!("the recording cannot be written ({error})"));
         Ok(file.map_err(named)?.end()?)
     }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
-use super::recording::Recording;
+use super::recording::{Recording, RecordingPace};
 use domecast_files::StopWish;
 use domecast_live::decode::picture;
 use domecast_live::frame_files::read_whole;
@@ -118,8 +118,10 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
     };
     let inputs = [arguments.constants.as_path()];
     let rules = output.rules(&inputs);
-    let begin =
-        |path: &std::path::PathBuf| Recording::begin(output, path, "live", &rules, &constants, &tracker);
+    let pace = RecordingPace::BehindFrames;
+    let begin = |path: &std::path::PathBuf| {
+        Recording::begin(output, path, "live", &rules, &constants, &tracker, pace)
+    };
     let recording = arguments.record.as_ref().map(begin).transpose()?;
     let heights = skin.map(HeightReader::start).transpose().map_err(Failure::Print)?;
     // the first Ctrl-C ends the reading in good order, with the recording's index and the summary

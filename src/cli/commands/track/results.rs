@@ -11,7 +11,7 @@ use super::hardness::HardnessLines;
 use super::pictures::Pictures;
 use super::shape::ShapeFiles;
 use crate::commands::output::{Failure, Output};
-use crate::commands::recording::{Recording, recorded, time_ns};
+use crate::commands::recording::{Recording, RecordingPace, recorded, time_ns};
 use crate::track_report::{TrackReport, page};
 use domecast_files::{OutputRules, StagedFile};
 use domecast_runtime::constants::Constants;
@@ -122,7 +122,8 @@ impl Results {
             None => None,
         };
         // last, for it is there at once
-        let begin = |path: &PathBuf| Recording::begin(output, path, "track", rules, constants, tracker);
+        let pace = RecordingPace::WithFrames;
+        let begin = |path: &PathBuf| Recording::begin(output, path, "track", rules, constants, tracker, pace);
         let recording = arguments.mcap.as_ref().map(begin).transpose()?;
         Ok(Self { sink, pictures, shape, hardness, page, recording, at_mm, line: Vec::new() })
     }

@@ -10,7 +10,8 @@ command fails by its exit code. A mark in the line's own comment says what keeps
     (minutes ...)   only run with --all
     (... network)   not run here: `scripts/test` itself is the one such command, and would run itself
 
-`--watch` does not end by itself: it is stopped by Ctrl-C once the page is there. Of commands that stand in a sentence,
+`--watch` does not end by itself: it is stopped by Ctrl-C once the page is there. A search for lights looks at as few as it may,
+whatever number its line gives: how it goes on is judged by check_optimize.py. Of commands that stand in a sentence,
 `domecast NAME --flag`, name and flags must be known to the program, and `scripts/NAME` must exist.
 """
 
@@ -32,6 +33,8 @@ import numpy as np
 REPOSITORY = Path(__file__).resolve().parent.parent
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "src/guide").glob("*.md"))]
 LIMIT_S = 600
+# the fewest that a search may look at
+EVALUATIONS = 20
 BLOCK = re.compile(r"^```sh\n(.*?)^```", re.M | re.S)
 MARK = re.compile(r"\(([^()]*\b(minutes|network)\b[^()]*)\)")
 INLINE = re.compile(r"`(domecast [^`]+|scripts/[\w./]+)`")
@@ -109,6 +112,16 @@ def run_watching(words, folder):
     return None if page.exists() and stopped else f"exit code {child.returncode}: {output[-800:]}"
 
 
+def shorter(words):
+    """A command with as short a search as there is, where it searches."""
+    if "--optimize" not in words:
+        return words
+    at = words.index("--evaluations") if "--evaluations" in words else len(words)
+    if at < len(words) and not "".join(words[at + 1:at + 2]).isdecimal():
+        return words
+    return [*words[:at], "--evaluations", str(EVALUATIONS), *words[at + 2:]]
+
+
 def run(domecast, line, folder):
     """What is wrong with a command; `None` if it ran well."""
     words = shlex.split(line.replace("cargo run --release --", "domecast"), comments=True)
@@ -117,7 +130,7 @@ def run(domecast, line, folder):
     words[0] = domecast
     if "--watch" in words:
         return run_watching(words, folder)
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=LIMIT_S, stdin=subprocess.DEVNULL)
+    done = subprocess.run(shorter(words), cwd=folder, capture_output=True, text=True, timeout=LIMIT_S, stdin=subprocess.DEVNULL)
     return None if done.returncode == 0 else f"exit code {done.returncode}: {(done.stderr + done.stdout)[-800:]}"
 
 

@@ -1,7 +1,7 @@
 """A second renderer: frames of a sensor from its constants, by NumPy and OpenCV alone.
 
 Its projector shares nothing with domecast: a point is carried into the platform's frame, the angle at which its ray leaves
-the layers is found by bisection on Snell's law, and the lens is OpenCV's formulas written out. Dots and markers are polygons
+the layers is found by Newton's method on Snell's law, and the lens is OpenCV's formulas written out. Dots and markers are polygons
 filled at four times the frame's resolution. A skin that moves is a function from places on the dome to places in the sensor
 frame.
 """
@@ -12,6 +12,7 @@ import numpy as np
 
 FINE = 4
 RIM = 40
+MAX_STEPS, MAX_MISS_MM = 60, 1e-11
 
 
 def rotation(vector):
@@ -53,18 +54,21 @@ class Sensor:
         reach = np.hypot(across[..., 0], across[..., 1])
         sheet = sum(thickness for _, thickness in self.sheets)
         air = -pupil[2] - sheet
-        low, high = np.zeros_like(reach), np.full_like(reach, np.pi / 2 - 1e-9)
-        for _ in range(50):
-            angle = 0.5 * (low + high)
-            sine = np.sin(angle)
-            there = air * np.tan(angle)
+        # Newton's method for the tangent in air, from the axis: what a ray reaches is concave in it, so that no step goes too far.
+        tangent = np.zeros_like(reach)
+        for _ in range(MAX_STEPS):
+            there, slope = air * tangent, np.full_like(reach, air)
             for index, thickness in self.sheets + [(self.fill, None)]:
-                inner = sine / index
                 depth = points[..., 2] if thickness is None else thickness
-                there = there + depth * inner / np.sqrt(1 - inner**2)
-            near = there < reach
-            low, high = np.where(near, angle, low), np.where(near, high, angle)
-        angle = 0.5 * (low + high)
+                inner = 1 / np.sqrt(index**2 + (index**2 - 1) * tangent**2)
+                there += depth * tangent * inner
+                slope += depth * index**2 * inner**3
+            tangent += (reach - there) / slope
+            if np.abs(reach - there).max() < MAX_MISS_MM:
+                break
+        else:
+            raise ArithmeticError("no ray reaches a point")
+        angle = np.arctan(tangent)
         unit = across / np.maximum(reach, 1e-300)[..., None]
         ray = np.concatenate([unit * np.sin(angle)[..., None], np.cos(angle)[..., None]], -1)
         return self.lens(ray @ platform.T @ self.camera_rotation.T)

@@ -31,7 +31,7 @@ pub struct TimeLimit {
 
 impl TimeLimit {
     /// For curves that are to be trusted.
-    pub const FULL: Self = Self { per_sample: Duration::from_millis(120), min_runs: 5, max_runs: 101 };
+    pub const FULL: Self = Self { per_sample: Duration::from_millis(120), min_runs: 3, max_runs: 101 };
     /// For a first look.
     pub const QUICK: Self = Self { per_sample: Duration::from_millis(12), min_runs: 3, max_runs: 31 };
 }

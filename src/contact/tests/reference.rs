@@ -1,7 +1,7 @@
 //! The levels against the truth: axisymmetric solutions of scikit-fem (tests/cases/golden_neo_hookean.json), and contacts drawn
 //! at random, by the finite-strain level (tests/cases/contact_reference.json).
 //!
-//! `DOMECAST_REFERENCE=from..to` or `a,b,c` with the long test below solves the drawn contacts anew and prints their lines.
+//! `DOMECAST_REFERENCE=from..to` or `a,b,c` with the ignored test below solves the drawn contacts anew and prints their lines.
 
 use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
@@ -136,7 +136,8 @@ fn solved(seed: u64, across: usize) -> Result<Value, ContactError> {
 }
 
 #[test]
-fn long_reference_is_solved_anew() {
+#[ignore = "writes the table's lines and asserts nothing"]
+fn reference_is_solved_anew() {
     let asked = std::env::var("DOMECAST_REFERENCE").unwrap_or_else(|_| "0..2".into());
     let across = std::env::var("DOMECAST_ACROSS").map_or(8, |v| v.parse().unwrap());
     let number = |text: &str| text.parse::<u64>().unwrap();

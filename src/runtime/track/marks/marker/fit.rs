@@ -29,9 +29,9 @@ const FREE_OF_NOISE: f64 = 3.0;
 const MAX_SD_PX: f64 = 0.1;
 const MAX_SD_RADII: f64 = 0.02;
 /// What is around a disc and differs from octant to octant by more than the first part of the disc's contrast moves the fit,
-/// by up to a pixel times what is more; by more than the second, by hundredths of a pixel: it is fitted apart.
+/// by up to a pixel times what is more, as a soft lens does too; by more than the second it is fitted apart.
 const EVEN: f64 = 0.025;
-const MAX_UNEVENNESS: f64 = 0.05;
+const MAX_UNEVENNESS: f64 = 0.075;
 const MOVED_BY_UNEVENNESS_PX: f64 = 1.0;
 /// Smaller discs have too few pixels for a fit apart from their surroundings.
 const MIN_APART_RADIUS_PX: f64 = 3.0;

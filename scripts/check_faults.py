@@ -10,12 +10,15 @@ spoilt ones with the build's constants. Each frame is held to the truth:
 - no frame called `ok` has a wrench that is both 0.1 N (1 N mm) and 5 `wrench_sd` from that of the same frame unspoilt;
 - what the scenario says must be named is named, on the marks or the frames that are spoilt;
 - no more dots are withheld than the scenario allows, and where it says so the frames are `ok` and as exact as clean ones.
+
+What is beside the white markers is drawn and judged by scripts/check_surroundings.py.
 """
 import sys
 
 import cv2
 import numpy as np
 
+import check_surroundings
 from check_identities import Build, dent
 
 failed = 0
@@ -353,6 +356,7 @@ def scenarios(build, count):
 
 
 def main(program, *arguments):
+    global failed
     arguments = list(arguments)
     only, count = None, 4
     for option in ("--only", "--frames"):
@@ -368,6 +372,8 @@ def main(program, *arguments):
         for name, run in listed:
             if only is None or only in name:
                 run()
+        if not build.is_rigid:
+            failed += check_surroundings.check(build, 0 if only else 8, only=only)
         print(f"     {len(listed)} scenarios")
     print("nothing is wrong in silence" if failed == 0 else f"{failed} faults")
     return 1 if failed else 0

@@ -67,11 +67,11 @@ impl MarkerIdentities {
             let Ok(image) = marker.image(optics) else { continue };
             let Some(view) = MarkerView::new(optics, marker) else { continue };
             let start = image.centroid_px;
-            *disc = view.fit(frame.plane, start, FIT_REACH_PX, levels, shading);
+            *disc = view.fit_closely(frame.plane, start, FIT_REACH_PX, levels, shading);
             if disc.is_none() {
                 let mut best = [Candidate::default(); 1];
                 if view.candidates(frame.plane, start, frame.reach_px, &mut best) > 0 {
-                    *disc = view.fit(frame.plane, best[0].at_px, FIT_REACH_PX, None, shading);
+                    *disc = view.fit_closely(frame.plane, best[0].at_px, FIT_REACH_PX, None, shading);
                 }
             }
         }
@@ -87,7 +87,7 @@ impl MarkerIdentities {
             let Ok(image) = marker.image(optics) else { continue };
             let Some(view) = MarkerView::new(optics, marker) else { continue };
             let shading = self.shading[index].estimate();
-            *disc = view.fit(frame.plane, image.centroid_px, FIT_REACH_PX, None, shading);
+            *disc = view.fit_closely(frame.plane, image.centroid_px, FIT_REACH_PX, None, shading);
             if disc.is_some() {
                 refound.markers[refound.count] = index;
                 refound.count += 1;
@@ -132,7 +132,7 @@ impl MarkerIdentities {
             shading.add(found.shading);
             let view = MarkerView::new(optics, marker);
             let again = view.and_then(|view| {
-                view.fit(frame.plane, found.centroid_px, FIT_REACH_PX, None, shading.estimate())
+                view.fit_closely(frame.plane, found.centroid_px, FIT_REACH_PX, None, shading.estimate())
             });
             *disc = again.or(*disc);
         }

@@ -69,8 +69,7 @@ impl ShiftedRows {
             is_more = false;
             for index in 0..models.len() {
                 if self.steps[index].is_none() && tracks[index].spot.is_some() {
-                    let beside = self.step_beside(models, tracks, index, is_gap);
-                    self.steps[index] = beside.or_else(|| self.step_around(models, tracks, index));
+                    self.steps[index] = self.step_beside(models, tracks, index, is_gap);
                     is_more |= self.steps[index].is_some();
                 }
             }
@@ -97,19 +96,6 @@ impl ShiftedRows {
             let before = beside(models, index, -step_px)?;
             (is_beside && is_alike && (is_gap(before) || self.steps[before].is_some())).then_some(step_px)
         })
-    }
-
-    /// The step of the rows around a dot, where more of its neighbours are in such rows than are clear.
-    fn step_around(&self, models: &[DotModel], tracks: &[DotTrack], index: usize) -> Option<DVec2> {
-        let around = &models[index].neighbors;
-        let is_clear = |other: &&usize| {
-            let track = &tracks[**other];
-            track.spot.is_some() && track.fault.is_none() && self.steps[**other].is_none()
-        };
-        let mut steps = around.iter().filter_map(|other| self.steps[*other]);
-        let count = steps.clone().count();
-        let is_within = count >= 2 && count > around.iter().filter(is_clear).count();
-        steps.next().filter(|_| is_within)
     }
 
     /// Whether a row's next spot may be two dots'; `beyond`: the dot after it.

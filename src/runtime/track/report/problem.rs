@@ -47,7 +47,7 @@ pub enum Problem {
     Gap,
     /// Much brighter or darker than the last frame.
     ExposureJump,
-    /// The pose rests on three white markers: nothing checks it.
+    /// The pose rests on three white markers, or on ones that do not look like markers: nothing checks it.
     ThreeMarkers,
     /// A twentieth or more of the dots that should be seen are not.
     DotsLost,

@@ -200,7 +200,8 @@ impl Reporter {
         if let Some(refined) = pose.refined {
             self.result.pose = Some(refined.pose);
             self.result.pose_rms_px = Some(refined.rms_px);
-            self.problem_if(pose.seen.len() == 3, Problem::ThreeMarkers);
+            let sound = discs.iter().flatten().filter(|disc| disc.fault.is_none()).count();
+            self.problem_if(pose.seen.len() == 3 || sound < 3, Problem::ThreeMarkers);
         } else {
             self.problem(if are_all_found { Problem::MarkersDoNotFit } else { Problem::MarkersMissing });
         }

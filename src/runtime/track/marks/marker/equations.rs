@@ -1,28 +1,30 @@
 //! Normal equations of the marker fit over a window of pixels.
 
-use glam::{DMat2, DVec2};
+use glam::DVec2;
 use nalgebra::{SMatrix, SVector};
 
-use super::view::{GROUND_PX, MarkerView};
+use super::geometry::{EDGE_PX, Geometry, PixelModel, SECTORS, octant_middle};
+use super::view::MarkerView;
 use crate::track::frame::Plane;
 
-/// Half of the width over which an edge goes from one level to the other, px.
-const EDGE_PX: f64 = 1.1;
 /// Pixels so far from every outline are flat: what is left of them is noise.
 const FLAT_PX: f64 = 1.6;
 /// Fewest flat pixels that determine a slope.
 const MIN_SLOPE_PIXELS: f64 = 16.0;
 /// Fewest pixels that determine a disc.
 const MIN_PIXELS: f64 = 12.0;
+/// The dome's image may end so far from where the constants have its rim, px: what that leaves is not another ground.
+const RIM_PX: f64 = 0.3;
+/// Fewest pixels of an octant's surroundings that have a mean.
+const MIN_AROUND: f64 = 4.0;
+/// What differs between the means of eight octants by more than this times their deviation is not the pixels' noise.
+const FREE_OF_NOISE: f64 = 6.0;
 /// Variance of rounding to whole levels.
 const QUANTISATION: f64 = 1.0 / 12.0;
 
 /// Columns of the equations: ground, disc, dome, and the place (x, y).
 pub(super) type Unknowns = SVector<f64, 5>;
 pub(super) type Normal = SMatrix<f64, 5, 5>;
-
-/// Octants around a disc's middle.
-const SECTORS: usize = 8;
 
 /// Normal equations over a window, and what is left of its pixels.
 pub(super) struct WindowSums {
@@ -32,97 +34,16 @@ pub(super) struct WindowSums {
     /// Sum of squared residuals, and the number of pixels.
     pub left: f64,
     pub count: f64,
-    /// The smallest and the largest residual.
+    /// The smallest residual on the disc, and the largest anywhere.
     pub extremes: [f64; 2],
     /// Where no edge is near, on ground, disc and dome: pixels, sum of residuals, sum of squared ones.
     flats: [[f64; 3]; 3],
+    /// Around the disc, by octants: pixels, sum of residuals, sum of squared ones.
+    around: [[f64; 3]; SECTORS],
+    /// Whether the dome's edge runs into the disc's.
+    pub touches_rim: bool,
     /// Slope of the residuals on the disc's flat, levels a px.
     pub slope: Option<DVec2>,
-}
-
-/// Where the pixels of a window lie to disc and rim.
-struct Geometry {
-    mm_by_px: DMat2,
-    transposed: DMat2,
-    place_mm: DVec2,
-    radius_mm: f64,
-    rim_mm: f64,
-    /// Beyond this from the middle nothing is looked at, mm.
-    far_mm: f64,
-    /// Whether the rim enters the window at all, and pixels to a millimetre across it.
-    has_rim: bool,
-    rim_px_by_mm: f64,
-}
-
-/// What the model of a marker says of one pixel.
-struct PixelModel {
-    /// Octant around the disc's middle.
-    sector: usize,
-    /// Signed distances from the disc's outline and from the dome's rim, px, positive outside.
-    outside_px: f64,
-    from_rim_px: f64,
-    /// Parts of disc and dome in the pixel.
-    disc: f64,
-    dome: f64,
-    /// Gradient of the distance from the disc's middle in the image, mm a px, and its length.
-    gradient: DVec2,
-    steep: f64,
-    /// Change of the disc's part by a pixel outwards.
-    disc_slope: f64,
-}
-
-impl Geometry {
-    fn new(view: &MarkerView) -> Self {
-        let transposed = view.mm_by_px.transpose();
-        // A pixel is at most this many mm wide.
-        let px_mm = view.mm_by_px.x_axis.length() + view.mm_by_px.y_axis.length();
-        let far_mm = view.radius_mm + GROUND_PX * px_mm;
-        let from_axis = view.place_mm.length().max(1e-9);
-        Self {
-            mm_by_px: view.mm_by_px,
-            transposed,
-            place_mm: view.place_mm,
-            radius_mm: view.radius_mm,
-            rim_mm: view.rim_mm,
-            far_mm,
-            has_rim: from_axis - far_mm < view.rim_mm + far_mm,
-            // Over the window the rim's direction hardly changes.
-            rim_px_by_mm: 1.0 / (transposed * (view.place_mm / from_axis)).length().max(1e-9),
-        }
-    }
-
-    /// The model of a pixel at `from` the disc's middle, px; `None` beyond the ground around.
-    #[inline(always)]
-    fn pixel(&self, from: DVec2) -> Option<PixelModel> {
-        let u = self.mm_by_px * from;
-        let square = u.length_squared();
-        if square > self.far_mm * self.far_mm {
-            return None;
-        }
-        let distance = square.sqrt().max(1e-9);
-        let gradient = self.transposed * (u / distance);
-        let steep = gradient.length().max(1e-9);
-        let outside_px = (distance - self.radius_mm) / steep;
-        if outside_px > GROUND_PX {
-            return None;
-        }
-        let (disc, disc_slope) = edge(outside_px);
-        let (mut dome, mut from_rim_px) = (0.0, f64::INFINITY);
-        if self.has_rim {
-            from_rim_px = ((self.place_mm + u).length() - self.rim_mm) * self.rim_px_by_mm;
-            dome = edge(from_rim_px).0;
-        }
-        Some(PixelModel {
-            sector: octant(u),
-            outside_px,
-            from_rim_px,
-            disc,
-            dome,
-            gradient,
-            steep,
-            disc_slope,
-        })
-    }
 }
 
 /// Sums over the pixels, as plain arrays that stay in registers.
@@ -134,6 +55,7 @@ struct Accumulator {
     extremes: [f64; 2],
     count: f64,
     flats: [[f64; 3]; 3],
+    around: [[f64; 3]; SECTORS],
     /// On the disc's flat, for the slope of the residuals: pixels, sums of x, y, xx, xy, yy, of the residuals, and of
     /// their products with x and y.
     lean: [f64; 9],
@@ -150,15 +72,31 @@ impl Accumulator {
             }
         }
         self.left += rest * rest;
-        self.extremes = [self.extremes[0].min(rest), self.extremes[1].max(rest)];
         self.count += 1.0;
     }
 
     #[inline(always)]
-    fn add_flat(&mut self, pixel: &PixelModel, from: DVec2, rest: f64) {
+    fn add_extremes(&mut self, pixel: &PixelModel, rest: f64) {
+        let [darkest, brightest] = &mut self.extremes;
+        *brightest = brightest.max(rest);
+        if pixel.outside_px < 0.0 {
+            *darkest = darkest.min(rest);
+        }
+    }
+
+    #[inline(always)]
+    fn add_flat(&mut self, pixel: &PixelModel, from: DVec2, rest: f64, dome: f64) {
         if pixel.outside_px.abs() > FLAT_PX && pixel.from_rim_px.abs() > FLAT_PX + 1.0 {
             let place = if pixel.disc == 1.0 { 1 } else { 2 * usize::from(pixel.dome == 1.0) };
             let [n, sum, square] = &mut self.flats[place];
+            *n += 1.0;
+            *sum += rest;
+            *square += rest * rest;
+        }
+        if pixel.outside_px > FLAT_PX {
+            let allowed = RIM_PX * (pixel.dome_slope * dome).abs();
+            let rest = rest - rest.clamp(-allowed, allowed);
+            let [n, sum, square] = &mut self.around[pixel.sector % SECTORS];
             *n += 1.0;
             *sum += rest;
             *square += rest * rest;
@@ -205,7 +143,8 @@ impl WindowSums {
                     rest -= ground * row[0] + disc * row[1] + dome * beside;
                 }
                 sums.add(pixel.sector, &row, rest);
-                sums.add_flat(&pixel, from, rest);
+                sums.add_extremes(&pixel, rest);
+                sums.add_flat(&pixel, from, rest, known.map_or(0.0, |[_, _, dome]| dome));
             }
         }
         (sums.count > MIN_PIXELS).then(|| Self {
@@ -215,6 +154,8 @@ impl WindowSums {
             count: sums.count,
             extremes: sums.extremes,
             flats: sums.flats,
+            around: sums.around,
+            touches_rim: geometry.gap_px() < EDGE_PX,
             slope: slope_of(&sums.lean),
         })
     }
@@ -231,6 +172,26 @@ impl WindowSums {
             (left, freedom) = (self.left, self.count - 5.0);
         }
         (left / freedom.max(1.0)).max(QUANTISATION).sqrt()
+    }
+
+    /// By how many levels what is around the disc differs from octant to octant, where that is more than one ground, the dome
+    /// and noise explain; else zero.
+    pub fn unevenness(&self) -> f64 {
+        let (mut darkest, mut brightest) = (f64::INFINITY, f64::NEG_INFINITY);
+        let (mut variances, mut octants, mut count) = ([0.0; SECTORS], 0, 0.0);
+        for [n, sum, square] in self.around.iter().filter(|around| around[0] >= MIN_AROUND) {
+            let mean = sum / n;
+            (darkest, brightest) = (darkest.min(mean), brightest.max(mean));
+            variances[octants] = (square - sum * mean) / (n - 1.0);
+            octants += 1;
+            count += n;
+        }
+        // The middle one: a speck scatters the pixels of its own octant.
+        let variances = &mut variances[..octants];
+        variances.sort_unstable_by(f64::total_cmp);
+        let Some(variance) = variances.get(octants / 2) else { return 0.0 };
+        let noise = (variance.max(QUANTISATION) * octants as f64 / count).sqrt();
+        if brightest - darkest > FREE_OF_NOISE * noise { brightest - darkest } else { 0.0 }
     }
 
     /// Root mean square of the residuals, levels.
@@ -288,22 +249,6 @@ impl WindowSums {
     }
 }
 
-/// The octant of a place around the middle: bits for the sides of both axes, and for which axis is nearer.
-#[inline(always)]
-fn octant(place: DVec2) -> usize {
-    4 * usize::from(place.x < 0.0)
-        + 2 * usize::from(place.y < 0.0)
-        + usize::from(place.x.abs() < place.y.abs())
-}
-
-/// The direction of an octant's middle, of length one.
-fn octant_middle(octant: usize) -> DVec2 {
-    let (sin, cos) = std::f64::consts::FRAC_PI_8.sin_cos();
-    let first = if octant & 1 == 0 { DVec2::new(cos, sin) } else { DVec2::new(sin, cos) };
-    let side = |bit: usize| if octant & bit == 0 { 1.0 } else { -1.0 };
-    first * DVec2::new(side(4), side(2))
-}
-
 /// The slope of a plane through residuals, from their number, sums of x, y, xx, xy, yy, theirs, and of xr, yr.
 fn slope_of([n, x, y, xx, xy, yy, rest, xr, yr]: &[f64; 9]) -> Option<DVec2> {
     if *n < MIN_SLOPE_PIXELS {
@@ -313,10 +258,4 @@ fn slope_of([n, x, y, xx, xy, yy, rest, xr, yr]: &[f64; 9]) -> Option<DVec2> {
     let [cxr, cyr] = [xr - x * rest / n, yr - y * rest / n];
     let det = cxx * cyy - cxy * cxy;
     (det > 1e-3 * cxx * cyy).then(|| DVec2::new(cxr * cyy - cyr * cxy, cyr * cxx - cxr * cxy) / det)
-}
-
-/// From 1 inside to 0 outside of an outline, and the slope, over the distance from it, px.
-fn edge(outside_px: f64) -> (f64, f64) {
-    let t = (0.5 - outside_px / (2.0 * EDGE_PX)).clamp(0.0, 1.0);
-    (t * t * (3.0 - 2.0 * t), -6.0 * t * (1.0 - t) / (2.0 * EDGE_PX))
 }

@@ -6,8 +6,10 @@
 mod candidates;
 mod equations;
 mod fit;
+mod geometry;
 mod shading;
 mod still;
+mod surroundings;
 mod view;
 
 pub(in crate::track) use candidates::Candidate;

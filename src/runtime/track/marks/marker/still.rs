@@ -23,11 +23,13 @@ pub(crate) fn marker_in_still(
 ) -> Option<DVec2> {
     let plane = Plane::new(frame, Channel::Green);
     let view = MarkerView::new(optics, marker)?;
-    let mut disc = view.fit(&plane, start, FIT_REACH_PX, None, DVec2::ZERO)?;
+    let mut disc = view.fit_closely(&plane, start, FIT_REACH_PX, None, DVec2::ZERO)?;
     let mut shading = DVec2::ZERO;
     for _ in 0..ROUNDS {
         shading = usable_slope(disc.shading).unwrap_or(shading);
-        disc = view.fit(&plane, disc.centroid_px, FIT_REACH_PX, Some(disc.levels), shading).unwrap_or(disc);
+        disc = view
+            .fit_closely(&plane, disc.centroid_px, FIT_REACH_PX, Some(disc.levels), shading)
+            .unwrap_or(disc);
     }
     Some(disc.centroid_px)
 }

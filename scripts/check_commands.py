@@ -70,6 +70,7 @@ def bring(domecast, folder):
     for frame in sorted((folder / "simulated-ball").glob("frame_*.png")):
         shutil.copy(frame, folder / "pressed")
     shutil.rmtree(folder / "simulated-ball")
+    bring_presses(run, folder)
     constants = json.loads((folder / "constants.json").read_text())
     scatter = np.random.default_rng(25)
     dots = [(dot["id"], *dot["surface_mm"][:2]) for dot in constants["black_dots"]]
@@ -89,6 +90,26 @@ def bring(domecast, folder):
     write_csv(folder / "force.csv", "tx ty tz rx ry rz Fx Fy Fz Mx My Mz".split(), np.hstack([motions, wrenches]).tolist())
     shutil.rmtree(folder / "simulated")
     shutil.rmtree(folder / "sensor")
+
+
+def bring_presses(run, folder):
+    """Frames for the calibration of the light: the untouched sensor, then presses of a ball of 4 mm."""
+    scene = json.loads((folder / "designs/scenes/lit.json").read_text())
+    path, frame = [], 1
+    for polar, azimuth in ((0, 0), (25, 0), (25, 120), (25, 240), (40, 60)):
+        polar, azimuth = np.radians([polar, azimuth])
+        way = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+        path += [{"time_s": time, "position_mm": (away * way).tolist()} for time, away in ((frame - 1, 20), (frame, 13.6), (frame + 0.5, 20))]
+        frame += 2
+    scene |= {"name": "presses", "frames": {"count": frame, "rate_hz": 1}, "contact": {"level": "closed_form"},
+              "objects": [{"name": "ball", "shape": {"kind": "sphere", "radius_mm": 4}, "path": path}]}
+    (folder / "designs/scenes/presses.json").write_text(json.dumps(scene))
+    run("simulate", "designs/scenes/presses.json", "--out", "simulated-presses")
+    (folder / "presses").mkdir()
+    for number in (0, *range(1, frame, 2)):
+        shutil.copy(folder / f"simulated-presses/frame_{number:04}.png", folder / "presses")
+    shutil.rmtree(folder / "simulated-presses")
+    (folder / "designs/scenes/presses.json").unlink()
 
 
 def commands(page):

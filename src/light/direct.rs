@@ -17,11 +17,11 @@ use domecast_optics::SensorOptics;
 /// the rule's error is below 1e-5 (tested against 64).
 pub const PLACES: usize = 4;
 
-/// Places at which a line of the emitter is looked at to find the pieces of it that are in sight.
-const LOOKS: usize = 5;
+/// Looks along the whole of the emitter at which pieces of a diagonal in sight are told from pieces in the shadow.
+const LOOKS: f64 = 5.0;
 
-/// Halvings between two looks of which one is in sight: the edge is then known to 1/1280 of the line.
-const HALVINGS: u32 = 7;
+/// Halvings between two looks of which one is in sight: the edge is then known to 1/2560 of the emitter.
+const HALVINGS: u32 = 9;
 
 /// A square that emits, everywhere alike.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,12 +51,27 @@ pub struct DirectLight<'a> {
     pub fresnel: bool,
 }
 
-/// The rule across the emitter, made once: Gauss's places, and what interpolates between them.
+/// The rule across the emitter, made once: Gauss's places each way, what interpolates between them, and the lines that shadows are
+/// cut along.
+///
+/// The lines are diagonals that go on at the other side of the square, `u = begin + v` modulo 1, with Gauss's rule over `begin`.
+/// A shadow's edge that lies along a side of the emitter cuts each of them in its own part, and so it moves through the light
+/// without a step; lines along a side would be taken one by one.
 #[derive(Debug, Clone)]
 pub struct EmitterRule {
     rule: GaussRule,
     /// Barycentric weights of the polynomial through the places.
     weights: Vec<f64>,
+    diagonals: Vec<Diagonal>,
+}
+
+/// A diagonal between two sides of the emitter's unit square: `u = v + shift` for `v` in a range.
+#[derive(Debug, Clone, Copy)]
+struct Diagonal {
+    shift: f64,
+    from: f64,
+    to: f64,
+    weight: f64,
 }
 
 impl Default for EmitterRule {
@@ -66,7 +81,7 @@ impl Default for EmitterRule {
 }
 
 impl EmitterRule {
-    /// A rule with another number of places, to see how much the number matters.
+    /// A rule with another number of places each way, to see how much the number matters.
     pub fn with_places(count: usize) -> Self {
         let rule = GaussRule::new(count);
         let nodes = rule.nodes();
@@ -76,31 +91,38 @@ impl EmitterRule {
             others.map(|(_, (v, _))| 4.0 * (nodes[i].0 - v)).product()
         };
         let weights = (0..nodes.len()).map(|i| 1.0 / product(i)).collect();
-        Self { rule, weights }
+        let pair = |&(begin, weight): &(f64, f64)| {
+            let turn = 1.0 - begin;
+            [
+                Diagonal { shift: begin, from: 0.0, to: turn, weight },
+                Diagonal { shift: begin - 1.0, from: turn, to: 1.0, weight },
+            ]
+        };
+        let diagonals = nodes.iter().flat_map(pair).collect();
+        Self { rule, weights, diagonals }
     }
 
     fn nodes(&self) -> &[(f64, f64)] {
         self.rule.nodes()
     }
 
-    /// Value at `v` of the polynomial through values at the places (J.-P. Berrut and L. N. Trefethen, Barycentric
+    /// Weights of the values at the places in the polynomial through them, at `v` (J.-P. Berrut and L. N. Trefethen, Barycentric
     /// Lagrange interpolation, SIAM Review 46, 2004).
-    fn interpolate(&self, values: impl Iterator<Item = DVec3>, v: f64) -> DVec3 {
-        let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
-        for ((value, weight), (place, _)) in values.zip(&self.weights).zip(self.nodes()) {
-            let away = v - place;
-            if away == 0.0 {
-                return value;
-            }
-            sum += value * (weight / away);
-            weights += weight / away;
+    fn weigh(&self, v: f64, weights: &mut Vec<f64>) {
+        weights.clear();
+        if let Some(own) = self.nodes().iter().position(|(place, _)| *place == v) {
+            weights.extend((0..self.weights.len()).map(|i| f64::from(u8::from(i == own))));
+            return;
         }
-        sum / weights
+        weights
+            .extend(self.weights.iter().zip(self.nodes()).map(|(weight, (place, _))| weight / (v - place)));
+        let sum: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|weight| *weight /= sum);
     }
 }
 
 /// What one place of the emitter gives.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Share {
     flux: DVec3,
     /// From the place to where its ray meets the sheet's underside, mm.
@@ -109,20 +131,79 @@ struct Share {
     top_mm: DVec3,
 }
 
+/// The shares of the rule's places, line by line, and the polynomial in both coordinates through them.
+struct Shares<'a> {
+    rule: &'a EmitterRule,
+    all: Vec<Share>,
+    weights: [Vec<f64>; 2],
+}
+
+impl Shares<'_> {
+    /// The share at a place of the unit square.
+    fn at(&mut self, u: f64, v: f64) -> Share {
+        let [across, along] = &mut self.weights;
+        self.rule.weigh(u, across);
+        self.rule.weigh(v, along);
+        let mut sum = Share::default();
+        for (line, across) in self.all.chunks_exact(along.len()).zip(across) {
+            for (share, along) in line.iter().zip(along.iter()) {
+                let weight = *across * along;
+                sum.flux += share.flux * weight;
+                sum.way_mm += share.way_mm * weight;
+                sum.top_mm += share.top_mm * weight;
+            }
+        }
+        sum
+    }
+
+    /// The flux of the whole square.
+    fn whole(&self) -> DVec3 {
+        let nodes = self.rule.nodes();
+        let weights = nodes.iter().flat_map(|(_, across)| nodes.iter().map(move |(_, along)| across * along));
+        self.all.iter().zip(weights).map(|(share, weight)| share.flux * weight).sum()
+    }
+
+    /// The flux of what is in sight.
+    fn in_sight(&mut self, mut is_free: impl FnMut(f64, f64, &Share) -> bool) -> DVec3 {
+        let rule = self.rule;
+        let mut pieces = Vec::new();
+        let mut is_whole = true;
+        for diagonal in &rule.diagonals {
+            let free = |v: f64| {
+                let u = v + diagonal.shift;
+                is_free(u, v, &self.at(u, v))
+            };
+            let first = pieces.len();
+            pieces_in_sight(diagonal.from, diagonal.to, free, |low, high| pieces.push((diagonal, low, high)));
+            is_whole &=
+                matches!(pieces[first..], [(_, low, high)] if low == diagonal.from && high == diagonal.to);
+        }
+        if is_whole {
+            return self.whole();
+        }
+        let mut sum = DVec3::ZERO;
+        for (diagonal, low, high) in pieces {
+            for (v, up) in rule.rule.over(low, high) {
+                sum += self.at(v + diagonal.shift, v).flux * (diagonal.weight * up);
+            }
+        }
+        sum
+    }
+}
+
 impl DirectLight<'_> {
     /// Vector irradiance at a point of the dome or the sheet's top, mW/mm^2, sensor frame. Its product with the
     /// unit normal *away from* the light is the irradiance.
     ///
-    /// The rays from the rule's places are solved. Between them, flux and way are smooth along a line of the emitter, and
-    /// the polynomial through the places interpolates both: so the platform's shadow is cut without another solve.
+    /// The rays from the rule's places are solved. Between them, flux and way are smooth, and the polynomial through the places
+    /// interpolates both: so the platform's shadow is cut without another solve.
     pub fn vector_irradiance(&self, emitter: &Emitter, point_mm: DVec3, rule: &EmitterRule) -> DVec3 {
         let side = 2.0 * emitter.half_side_mm;
         let pose = &emitter.platform_from_emitter;
         let place =
             |u: f64, v: f64| pose.transform_point3(DVec3::new((u - 0.5) * side, (v - 0.5) * side, 0.0));
         let indices = self.indices(point_mm.z);
-        let count = rule.nodes().len();
-        let mut shares = Vec::with_capacity(count * count);
+        let mut all = Vec::with_capacity(rule.nodes().len() * rule.nodes().len());
         let (mut near, mut low, mut high) = (0.0, DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &(u, _) in rule.nodes() {
             for &(v, _) in rule.nodes() {
@@ -130,30 +211,22 @@ impl DirectLight<'_> {
                 let Some(share) = self.share(emitter, source, point_mm, &indices, &mut near) else {
                     return DVec3::ZERO;
                 };
-                shares.push(share);
+                all.push(share);
                 for end in [source, source + share.way_mm] {
                     (low, high) = (low.min(end), high.max(end));
                 }
             }
         }
         let open = if self.cavities.is_some() { self.through_platform } else { 1.0 };
+        let mut shares = Shares { rule, all, weights: Default::default() };
         let mut sum = DVec3::ZERO;
         let mut gather = |part: f64, is_free: &dyn Fn(DVec3, DVec3) -> bool| {
-            for (line, &(u, across)) in shares.chunks_exact(count).zip(rule.nodes()) {
-                let along = |of: &dyn Fn(&Share) -> DVec3, v: f64| rule.interpolate(line.iter().map(of), v);
-                let is_free = |v: f64| {
+            sum += part
+                * shares.in_sight(|u, v, share| {
                     let source = place(u, v);
-                    let end = source + along(&|share| share.way_mm, v);
-                    self.enters(end)
-                        && self.is_in_foot(along(&|share| share.top_mm, v))
-                        && is_free(source, end)
-                };
-                for (low, high) in pieces_in_sight(is_free) {
-                    for (v, up) in rule.rule.over(low, high) {
-                        sum += along(&|share| share.flux, v) * (across * up * part);
-                    }
-                }
-            }
+                    let end = source + share.way_mm;
+                    self.enters(end) && self.is_in_foot(share.top_mm) && is_free(source, end)
+                });
         };
         if open > 0.0 {
             gather(open, &|_, _| true);
@@ -208,13 +281,14 @@ impl DirectLight<'_> {
     }
 }
 
-/// The pieces of [0, 1] that are in sight: looked for at evenly spaced places, their ends by halving.
-fn pieces_in_sight(mut free: impl FnMut(f64) -> bool) -> Vec<(f64, f64)> {
-    let mut pieces = Vec::new();
-    let mut before = (0.0, free(0.0));
-    let mut begun = before.1.then_some(0.0);
-    for k in 1..=LOOKS {
-        let here = (k as f64 / LOOKS as f64, free(k as f64 / LOOKS as f64));
+/// The pieces of a range that are in sight: looked for at evenly spaced places, their ends by halving.
+fn pieces_in_sight(from: f64, to: f64, mut free: impl FnMut(f64) -> bool, mut found: impl FnMut(f64, f64)) {
+    let looks = ((to - from) * LOOKS).ceil().max(1.0);
+    let mut before = (from, free(from));
+    let mut begun = before.1.then_some(from);
+    for k in 1..=looks as usize {
+        let place = if k as f64 == looks { to } else { from + (to - from) * k as f64 / looks };
+        let here = (place, free(place));
         if here.1 != before.1 {
             let (mut low, mut high) = (before.0, here.0);
             for _ in 0..HALVINGS {
@@ -223,14 +297,13 @@ fn pieces_in_sight(mut free: impl FnMut(f64) -> bool) -> Vec<(f64, f64)> {
             }
             let edge = 0.5 * (low + high);
             match begun.take() {
-                Some(start) => pieces.push((start, edge)),
+                Some(start) => found(start, edge),
                 None => begun = Some(edge),
             }
         }
         before = here;
     }
     if let Some(start) = begun {
-        pieces.push((start, 1.0));
+        found(start, to);
     }
-    pieces
 }

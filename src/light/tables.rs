@@ -179,14 +179,50 @@ fn dome_tables(ways: &Ways) -> Tables {
 /// Vector irradiance of each source on the sphere of a part of the dome's radius.
 fn tables(ways: &Ways, part: f64, grid: DomeGrid) -> Tables {
     let rule = EmitterRule::default();
-    let fill = |source| {
-        grid.fill_in_parallel(|direction| {
-            let flux = ways.flux(source, ways.point(direction, part), &rule);
-            flux.extend(flux.dot(grid.face.normal(direction)).max(0.0)).to_array()
-        })
-    };
-    let sources = ways.sources.iter().map(fill).collect();
+    let sources = ways.sources.iter().map(|source| table(ways, source, part, &grid, &rule)).collect();
     Tables { grid, sources, error: 0.0, evaluations: grid.evaluations() }
+}
+
+fn table(ways: &Ways, source: &Source, part: f64, grid: &DomeGrid, rule: &EmitterRule) -> Vec<Node> {
+    grid.fill_in_parallel(|direction| {
+        let flux = ways.flux(source, ways.point(direction, part), rule);
+        flux.extend(flux.dot(grid.face.normal(direction)).max(0.0)).to_array()
+    })
+}
+
+/// The tables of one light: on the dome, then on the shells inside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SourceTables(Vec<(DomeGrid, Vec<Node>)>);
+
+impl SourceTables {
+    /// Computes them for one of the ways' sources, on grids with so many times fewer cells across than those that frames are drawn
+    /// with.
+    pub fn new(ways: &Ways, source: &Source, coarser: usize) -> Self {
+        let rule = EmitterRule::default();
+        let of = |(shell, part): (usize, &f64)| {
+            let cells = if shell == 0 { DOME_CELLS } else { SHELL_CELLS };
+            let grid = DomeGrid::with_cells(cells / coarser.max(1)).over(ways.face());
+            (grid, table(ways, source, ways.shell(*part), &grid, &rule))
+        };
+        Self(SHELLS.iter().enumerate().map(of).collect())
+    }
+}
+
+impl Prepared {
+    /// Puts together what was computed light by light on the same grids, and the dome as a room.
+    pub fn of(sources: &[&SourceTables], rooms: &[DomeRoom]) -> Self {
+        let gathered = |shell: usize| {
+            let own = || sources.iter().filter_map(|own| own.0.get(shell));
+            let sources = own().map(|(_, values)| values.clone()).collect();
+            own().next().map(|(grid, _)| Tables { grid: *grid, sources, error: 0.0, evaluations: 0 })
+        };
+        let prepared = Self { rooms: OnceLock::from(rooms.to_vec()), ..Self::default() };
+        if let Some(dome) = gathered(0) {
+            let _ = prepared.dome.set(dome);
+            let _ = prepared.shells.set((1..SHELLS.len()).filter_map(gathered).collect());
+        }
+        prepared
+    }
 }
 
 /// Exact evaluations of each source, with or without shells.

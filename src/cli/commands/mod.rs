@@ -4,6 +4,7 @@ mod accuracy;
 mod build;
 mod calibrate;
 mod calibrate_force;
+mod calibrate_light;
 mod calibrate_optics;
 mod calibrate_print;
 mod check;
@@ -202,6 +203,8 @@ enum Command {
         #[arg(long)]
         centroids: Option<PathBuf>,
     },
+    /// Fit the lights (flux, place, axis, lobe, crosstalk, reflectance, stray light) to a frame at rest and presses of a ball.
+    CalibrateLight(calibrate_light::LightArguments),
     /// Draw what the sensor will see, with the exact truth, using only the effects that the scene calls for.
     Simulate {
         /// The scene file.
@@ -368,6 +371,7 @@ fn dispatch(output: &Output, command: &Command) -> Result<(), Failure> {
             let files = calibrate_optics::Files { out: out.as_deref(), centroids: centroids.as_deref() };
             calibrate_optics::run(output, seen, constants, &files, *rest_frames)
         }
+        Command::CalibrateLight(arguments) => calibrate_light::run(output, arguments),
         Command::Simulate { scene, options } => simulate::run(output, scene, options),
         Command::Dataset { spec, options } => dataset::run(output, spec, options),
         Command::Hardness { dataset, out } => hardness::run(output, dataset, out.as_deref()),

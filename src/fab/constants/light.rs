@@ -5,7 +5,7 @@ use glam::DVec3;
 use domecast_design::sections::LedColor;
 use domecast_design::{Design, DesignError, parts};
 use domecast_runtime::constants::{
-    DiffuserConstants, HollowConstants, LedConstants, LightConstants, LobeConstants,
+    DiffuserConstants, HollowConstants, LedConstants, LightConstants, LightTolerances, LobeConstants,
 };
 use domecast_sim::light::setup;
 
@@ -54,6 +54,9 @@ pub(super) fn light_of(design: &Design) -> Result<Option<LightConstants>, Design
         sheet_mm: sections.sheet.size_mm,
         hollows: cavities.iter().map(|(shape, own)| HollowConstants::new(shape.clone(), own)).collect(),
         source: "nominal".into(),
+        tolerances: LightTolerances::default(),
+        sd: None,
+        uncertainty: None,
     }))
 }
 

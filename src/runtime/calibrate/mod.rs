@@ -1,7 +1,7 @@
 //! From what a built sensor measures to measured constants.
 //!
-//! [`detect`] finds the marks in frames, [`force`] fits the wrench to displacements, [`optics`] fits what the camera sees to the geometry; both start from
-//! the nominal constants and say of each number whether the data determined it.
+//! [`detect`] finds the marks in frames, [`force`] fits the wrench to displacements, [`optics`] fits what the camera sees to the geometry, [`light`] the
+//! lights to presses of a ball; all start from the nominal constants and say of each number whether the data determined it.
 //!
 //! Measurements come as tables; an empty cell is a reading that is missing.
 //!
@@ -16,6 +16,7 @@
 
 pub mod detect;
 pub mod force;
+pub mod light;
 pub mod optics;
 mod table;
 

@@ -35,6 +35,106 @@ pub struct LightConstants {
     pub hollows: Vec<HollowConstants>,
     /// `nominal` (the design's) or `measured`.
     pub source: String,
+    /// How far the built light may be off these numbers: the priors of `calibrate-light`.
+    #[serde(default)]
+    pub tolerances: LightTolerances,
+    /// Standard deviation of each measured number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sd: Option<LightDeviations>,
+    /// Names of the measured numbers and their covariance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<LightUncertainty>,
+}
+
+/// How far lights as they are bought and put in may be off, each as one standard deviation.
+///
+/// All are choices: fluxes of a bin of lights scatter by some 10 to 20 %, hand-soldered boards by 0.2 mm, and of tapes nothing
+/// is known but their looks. A bench that knows better writes its own numbers into the constants.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(default)]
+pub struct LightTolerances {
+    /// Flux of each light, part of it.
+    pub flux_part: f64,
+    /// Place of each light on each axis, mm.
+    pub place_mm: f64,
+    /// Direction of each light about each of two axes, rad.
+    pub axis_rad: f64,
+    /// Share of a diffuser that leaves by Lambert's law.
+    pub lambert_fraction: f64,
+    /// Width of a diffuser's lobe, or the exponent of a bare light's, part of it.
+    pub lobe_part: f64,
+    /// Reflectance of the membrane in each channel, part of it.
+    pub reflectance_part: f64,
+    /// Each number of the crosstalk beside the diagonal.
+    pub crosstalk: f64,
+    /// Level of stray light, full scale 1.
+    pub stray: f64,
+}
+
+impl Default for LightTolerances {
+    fn default() -> Self {
+        Self {
+            flux_part: 0.2,
+            place_mm: 0.2,
+            axis_rad: 0.04,
+            lambert_fraction: 0.15,
+            lobe_part: 0.15,
+            reflectance_part: 0.1,
+            crosstalk: 0.02,
+            stray: 0.004,
+        }
+    }
+}
+
+/// Standard deviations of a measured light's numbers, in the units of these.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct LightDeviations {
+    /// Of each light.
+    pub leds: Vec<LedDeviations>,
+    /// Of the crosstalk; its diagonal is 1 by definition.
+    pub crosstalk: [[f64; 3]; 3],
+    /// Of the membrane's reflectance.
+    pub reflectance: [f64; 3],
+    /// Of the level of stray light.
+    pub stray: f64,
+}
+
+/// Standard deviations of a light.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct LedDeviations {
+    /// On each axis of the sensor frame, mm.
+    pub position_mm: [f64; 3],
+    /// Angle on each of two axes across its own, rad.
+    pub axis_rad: [f64; 2],
+    /// Radiant flux, mW.
+    pub flux: f64,
+    /// Of the lobe.
+    pub lobe: LobeDeviations,
+}
+
+/// Standard deviations of a lobe; 0 of a number that it does not have or that was not fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct LobeDeviations {
+    /// Of the bare light's exponent.
+    pub exponent: f64,
+    /// Of the share that leaves by Lambert's law.
+    pub lambert_fraction: f64,
+    /// Of the width of the Gaussian lobe, rad.
+    pub lobe_width_rad: f64,
+}
+
+/// What `calibrate-light` left open.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct LightUncertainty {
+    /// Names, as the command prints them.
+    pub parameters: Vec<String>,
+    /// Their covariance.
+    pub covariance: Vec<Vec<f64>>,
 }
 
 /// A light.
@@ -143,14 +243,29 @@ impl LightConstants {
         if !(0.2..=5.0).contains(&self.gamma) {
             return Err(format!("light.gamma: is {}; 0.2 to 5 is allowed", self.gamma));
         }
-        let mut lobes: Vec<(LobeConstants, Lobe)> = Vec::new();
+        self.ways_beside(optics, None)
+    }
+
+    /// The same beside another light, whose lobes need not be computed again where they are alike; shares may be a little below 0,
+    /// as in a fit on its way.
+    pub(crate) fn ways_beside(
+        &self,
+        optics: &SensorOptics,
+        other: Option<(&Self, &Ways)>,
+    ) -> Result<Ways, String> {
+        let known = |(light, ways): (&Self, &Ways)| -> Vec<(LobeConstants, Lobe)> {
+            let both = light.leds.iter().zip(&ways.sources);
+            both.map(|(led, source)| (led.lobe, source.emitter.lobe.clone())).collect()
+        };
+        let mut lobes = other.map_or_else(Vec::new, known);
         let mut sources = Vec::new();
         for (i, led) in self.leds.iter().enumerate() {
             let lobe = match lobes.iter().find(|(of, _)| *of == led.lobe) {
                 Some((_, lobe)) => lobe.clone(),
                 None => {
-                    lobes.push((led.lobe, led.lobe.lobe()));
-                    led.lobe.lobe()
+                    let lobe = led.lobe.lobe();
+                    lobes.push((led.lobe, lobe.clone()));
+                    lobe
                 }
             };
             sources.push(self.source(i, led, lobe, optics)?);

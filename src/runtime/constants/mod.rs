@@ -26,7 +26,10 @@ mod uncertainty;
 
 pub use error::ConstantsError;
 pub use law::{MagnetLaw, SpringLaw, SpringLawEnds};
-pub use light::{DiffuserConstants, HollowConstants, LedConstants, LightConstants, LobeConstants};
+pub use light::{
+    DiffuserConstants, HollowConstants, LedConstants, LedDeviations, LightConstants, LightDeviations,
+    LightTolerances, LightUncertainty, LobeConstants, LobeDeviations,
+};
 pub use loads::{PosedLoad, loads_over};
 pub use model::{
     BlackDot, CalibrationPriors, CameraConstants, Constants, ElastomerConstants, FORMAT, KeyConstants,

@@ -61,7 +61,7 @@ pub struct ShapeFromColor {
     marks: Marks,
     pub(super) cells: Cells,
     rest_optics: SensorOptics,
-    optics: SensorOptics,
+    pub(super) optics: SensorOptics,
     /// Constants without white markers are those of a rigid mount.
     is_rigid: bool,
     rest: Option<RestMap>,

@@ -3,10 +3,10 @@
 use glam::{Vec3A, Vec4};
 
 use super::error::ShapeError;
-use crate::constants::Constants;
+use crate::constants::{Constants, LightConstants};
 use domecast_light::field::{FieldParts, LightField};
 use domecast_light::fresnel;
-use domecast_light::tables::Prepared;
+use domecast_light::tables::{Prepared, Ways};
 use domecast_optics::{ColorChannel, SensorOptics};
 
 /// Places of the table of what leaves towards the camera.
@@ -17,7 +17,7 @@ const REBUILD: &str = "build the design again with this release, which writes it
 
 /// Irradiance of the membrane, and what of it goes the camera's way.
 #[derive(Debug, Clone)]
-pub(super) struct ShapeLight {
+pub(crate) struct ShapeLight {
     field: LightField,
     /// By the squared sine of a way in the dome, times the channel's reflectance.
     leaving: Vec<Vec3A>,
@@ -30,7 +30,7 @@ pub(super) struct ShapeLight {
 
 /// Light on a point before its normal is known: irradiance is `base + matrix^T normal`.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct PointLight {
+pub(crate) struct PointLight {
     pub base: Vec3A,
     /// `[k]`: component k of the vector irradiance of each channel.
     pub vectors: [Vec3A; 3],
@@ -59,8 +59,13 @@ impl ShapeLight {
                 return Err(ShapeError::new("light.leds", problem, "give each colour a light"));
             }
         }
+        Ok(Self::with(light, optics, &ways, &Prepared::default()))
+    }
+
+    /// The same with tables of these ways that the caller has.
+    pub fn with(light: &LightConstants, optics: &SensorOptics, ways: &Ways, prepared: &Prepared) -> Self {
         let parts = FieldParts { falloff: true, albedo: Some(light.mean_reflectance), moved: true };
-        let field = LightField::new(&ways, &Prepared::default(), &parts);
+        let field = LightField::new(ways, prepared, &parts);
         let index = |channel: ColorChannel| {
             let last = optics.layers().last();
             last.map_or(1.0, |layer| layer.index_for(channel))
@@ -78,13 +83,13 @@ impl ShapeLight {
             Vec3A::new(passed(0) as f32, passed(1) as f32, passed(2) as f32)
         };
         let linear = |code: usize| (code as f64 / 255.0).powf(light.gamma) as f32;
-        Ok(Self {
+        Self {
             field,
             leaving: (0..=LEAVING + 1).map(at).collect(),
             leaving_scale: (LEAVING as f64 / max_sine_squared) as f32,
             stray: light.stray as f32,
             linear: (0..256).map(linear).collect(),
-        })
+        }
     }
 
     /// Share of the irradiance that goes the camera's way, for a direction in the dome with this component along the axis.

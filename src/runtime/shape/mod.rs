@@ -50,11 +50,14 @@ mod normals;
 mod outline;
 mod reading;
 mod rest;
+mod seen;
 mod system;
 mod volume;
 
 pub use contact::SkinContact;
 pub use error::ShapeError;
 pub use estimator::{ShapeFromColor, ShapeOptions};
+pub(crate) use light::ShapeLight;
 pub use map::{ShapeMap, SkinSurface};
+pub(crate) use seen::{ChannelRay, SeenCell};
 pub use system::SolveStatus;

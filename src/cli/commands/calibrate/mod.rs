@@ -1,5 +1,6 @@
 //! `domecast calibrate DEVICE --constants FILE`
 
+mod ball;
 mod capture;
 mod loads;
 mod noise;
@@ -15,10 +16,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use super::calibrate_light::light_json;
 use super::input::input_fault;
 use super::live::Device;
 use super::output::{Failure, Output};
 use domecast_live::source::ControlRequest;
+use domecast_runtime::calibrate::light::LightFit;
 use loads::{Load, LoadNoise};
 use outcome::{Outcome, kind_of, solve};
 use session::CalibrationSession;
@@ -80,6 +83,8 @@ struct Wizard<'a> {
     arguments: &'a CalibrateArguments,
     session: CalibrationSession,
     outcome: Outcome,
+    /// The lights, once they are fitted.
+    light: Option<LightFit>,
     is_done: bool,
 }
 
@@ -87,7 +92,7 @@ struct Wizard<'a> {
 pub fn run(output: &Output, arguments: &CalibrateArguments) -> Result<(), Failure> {
     let session = CalibrationSession::open(output, &arguments.session, &arguments.constants)?;
     let outcome = solve(&session.nominal, &session.steps, &arguments.load_sd, &arguments.session)?;
-    let mut wizard = Wizard { output, arguments, session, outcome, is_done: false };
+    let mut wizard = Wizard { output, arguments, session, outcome, light: None, is_done: false };
     let typed = arguments.answers.is_none() && io::stdin().is_terminal();
     let lines: Box<dyn BufRead> = match &arguments.answers {
         Some(path) => {
@@ -146,8 +151,11 @@ impl Wizard<'_> {
             self.output
                 .say(&format!("markers: {sd_px:.3} px, one standard deviation, by the frames so far"))?;
         }
-        match self.next(self.best().as_ref()) {
-            Some(next) => self.output.say(&format!("helps most next: {next}")),
+        if let Some(next) = self.next(self.best().as_ref()) {
+            self.output.say(&format!("helps most next: {next}"))?;
+        }
+        match self.next_ball() {
+            Some(next) => self.output.say(&format!("for the lights, {next}")),
             None => Ok(()),
         }
     }
@@ -164,6 +172,11 @@ impl Wizard<'_> {
             None => Some("rest".into()),
             Some(_) => best.map(|(load, _)| load.answer()),
         }
+    }
+
+    /// The press that the lights want next, once there is one.
+    fn next_ball(&self) -> Option<String> {
+        ball::next(&self.outcome.constants, &self.session.steps)
     }
 
     fn answer(&mut self, line: &str) -> Result<(), Failure> {
@@ -221,11 +234,17 @@ impl Wizard<'_> {
             |problem: String| input_fault(&self.arguments.session, problem, "frames at rest, at least");
         let measured = self.outcome.measured().map_err(fault)?;
         let measured = measured.ok_or_else(|| fault("there is nothing to write: no step `rest`".into()))?;
-        let page = page::page(&self.session, &self.outcome);
-        let constants = measured.to_json();
+        let pressed = self.session.steps.iter().filter(|step| kind_of(step) == ball::BALL).count();
+        if pressed > 0 {
+            self.output.step(&format!("fitting the light to {pressed} presses"));
+        }
+        self.light = ball::fit_light(&self.session, &measured)?;
+        let page = page::page(&self.session, &self.outcome, self.light.as_ref());
+        let constants = self.light.as_ref().map_or(&measured, |light| &light.constants).to_json();
         let files = [(MEASURED, constants.as_bytes()), (PAGE, page.as_str().as_bytes())];
         self.session.write_results(self.output, &files)?;
         self.is_done = true;
+        self.output.steps_done();
         for name in [MEASURED, PAGE] {
             self.output.say(&format!("wrote {}", self.session.path(name).display()))?;
         }
@@ -243,6 +262,8 @@ impl Wizard<'_> {
             "centroid_px": self.outcome.centroid_px,
             "next_gain": best.map(|(_, gain)| gain),
             "surprises": self.outcome.loads.iter().map(|load| load.surprise).collect::<Vec<_>>(),
+            "next_ball": self.next_ball(),
+            "light": self.light.as_ref().map(light_json),
             "constants": written(MEASURED),
             "page": written(PAGE),
         })

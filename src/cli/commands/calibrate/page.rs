@@ -9,7 +9,8 @@ use domecast_fab::chart::{Axis, Chart, ChartColor, INK, TextAlign};
 use domecast_fab::html::{Html, document, figure, html, table};
 use domecast_fab::numbers::{percent, significant};
 use domecast_runtime::calibrate::force::SpringKnowledge;
-use domecast_runtime::calibrate::optics::OpticsFit;
+use domecast_runtime::calibrate::light::{LightFit, LightParameter};
+use domecast_runtime::calibrate::optics::{OpticsFit, Parameter};
 use domecast_runtime::constants::{POSE_AXES, WRENCH_AXES, matrix_of};
 
 const SIZE: DVec2 = DVec2::new(620.0, 300.0);
@@ -25,7 +26,7 @@ const COLORS: [[u8; 3]; 6] =
     [[204, 51, 51], [46, 139, 87], [51, 102, 204], [204, 119, 34], [136, 86, 167], [110, 110, 110]];
 
 /// The page.
-pub fn page(session: &CalibrationSession, outcome: &Outcome) -> Html {
+pub fn page(session: &CalibrationSession, outcome: &Outcome, light: Option<&LightFit>) -> Html {
     let design = &session.nominal.design;
     let title = format!("Calibration of {design}");
     let mut body = html!("<header>\n<h1>{}</h1>\n", title);
@@ -41,6 +42,9 @@ pub fn page(session: &CalibrationSession, outcome: &Outcome) -> Html {
     }
     if let Some(optics) = &outcome.optics {
         body += optics_chapter(optics);
+    }
+    if let Some(light) = light {
+        body += light_chapter(light);
     }
     body += steps_chapter(&session.steps, &outcome.notes);
     body += Html::trusted("</main>\n");
@@ -174,27 +178,36 @@ fn loads_chapter(session: &CalibrationSession, knowledge: &SpringKnowledge, load
     )
 }
 
+/// A number before and after.
+fn number_row(name: &str, [nominal, value]: [f64; 2], [prior_sd, sd]: [f64; 2], observed: bool) -> Vec<Html> {
+    let with_sd = |v: f64, sd: f64| Html::from(format!("{} ± {}", significant(v + 0.0), significant(sd)));
+    let what: Html = if observed { "known".into() } else { "the tolerance stands".into() };
+    vec![html!("<code>{}</code>", name), with_sd(nominal, prior_sd), with_sd(value, sd), what]
+}
+
 fn optics_chapter(optics: &OpticsFit) -> Html {
-    let rows: Vec<Vec<Html>> = optics
-        .parameters
-        .iter()
-        .map(|p| {
-            let value = |v: f64, sd: f64| format!("{} ± {}", significant(v + 0.0), significant(sd));
-            let what: Html = if p.observed { "known".into() } else { "the tolerance stands".into() };
-            vec![
-                html!("<code>{}</code>", p.name),
-                value(p.nominal, p.prior_sd).into(),
-                value(p.value, p.sd).into(),
-                what,
-            ]
-        })
-        .collect();
+    let row = |p: &Parameter| number_row(&p.name, [p.nominal, p.value], [p.prior_sd, p.sd], p.observed);
+    let rows: Vec<Vec<Html>> = optics.parameters.iter().map(row).collect();
     html!(
         "<h2>Camera, sheet and markers</h2>\n<p>{} frames; residuals of the marks {} px rms before, {} after.</p>\n{}",
         optics.poses.len(),
         significant(optics.rms_px[0]),
         significant(optics.rms_px[1]),
         table("", &["Number (mm, rad, 1)", "Before", "After", ""], &rows)
+    )
+}
+
+fn light_chapter(light: &LightFit) -> Html {
+    let row = |p: &LightParameter| number_row(&p.name, [p.nominal, p.value], [p.prior_sd, p.sd], p.observed);
+    let rows: Vec<Vec<Html>> = light.parameters.iter().map(row).collect();
+    html!(
+        "<h2>Lights</h2>\n<p>{} presses of a ball; residuals of the levels under it {} of 255 rms with the light of the frame at rest, {} \
+         after all. The presses themselves say a radius of some {} mm.</p>\n{}",
+        light.presses.len(),
+        significant(light.rms_levels[0]),
+        significant(light.rms_levels[1]),
+        significant(light.radius_mm),
+        table("", &["Number (mW, mm, rad, 1)", "Before", "After", ""], &rows)
     )
 }
 

@@ -9,6 +9,7 @@ use crate::commands::input::{input_fault, read_constants};
 use crate::commands::output::{Failure, Output};
 use domecast_design::read_text;
 use domecast_files::{StagedFile, StagedFolder, replace_file};
+use domecast_live::frame_files::{numbered, pictures_in, read_whole};
 use domecast_runtime::calibrate::optics::Observation;
 use domecast_runtime::constants::Constants;
 
@@ -18,6 +19,10 @@ const CONSTANTS: &str = "constants.json";
 const CENTROIDS: &str = "centroids.csv";
 /// The camera's calibration in the folder of its step.
 const CAMERA: &str = "camera.txt";
+/// Where a ball was pressed, in the folder of its step.
+const PLACE: &str = "place.json";
+/// The frames in the folder of their step.
+const FRAMES: &str = "frames";
 const ALLOWED: &str = "the folder of an earlier `domecast calibrate`, or a new name";
 
 /// A step that was taken.
@@ -31,6 +36,8 @@ pub struct Step {
     pub marks: Vec<Observation>,
     /// The camera's calibration file, of the step `lens`.
     pub camera: Option<String>,
+    /// Where a ball was pressed, of the step `ball`: from the pole and about the axis, degrees.
+    pub place_deg: Option<[f64; 2]>,
 }
 
 /// The folder of a wizard and its steps.
@@ -83,7 +90,13 @@ impl CalibrationSession {
                 false => Vec::new(),
             };
             let camera = camera.exists().then(|| read_text(&camera)).transpose()?;
-            session.steps.push(Step { name, said, marks, camera });
+            let place = place.join(PLACE);
+            let place_deg = match place.exists() {
+                true => serde_json::from_str(&read_text(&place)?)
+                    .map_err(|e| input_fault(&place, e.to_string(), ALLOWED))?,
+                false => None,
+            };
+            session.steps.push(Step { name, said, marks, camera, place_deg });
         }
         Ok(session)
     }
@@ -98,7 +111,7 @@ impl CalibrationSession {
     pub fn keep(&mut self, output: &Output, step: Step, frames: &[Vec<u8>]) -> Result<(), Failure> {
         let staged = StagedFolder::new(&self.folder.join(&step.name), "calibrate", &output.rules(&[]))?;
         for (number, bytes) in frames.iter().enumerate() {
-            staged.write(&format!("frames/frame_{number:04}.png"), bytes)?;
+            staged.write(&format!("{FRAMES}/frame_{number:04}.png"), bytes)?;
         }
         if !step.marks.is_empty() {
             staged.write(CENTROIDS, table_of(&step.marks).as_bytes())?;
@@ -106,9 +119,21 @@ impl CalibrationSession {
         if let Some(camera) = &step.camera {
             staged.write(CAMERA, camera.as_bytes())?;
         }
+        if let Some(place_deg) = step.place_deg {
+            staged.write(PLACE, format!("{}\n", json!(place_deg)).as_bytes())?;
+        }
         output.kept(staged.commit()?);
         self.steps.push(step);
         self.write()
+    }
+
+    /// The frames of a step that was kept, PNG.
+    pub fn frames_of(&self, step: &Step) -> Result<Vec<Vec<u8>>, Failure> {
+        let folder = self.folder.join(&step.name).join(FRAMES);
+        let fault =
+            |path: &Path, e: std::io::Error| input_fault(path, format!("cannot be read ({e})"), ALLOWED);
+        let files = pictures_in(&folder).map_err(|e| fault(&folder, e))?;
+        numbered(files).iter().map(|(_, path)| read_whole(path).map_err(|e| fault(path, e))).collect()
     }
 
     /// Takes the last step back; its frames stay until another takes its number.

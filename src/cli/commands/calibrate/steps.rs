@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::ball;
 use super::capture::{self, FrameWish};
 use super::loads;
 use super::session::{CalibrationSession, Step};
@@ -42,7 +43,7 @@ pub struct StepKind {
 }
 
 /// In the order in which they are taken.
-pub const STEPS: [StepKind; 3] = [
+pub const STEPS: [StepKind; 4] = [
     StepKind {
         name: "lens",
         form: "lens FILE",
@@ -67,6 +68,14 @@ pub const STEPS: [StepKind; 3] = [
         before: None,
         take: take_weight,
     },
+    StepKind {
+        name: ball::BALL,
+        form: "ball radius 4 mm",
+        what: "a ball pressed some 0.4 mm into the dome, here and there, five times and more: the lights",
+        after: Some("rest"),
+        before: None,
+        take: take_ball,
+    },
 ];
 
 /// Takes the step that the answer names.
@@ -90,14 +99,21 @@ fn take_lens(taking: &Taking, name: &str) -> TakenStep {
         return Err(refused(taking, "names no file, or more than one".into(), "lens FILE"));
     };
     let camera = Some(read_text(Path::new(file))?);
-    let step = Step { name: name.into(), said: taking.said.into(), marks: Vec::new(), camera };
+    let step =
+        Step { name: name.into(), said: taking.said.into(), marks: Vec::new(), camera, place_deg: None };
     Ok((step, Vec::new()))
 }
 
 fn take_frames(taking: &Taking, name: &str) -> TakenStep {
     let wish = FrameWish { device: taking.device.clone(), step: name, count: taking.frames };
     let taken = capture::take(&wish, taking.constants)?;
-    let step = Step { name: name.into(), said: taking.said.into(), marks: taken.marks, camera: None };
+    let step = Step {
+        name: name.into(),
+        said: taking.said.into(),
+        marks: taken.marks,
+        camera: None,
+        place_deg: None,
+    };
     Ok((step, taken.frames))
 }
 
@@ -105,4 +121,13 @@ fn take_weight(taking: &Taking, name: &str) -> TakenStep {
     let form = "MASS UNIT DIRECTION at PLACE";
     loads::parse(taking.words, taking.constants).map_err(|problem| refused(taking, problem, form))?;
     take_frames(taking, name)
+}
+
+fn take_ball(taking: &Taking, name: &str) -> TakenStep {
+    let radius_mm =
+        ball::parse(taking.words).map_err(|problem| refused(taking, problem, "ball radius NUMBER mm"))?;
+    let (step, frames) = take_frames(taking, name)?;
+    let place_deg = ball::examine(taking.session, taking.constants, &frames, (taking.said, radius_mm))?;
+    // a platform that is pushed by hand says nothing of the springs
+    Ok((Step { marks: Vec::new(), place_deg: Some(place_deg), ..step }, frames))
 }

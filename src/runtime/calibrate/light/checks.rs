@@ -7,6 +7,7 @@ use super::types::{LightFitError, place_deg};
 use crate::constants::{CalibrationPriors, Constants};
 use crate::shape::SeenCell;
 use crate::track::{MarkState, Tracked};
+use domecast_optics::SensorOptics;
 
 /// Presses that a fit needs, and how many it takes.
 pub(super) const MIN_PRESSES: usize = 5;
@@ -52,8 +53,12 @@ pub(super) fn input(presses: usize, radius_mm: f64) -> Result<(), LightFitError>
     Ok(())
 }
 
-/// Whether marks at rest lie where the constants put them.
-pub(super) fn marks_at_rest(constants: &Constants, tracked: &Tracked) -> Result<(), LightFitError> {
+/// Whether marks at rest lie where the constants' own optics see them.
+pub(super) fn marks_at_rest(
+    constants: &Constants,
+    optics: &SensorOptics,
+    tracked: &Tracked,
+) -> Result<(), LightFitError> {
     let status = tracked.status();
     if matches!(status, "turned" | "mirrored") {
         let cure = "give frames as the constants' camera takes them, or calibrate the optics first";
@@ -78,7 +83,7 @@ pub(super) fn marks_at_rest(constants: &Constants, tracked: &Tracked) -> Result<
     let dots = tracked.black_dots.iter().zip(&constants.black_dots);
     let found = dots.filter(|(dot, _)| dot.state == MarkState::Ok);
     let off = |(dot, at): (&crate::track::DotResult, &crate::constants::BlackDot)| {
-        Some(dot.image_px?.distance(glam::DVec2::from_array(at.image_px)))
+        Some(dot.image_px?.distance(optics.project(DVec3::from_array(at.surface_mm)).ok()?))
     };
     let mut off: Vec<f64> = found.filter_map(off).collect();
     off.sort_by(f64::total_cmp);

@@ -46,7 +46,7 @@ pub fn fit(
         ));
     };
     let tracked = bench.track(rest);
-    checks::marks_at_rest(constants, &tracked)?;
+    checks::marks_at_rest(constants, bench.optics(), &tracked)?;
     let cells = bench.rest(rest, &tracked)?;
     checks::saturation(0, &cells)?;
     let model = LightModel::new(nominal);

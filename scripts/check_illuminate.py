@@ -27,8 +27,8 @@ import numpy as np
 SMALL = 1e-7
 # the light in total is read from a table with an error of a thousandth of the brightest place
 TABLE = 0.01
-# the build's summary has a quarter of the places
-COARSE = 0.15
+# the build's summary has a quarter of the places; between the 94th and the 96th percentile of picam-r20, which has deep shadows, lie 38 %
+COARSE = 0.25
 
 
 def refuse(text):

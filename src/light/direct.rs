@@ -17,7 +17,7 @@ use domecast_optics::SensorOptics;
 /// the rule's error is below 1e-5 (tested against 64).
 pub const PLACES: usize = 4;
 
-/// Looks along the whole of the emitter at which pieces of a diagonal in sight are told from pieces in the shadow.
+/// Looks along the whole of the emitter at which pieces of a diagonal in sight are distinguished from pieces in the shadow.
 const LOOKS: f64 = 5.0;
 
 /// Halvings between two looks of which one is in sight: the edge is then known to 1/2560 of the emitter.

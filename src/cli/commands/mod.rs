@@ -166,7 +166,7 @@ enum Command {
         #[arg(long)]
         pose: Option<PathBuf>,
     },
-    /// Calibrate a built sensor step by step: lens, rest, known weights; says what is still unknown, and which load helps most.
+    /// Calibrate a built sensor step by step: lens, rest, known weights, presses of a ball; says what is still unknown, and which load helps most.
     Calibrate(calibrate::CalibrateArguments),
     /// Fit the springs' stiffness to measured pairs of displacement and wrench.
     CalibrateForce {

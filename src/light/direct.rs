@@ -122,7 +122,7 @@ impl EmitterRule {
 }
 
 /// What one place of the emitter gives.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Share {
     flux: DVec3,
     /// From the place to where its ray meets the sheet's underside, mm.
@@ -139,21 +139,19 @@ struct Shares<'a> {
 }
 
 impl Shares<'_> {
-    /// The share at a place of the unit square.
-    fn at(&mut self, u: f64, v: f64) -> Share {
+    /// What the shares have at a place of the unit square.
+    fn at<const N: usize>(&mut self, u: f64, v: f64, of: impl Fn(&Share) -> [DVec3; N]) -> [DVec3; N] {
         let [across, along] = &mut self.weights;
         self.rule.weigh(u, across);
         self.rule.weigh(v, along);
-        let mut sum = Share::default();
+        let mut sums = [DVec3::ZERO; N];
         for (line, across) in self.all.chunks_exact(along.len()).zip(across) {
             for (share, along) in line.iter().zip(along.iter()) {
                 let weight = *across * along;
-                sum.flux += share.flux * weight;
-                sum.way_mm += share.way_mm * weight;
-                sum.top_mm += share.top_mm * weight;
+                sums.iter_mut().zip(of(share)).for_each(|(sum, part)| *sum += part * weight);
             }
         }
-        sum
+        sums
     }
 
     /// The flux of the whole square.
@@ -163,15 +161,15 @@ impl Shares<'_> {
         self.all.iter().zip(weights).map(|(share, weight)| share.flux * weight).sum()
     }
 
-    /// The flux of what is in sight.
-    fn in_sight(&mut self, mut is_free: impl FnMut(f64, f64, &Share) -> bool) -> DVec3 {
+    /// The flux of what is in sight; `is_free` is given a place of the square, its way and where its ray crosses the sheet's top.
+    fn in_sight(&mut self, mut is_free: impl FnMut(f64, f64, [DVec3; 2]) -> bool) -> DVec3 {
         let rule = self.rule;
         let mut pieces = Vec::new();
         let mut is_whole = true;
         for diagonal in &rule.diagonals {
             let free = |v: f64| {
                 let u = v + diagonal.shift;
-                is_free(u, v, &self.at(u, v))
+                is_free(u, v, self.at(u, v, |share| [share.way_mm, share.top_mm]))
             };
             let first = pieces.len();
             pieces_in_sight(diagonal.from, diagonal.to, free, |low, high| pieces.push((diagonal, low, high)));
@@ -184,7 +182,8 @@ impl Shares<'_> {
         let mut sum = DVec3::ZERO;
         for (diagonal, low, high) in pieces {
             for (v, up) in rule.rule.over(low, high) {
-                sum += self.at(v + diagonal.shift, v).flux * (diagonal.weight * up);
+                let [flux] = self.at(v + diagonal.shift, v, |share| [share.flux]);
+                sum += flux * (diagonal.weight * up);
             }
         }
         sum
@@ -222,10 +221,10 @@ impl DirectLight<'_> {
         let mut sum = DVec3::ZERO;
         let mut gather = |part: f64, is_free: &dyn Fn(DVec3, DVec3) -> bool| {
             sum += part
-                * shares.in_sight(|u, v, share| {
+                * shares.in_sight(|u, v, [way_mm, top_mm]| {
                     let source = place(u, v);
-                    let end = source + share.way_mm;
-                    self.enters(end) && self.is_in_foot(share.top_mm) && is_free(source, end)
+                    let end = source + way_mm;
+                    self.enters(end) && self.is_in_foot(top_mm) && is_free(source, end)
                 });
         };
         if open > 0.0 {

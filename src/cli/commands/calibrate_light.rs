@@ -6,14 +6,12 @@ use serde_json::{Value, json};
 
 use super::input::{input_fault, measured_beside, read_constants};
 use super::output::{Failure, Output};
-use domecast_design::read_up_to;
 use domecast_files::StagedFile;
 use domecast_live::decode::{self, Picture};
+use domecast_live::frame_files::{has_extension, pictures_in, read_whole};
 use domecast_runtime::calibrate::light::{LightFit, LightFitOptions, LightParameter, fit};
 use domecast_runtime::track::CameraFrame;
 
-/// Bytes at most of a frame's file.
-const MAX_FRAME_BYTES: u64 = 1 << 28;
 /// What frames of the light's calibration are.
 pub const FRAMES: &str = "a folder of PNG or JPEG frames, raw as the camera gives them: one of the untouched sensor, the first by name or \
                       --rest, and 5 to 20 presses of one ball";
@@ -77,7 +75,7 @@ pub fn light_json(found: &LightFit) -> Value {
         "radius_by_presses_mm": found.radius_mm,
         "parameters": found.parameters,
         "not_observed": found.parameters.iter().filter(|p| !p.observed).map(|p| &p.name).collect::<Vec<_>>(),
-        "not_told_apart": found.pairs,
+        "not_distinguished": found.pairs,
         "presses": found.presses,
     })
 }
@@ -103,26 +101,21 @@ fn say(output: &Output, found: &LightFit) -> Result<(), Failure> {
     }
     for pair in &found.pairs {
         let [a, b] = &pair.names;
-        output.say(&format!("{a} and {b} are not told apart (correlation {:.3})", pair.correlation))?;
+        output.say(&format!("{a} and {b} are not distinguished (correlation {:.3})", pair.correlation))?;
     }
     Ok(())
 }
 
 fn read(path: &Path) -> Result<Picture, Failure> {
     let fault = |problem: String| input_fault(path, problem, FRAMES);
-    let bytes = std::fs::File::open(path).and_then(|file| read_up_to(file, MAX_FRAME_BYTES));
-    let bytes = bytes.map_err(|error| fault(format!("cannot be read ({error})")))?;
+    let bytes = read_whole(path).map_err(|error| fault(format!("cannot be read ({error})")))?;
     decode::picture(&bytes).map_err(fault)
 }
 
 /// The frame at rest, then the others of a folder by name.
 fn frames_of(folder: &Path, rest: Option<&Path>) -> Result<Vec<PathBuf>, Failure> {
-    let entries = std::fs::read_dir(folder)
+    let found = pictures_in(folder)
         .map_err(|error| input_fault(folder, format!("cannot be read ({error})"), FRAMES))?;
-    let is_frame = |path: &PathBuf| {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        ["png", "jpg", "jpeg"].contains(&extension.as_str())
-    };
     let is_rest = |path: &Path| {
         rest.is_some_and(|rest| {
             path == rest
@@ -131,11 +124,8 @@ fn frames_of(folder: &Path, rest: Option<&Path>) -> Result<Vec<PathBuf>, Failure
                     .is_some_and(|own| std::fs::canonicalize(rest).ok() == Some(own))
         })
     };
-    let mut frames: Vec<PathBuf> = entries
-        .filter_map(|e| Some(e.ok()?.path()))
-        .filter(|path| is_frame(path) && !is_rest(path))
-        .collect();
-    frames.sort();
+    let is_frame = |path: &PathBuf| has_extension(path, &["png", "jpg", "jpeg"]) && !is_rest(path);
+    let frames: Vec<PathBuf> = found.into_iter().filter(is_frame).collect();
     if frames.is_empty() {
         return Err(input_fault(folder, "holds no PNG or JPEG frame", FRAMES));
     }

@@ -201,7 +201,7 @@ fn result(
         "scatter_at_rest": scatter[0],
         "scatter_under_ball": scatter[1],
         "parameters": parameters,
-        "not_told_apart": pairs,
+        "not_distinguished": pairs,
     }));
     LightFit {
         constants,

@@ -230,7 +230,7 @@ def check_page(domecast, constants, files, rest):
     if expect(len(events) >= 2, f"only {len(events)} events: {text[:200]}"):
         last = events[-1]
         expect(last["image"].startswith("data:image/jpeg;base64,") and last["skin"].startswith("data:image/png;base64,"), "pictures")
-        expect(len(last["dots"]) > 100 and last["wrench"] and last["samples"], f"event: {list(last)}")
+        expect(len(last["dots"]) > 100 and len(last["tractions"]) > 100 and last["wrench"] and last["samples"], f"event: {list(last)}")
         frames = [event["frame"] for event in events]
         expect(frames == sorted(set(frames)), f"events repeat frames: {frames}")
     seen = browse(started["page"]) if shutil.which("chromedriver") else None

@@ -253,6 +253,7 @@ def entries(constants_path, repository, folder):
         "LiveSensor.step": Entry(lambda a: live.step([a]), [ball], 0.3),
         "Touch": Entry(lambda a, b: domecast.live.Touch(a, b), [(None, anything), ({}, anything)], 1),
         "calibrate_force": Entry(lambda a, b, c, d, e: domecast.calibrate_force(a, b, out="force.json", motion_sd=c, temperature=d, force=e), [("table.csv", files[1]), files, (None, anything), (None, words), truth], 0.7),
+        "calibrate_light": Entry(lambda a, b, c, d: domecast.calibrate_light(a, b, ball_radius_mm=c, rest=d, out="light.json"), [("played", files[1]), files, (4.0, scalars), (None, names)], 0.3),
         "calibrate_optics": Entry(lambda a, b, c, d: domecast.calibrate_optics(a, b, out="optics.json", rest_frames=c, centroids=d), [("played", files[1]), files, (1, words), (None, names)], 0.4),
         "calibrate_print": Entry(lambda a, b, c: domecast.calibrate_print(a, b, out="print.json", marks=c), [("table.csv", files[1]), (str(designs / "thumb24.json"), files[1]), (None, words)], 0.4),
         "accuracy": Entry(lambda a, b, c: domecast.accuracy(a, out=b, scene=c), [("broken.json", some.one_of(scalars, some.sampled_from(["played", "table.csv"]))), ("a", names), (None, files[1])], 1),

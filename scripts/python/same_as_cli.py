@@ -238,6 +238,19 @@ def calibrations(simulated):
             check(error.file is not None and "missing.csv" in error.file, f"{command}: {error}")
 
 
+def lights(constants, frames):
+    """Frames that no lights can be fitted to: the same fault. What is fitted is judged by check_light_calibration.py."""
+    words = [frames, constants, "--ball-radius-mm", "4"]
+    done = subprocess.run([DOMECAST, "calibrate-light", *map(str, words), "--json"], capture_output=True, text=True, cwd=WORK)
+    known = json.loads(done.stdout)["error"]
+    try:
+        domecast.calibrate_light(frames, constants, ball_radius_mm=4)
+        check(False, "calibrate-light: frames of no ball are refused")
+    except domecast.DomecastError as error:
+        same = (error.file, error.allowed) == (known["file"], known["allowed"])
+        check(done.returncode == 1 and same and str(error) == known["message"], f"calibrate-light: {error}")
+
+
 def prints():
     """A measured test print: file and result."""
     tree = json.loads((WORK / "by-cli/constants/constants.json").read_text())
@@ -397,6 +410,7 @@ def main():
     rest, _ = simulated("lit", "--seed", "7", seed=7)
     shapes(balls, pressed, rest / "frame_0000.png")
     calibrations(pushed)
+    lights(WORK / "by-cli/constants/constants.json", pushed)
     prints()
     accuracies(Path(sys.argv[5]) if len(sys.argv) > 5 else None)
     threads(sensor, frames, lines)

@@ -33,6 +33,8 @@ function overlay(to, reading) {
     if (now) arrow(to, from, [0, 1].map((i) => from[i] + magnify * (now[i] - from[i])));
     else ring(to, from, 4);
   }
+  to.strokeStyle = "#ff3cff";
+  for (const [from, end] of reading.tractions) arrow(to, from, end);
   to.strokeStyle = "#28c850";
   for (const at of reading.markers) ring(to, at, 8);
   if (reading.camera_force_n && reading.size) {

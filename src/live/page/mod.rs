@@ -1,5 +1,5 @@
-//! A page of this machine that shows the readings live: the frame with what is tracked in it, curves of the wrench, the skin's
-//! depth as colours.
+//! A page of this machine that shows the readings live: the frame with what is tracked in it and the forces on the skin, curves of
+//! the wrench, the skin's depth as colours.
 //!
 //! The server answers on 127.0.0.1 alone, to requests that name that host, and to no page of another site. The page gets
 //! server-sent events: one way is all it needs, browsers connect again by themselves, and unlike a WebSocket it stands
@@ -7,12 +7,13 @@
 //! has sent the last one, so a slow one sees fewer and holds nobody up.
 //!
 //! ```
-//! use domecast_live::page::LivePage;
-//! use domecast_optics::numeric::Rigid;
+//! use domecast_live::page::{LivePage, ShownSensor};
+//! # fn page_of(optics: domecast_optics::SensorOptics) -> std::io::Result<()> {
 //!
-//! let page = LivePage::start(0, Rigid::identity())?;
+//! let page = LivePage::start(0, ShownSensor { optics, forces: None })?;
 //! assert!(page.url().starts_with("http://127.0.0.1:"));
-//! # Ok::<(), std::io::Error>(())
+//! # Ok(())
+//! # }
 //! ```
 
 mod latest;
@@ -28,11 +29,20 @@ use std::sync::{Arc, PoisonError};
 use std::thread;
 
 use crate::reading::LiveReading;
-use domecast_optics::numeric::Rigid;
+use domecast_optics::SensorOptics;
 use domecast_runtime::track::Tracked;
-use painter::paint;
+use domecast_runtime::traction::ForceDistribution;
+use painter::Painter;
 use server::serve;
 use shared::{MAX_SAMPLES, Shared};
+
+/// The sensor whose readings are shown.
+pub struct ShownSensor {
+    /// Its optics at rest: forces are drawn as the camera sees them.
+    pub optics: SensorOptics,
+    /// What finds the forces on the skin in the frames that are shown; `None`: none are.
+    pub forces: Option<ForceDistribution>,
+}
 
 /// The page and its server.
 pub struct LivePage {
@@ -41,16 +51,17 @@ pub struct LivePage {
 }
 
 impl LivePage {
-    /// Starts the server at a port of 127.0.0.1; 0: any that is free. Forces are drawn as the camera sees them.
+    /// Starts the server at a port of 127.0.0.1; 0: any that is free.
     ///
     /// # Errors
     /// The port is taken, or the system has no threads.
-    pub fn start(port: u16, rest_from_camera: Rigid) -> io::Result<Self> {
+    pub fn start(port: u16, sensor: ShownSensor) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         let address = listener.local_addr()?;
         let shared = Arc::new(Shared::default());
         let of_painter = Arc::clone(&shared);
-        thread::Builder::new().name("painter".into()).spawn(move || paint(&of_painter, rest_from_camera))?;
+        let mut painter = Painter::new(sensor);
+        thread::Builder::new().name("painter".into()).spawn(move || painter.paint(&of_painter))?;
         let of_server = Arc::clone(&shared);
         thread::Builder::new().name("page".into()).spawn(move || serve(&listener, &of_server))?;
         Ok(Self { shared, address })

@@ -10,13 +10,14 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
+use super::ShownSensor;
 use super::shared::{Sample, Shared};
 use crate::decode::Picture;
 use crate::reading::LiveReading;
-use domecast_optics::numeric::Rigid;
-use domecast_runtime::overlay::{depth_range_mm, viridis};
+use domecast_runtime::overlay::{depth_range_mm, traction_arrow_px, viridis};
 use domecast_runtime::shape::ShapeMap;
 use domecast_runtime::track::MarkState;
+use domecast_runtime::traction::DotTraction;
 
 /// From picture to picture at least: what eyes need, and little of a core.
 const STEP: Duration = Duration::from_millis(50);
@@ -24,25 +25,56 @@ const JPEG_QUALITY: u8 = 75;
 /// Pixels of the frame along one of the skin's picture.
 const SKIN_STEP: usize = 2;
 
-/// Paints the newest reading until the page is dropped.
-pub(super) fn paint(shared: &Arc<Shared>, rest_from_camera: Rigid) {
-    let camera_from_rest = rest_from_camera.inverse();
-    let (mut last, mut deepest_mm) = (0, 0.0_f64);
-    while !shared.is_stopped.load(Ordering::Relaxed) {
-        let began = Instant::now();
-        let Some((number, reading)) = shared.reading.newer(last, Duration::from_secs(1)) else { continue };
-        last = number;
-        let samples = mem::take(&mut *shared.samples.lock().unwrap_or_else(PoisonError::into_inner));
-        let samples: Vec<Sample> = samples.into();
-        let touch = reading.skin.as_deref().and_then(|map| map.contact.as_ref());
-        deepest_mm = touch.map_or(deepest_mm, |touch| deepest_mm.max(touch.depth_mm));
-        let mut event = event(&reading, &samples, deepest_mm);
-        let force_n = reading.tracked.wrench.map(|wrench| camera_from_rest.vector(wrench.force_n));
-        event["camera_force_n"] = json!(force_n.map(|force_n| force_n.to_array()));
-        shared.event.set(event.to_string().into());
-        if let Some(left) = STEP.checked_sub(began.elapsed()) {
-            thread::sleep(left);
+/// What paints the readings.
+pub(super) struct Painter {
+    sensor: ShownSensor,
+    /// So far: the colours' range does not jump.
+    deepest_mm: f64,
+}
+
+impl Painter {
+    pub fn new(sensor: ShownSensor) -> Self {
+        Self { sensor, deepest_mm: 0.0 }
+    }
+
+    /// Paints the newest reading until the page is dropped.
+    pub fn paint(&mut self, shared: &Arc<Shared>) {
+        let mut last = 0;
+        while !shared.is_stopped.load(Ordering::Relaxed) {
+            let began = Instant::now();
+            let Some((number, reading)) = shared.reading.newer(last, Duration::from_secs(1)) else {
+                continue;
+            };
+            last = number;
+            let samples = mem::take(&mut *shared.samples.lock().unwrap_or_else(PoisonError::into_inner));
+            let samples: Vec<Sample> = samples.into();
+            let touch = reading.skin.as_deref().and_then(|map| map.contact.as_ref());
+            self.deepest_mm = touch.map_or(self.deepest_mm, |touch| self.deepest_mm.max(touch.depth_mm));
+            let mut event = event(&reading, &samples, self.deepest_mm);
+            let camera_from_rest = self.sensor.optics.rest_from_camera().inverse();
+            let force_n = reading.tracked.wrench.map(|wrench| camera_from_rest.vector(wrench.force_n));
+            event["camera_force_n"] = json!(force_n.map(|force_n| force_n.to_array()));
+            event["tractions"] = json!(self.tractions(&reading));
+            shared.event.set(event.to_string().into());
+            if let Some(left) = STEP.checked_sub(began.elapsed()) {
+                thread::sleep(left);
+            }
         }
+    }
+
+    /// Arrows of the forces on the skin in the frame, px.
+    fn tractions(&mut self, reading: &LiveReading) -> Vec<[[f64; 2]; 2]> {
+        let tracked = &reading.tracked;
+        let Some(forces) = &mut self.sensor.forces else { return Vec::new() };
+        let found = match reading.skin.as_deref() {
+            Some(skin) => forces.update_with_shape(tracked, skin),
+            None => forces.update(tracked),
+        };
+        let Some(optics) = tracked.pose.and_then(|pose| self.sensor.optics.at_pose(&pose).ok()) else {
+            return Vec::new();
+        };
+        let arrow = |dot: &DotTraction| traction_arrow_px(&optics, dot.surface_mm, dot.traction_n_mm2);
+        found.dots.iter().filter_map(arrow).map(|ends| ends.map(px)).collect()
     }
 }
 

@@ -11,7 +11,7 @@ Lengths are mm, angles rad unless a name says deg, forces N, torques N mm, pixel
 free to share. `domecast.mujoco` and `domecast.gym` are for simulators, `domecast.ros` is a node of ROS 2.
 """
 
-from ._commands import accuracy, calibrate_force, calibrate_optics, calibrate_print, main
+from ._commands import accuracy, calibrate_force, calibrate_light, calibrate_optics, calibrate_print, main
 from ._design import Design, Optics
 from ._error import DomecastError
 from ._native import (
@@ -45,6 +45,7 @@ __all__ = [
     "__version__",
     "accuracy",
     "calibrate_force",
+    "calibrate_light",
     "calibrate_optics",
     "calibrate_print",
     "main",

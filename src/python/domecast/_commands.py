@@ -52,6 +52,20 @@ def calibrate_force(
     return _call("calibrate-force", measured, constants, out=_place(out), motion_sd=sd, temperature=temperature, force=force)
 
 
+def calibrate_light(
+    frames: StrPath,
+    constants: StrPath,
+    *,
+    ball_radius_mm: float,
+    rest: StrPath | None = None,
+    out: StrPath | None = None,
+    force: bool = False,
+) -> dict[str, Any]:
+    """Fits the lights to a folder of frames, one at rest and 5 to 20 presses of a ball: `domecast calibrate-light` (minutes)."""
+    radius = repr(float(ball_radius_mm))
+    return _call("calibrate-light", frames, constants, ball_radius_mm=radius, rest=_place(rest), out=_place(out), force=force)
+
+
 def calibrate_optics(
     seen: StrPath,
     constants: StrPath,

@@ -70,6 +70,13 @@ impl Default for OverlayLayers<'_> {
     }
 }
 
+/// The arrow of a force on the skin in the frame, px: 15 mm a N/mm2 into the scene, from a place of the deformed skin (sensor frame,
+/// mm). `optics` stand where the platform is. `None` where the camera does not see an end of it.
+pub fn traction_arrow_px(optics: &SensorOptics, at_mm: DVec3, traction_n_mm2: DVec3) -> Option<[DVec2; 2]> {
+    let end_mm = at_mm + traction_n_mm2 * MM_PER_N_MM2;
+    Some([optics.project_deformed(at_mm).ok()?, optics.project_deformed(end_mm).ok()?])
+}
+
 /// A PNG of the frame, at twice its size. Yellow arrows: dots from where the undeformed dome would show them to where
 /// they are, `magnify` times as long; small red circles: where lost dots should be; green circles: white markers; red,
 /// green and blue lines: the platform's axes; a thick red arrow: the force across the image, 25 px a newton; a red
@@ -116,8 +123,7 @@ pub fn overlay_png(
             }
         }
         for (at_mm, traction_n_mm2) in tractions {
-            let end_mm = *at_mm + *traction_n_mm2 * MM_PER_N_MM2;
-            if let (Ok(from), Ok(to)) = (optics.project_deformed(*at_mm), optics.project_deformed(end_mm)) {
+            if let Some([from, to]) = traction_arrow_px(&optics, *at_mm, *traction_n_mm2) {
                 canvas.arrow(from, to, [255, 60, 255], 2.0);
             }
         }

@@ -11,15 +11,17 @@ use std::time::{Duration, Instant};
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
 use super::recording::{Recording, RecordingPace};
+use super::track::SHAPE_CORRELATION_MM;
 use domecast_files::StopWish;
 use domecast_live::decode::picture;
 use domecast_live::frame_files::read_whole;
-use domecast_live::page::LivePage;
+use domecast_live::page::{LivePage, ShownSensor};
 use domecast_live::source::{CameraRequest, ControlRequest, LiveSource, open_device as open_named};
 use domecast_live::{HeightReader, LiveEvent, LiveReader};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeFromColor, ShapeOptions};
 use domecast_runtime::track::{CameraFrame, Tracker};
+use domecast_runtime::traction::ForceDistribution;
 use session::{Outlets, Session};
 
 pub use arguments::{LiveArguments, milliseconds, rate};
@@ -109,11 +111,17 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
     let source = open_device(&device, &constants)?;
     check_size(&*source, arguments, &constants)?;
     let page = match arguments.show {
-        Some(port) => Some(LivePage::start(port, *tracker.optics().rest_from_camera()).map_err(|error| {
-            let problem = format!("cannot be used ({error})");
-            let named = format!("--show {port}");
-            input_fault(Path::new(&named), problem, "a port that is free, or none for any")
-        })?),
+        Some(port) => {
+            let correlation_mm = skin.is_some().then_some(SHAPE_CORRELATION_MM);
+            // constants of earlier builds have no dome to press: their page shows no forces on the skin
+            let forces = ForceDistribution::new(&constants, correlation_mm).ok();
+            let shown = ShownSensor { optics: tracker.optics().clone(), forces };
+            Some(LivePage::start(port, shown).map_err(|error| {
+                let problem = format!("cannot be used ({error})");
+                let named = format!("--show {port}");
+                input_fault(Path::new(&named), problem, "a port that is free, or none for any")
+            })?)
+        }
         None => None,
     };
     let inputs = [arguments.constants.as_path()];

@@ -67,7 +67,7 @@ fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
 }
 
 /// Over how far pressures are taken to be alike where the skin's heights are measured, mm.
-const SHAPE_CORRELATION_MM: f64 = 1.0;
+pub const SHAPE_CORRELATION_MM: f64 = 1.0;
 
 fn forces_of(
     arguments: &TrackArguments,

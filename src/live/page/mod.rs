@@ -29,20 +29,11 @@ use std::sync::{Arc, PoisonError};
 use std::thread;
 
 use crate::reading::LiveReading;
-use domecast_optics::SensorOptics;
 use domecast_runtime::track::Tracked;
-use domecast_runtime::traction::ForceDistribution;
 use painter::Painter;
+pub use painter::ShownSensor;
 use server::serve;
 use shared::{MAX_SAMPLES, Shared};
-
-/// The sensor whose readings are shown.
-pub struct ShownSensor {
-    /// Its optics at rest: forces are drawn as the camera sees them.
-    pub optics: SensorOptics,
-    /// What finds the forces on the skin in the frames that are shown; `None`: none are.
-    pub forces: Option<ForceDistribution>,
-}
 
 /// The page and its server.
 pub struct LivePage {

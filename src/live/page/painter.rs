@@ -10,20 +10,28 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::ShownSensor;
 use super::shared::{Sample, Shared};
 use crate::decode::Picture;
 use crate::reading::LiveReading;
+use domecast_optics::SensorOptics;
 use domecast_runtime::overlay::{depth_range_mm, traction_arrow_px, viridis};
 use domecast_runtime::shape::ShapeMap;
 use domecast_runtime::track::MarkState;
-use domecast_runtime::traction::DotTraction;
+use domecast_runtime::traction::{DotTraction, ForceDistribution};
 
 /// From picture to picture at least: what eyes need, and little of a core.
 const STEP: Duration = Duration::from_millis(50);
 const JPEG_QUALITY: u8 = 75;
 /// Pixels of the frame along one of the skin's picture.
 const SKIN_STEP: usize = 2;
+
+/// The sensor whose readings are shown.
+pub struct ShownSensor {
+    /// Its optics at rest: forces are drawn as the camera sees them.
+    pub optics: SensorOptics,
+    /// What finds the forces on the skin in the frames that are shown; `None`: none are.
+    pub forces: Option<ForceDistribution>,
+}
 
 /// What paints the readings.
 pub(super) struct Painter {

@@ -101,6 +101,15 @@ impl Cavities {
 pub struct NearHollows<'a>(Vec<&'a Hollow>);
 
 impl NearHollows<'_> {
+    /// The same, in the order in which a ray meets them: rays beside it mostly meet the same, and end before the others are asked.
+    pub fn sorted_along(mut self, from_mm: DVec3, to_mm: DVec3) -> Self {
+        self.0.sort_by_cached_key(|hollow| {
+            // What is entered earlier first; of numbers that are not negative the bits are in order.
+            hollow.interval(from_mm, to_mm).map_or(u64::MAX, |(enter, _)| enter.to_bits())
+        });
+        self
+    }
+
     /// [`Cavities::is_free`] for a ray inside the box.
     pub fn is_free(&self, from_mm: DVec3, to_mm: DVec3) -> bool {
         // Each hollow that the front lies in carries it on to its far side; when no hollow does, it is blocked.
@@ -168,7 +177,7 @@ impl Hollow {
         let origin = self.own_from_part.transform_point3(from);
         let way = self.own_from_part.transform_vector3(to - from);
         let mut span = (0.0_f64, 1.0_f64);
-        // inside where value + s * slope <= 0
+        // inside where value + s * slope <= 0; whether anything is left
         let mut keep = |value: f64, slope: f64| {
             if slope > 0.0 {
                 span.1 = span.1.min(-value / slope);
@@ -177,19 +186,24 @@ impl Hollow {
             } else if value > 0.0 {
                 span.1 = f64::NEG_INFINITY;
             }
+            span.0 < span.1
         };
         match &self.shape {
             Convex::Faces { sides, bottom_mm: bottom, top_mm: top, .. } => {
-                keep(origin.z - top, way.z);
-                keep(bottom - origin.z, -way.z);
+                if !(keep(origin.z - top, way.z) && keep(bottom - origin.z, -way.z)) {
+                    return None;
+                }
                 for (normal, offset) in sides {
                     let normal = DVec2::from_array(*normal);
-                    keep(normal.dot(origin.truncate()) - offset, normal.dot(way.truncate()));
+                    if !keep(normal.dot(origin.truncate()) - offset, normal.dot(way.truncate())) {
+                        return None;
+                    }
                 }
             }
             Convex::Frustum { bottom_mm: bottom, top_mm: top, radius_mm: radius, slope } => {
-                keep(origin.z - top, way.z);
-                keep(bottom - origin.z, -way.z);
+                if !(keep(origin.z - top, way.z) && keep(bottom - origin.z, -way.z)) {
+                    return None;
+                }
                 let r0 = radius + slope * (origin.z - bottom);
                 let r1 = slope * way.z;
                 let (p, d) = (origin.truncate(), way.truncate());

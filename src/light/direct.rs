@@ -216,6 +216,8 @@ impl DirectLight<'_> {
                 }
             }
         }
+        let source = pose.translation;
+        let end = source + all.iter().map(|share| share.way_mm).sum::<DVec3>() / all.len().max(1) as f64;
         let open = if self.cavities.is_some() { self.through_platform } else { 1.0 };
         let mut shares = Shares { rule, all, weights: Default::default() };
         let mut sum = DVec3::ZERO;
@@ -233,7 +235,7 @@ impl DirectLight<'_> {
         if let Some(cavities) = self.cavities.filter(|_| open < 1.0) {
             // The emitter's corners lie a little beyond the rule's places.
             let beyond = DVec3::splat(emitter.half_side_mm);
-            let hollows = cavities.near(low - beyond, high + beyond);
+            let hollows = cavities.near(low - beyond, high + beyond).sorted_along(source, end);
             gather(1.0 - open, &|source, end| hollows.is_free(source, end));
         }
         sum * emitter.flux_mw

@@ -124,7 +124,7 @@ impl ActiveSet {
             }
             allowed[node]
         });
-        for (node, per_sd) in self.per_sd.iter_mut().enumerate() {
+        for (node, per_sd) in self.per_sd.iter_mut().enumerate().filter(|(node, _)| allowed[*node]) {
             *per_sd = 1.0 / (rows.product((0, node), (0, node)) + rows.prior(0, node, node)).sqrt();
         }
         for slot in 0..self.active.len() {

@@ -61,6 +61,8 @@ pub struct ForceDistribution {
     /// Height of each node and one over its deviation, and the nodes that have one.
     pub(super) heights: Vec<(f64, f64)>,
     pub(super) measured: Vec<usize>,
+    /// The nodes whose columns a frame needs: those that may bear a pressure, and those beside them for its deviation.
+    needed: Vec<bool>,
     pub(super) room: PressureRoom,
     softness: f64,
     /// Whether the dots have moved by more than noise.
@@ -122,6 +124,7 @@ impl ForceDistribution {
             node_sd_n_mm2: vec![0.0; n],
             heights: vec![(0.0, 0.0); n],
             measured: Vec::with_capacity(n),
+            needed: vec![true; n],
             room: PressureRoom::default(),
             softness: 1.0,
             is_moved: false,
@@ -167,6 +170,7 @@ impl ForceDistribution {
         self.softness = 1.0;
         self.move_skin();
         self.allow(map);
+        self.need();
         self.take_heights(map);
         let is_touched = self.is_moved || !self.measured.is_empty();
         if !is_touched {
@@ -214,6 +218,13 @@ impl ForceDistribution {
         count >= MIN_DOTS.min(self.dots.len())
     }
 
+    fn need(&mut self) {
+        self.needed.copy_from_slice(&self.set.allowed);
+        for (node, _) in self.set.allowed.iter().enumerate().filter(|(_, is_allowed)| **is_allowed) {
+            self.model.nodes[node].beside.iter().for_each(|(other, ..)| self.needed[*other] = true);
+        }
+    }
+
     /// The rows of a turn: dots, wrench, heights.
     fn fill(&mut self, tracked: &Tracked, pose: &Rigid) {
         let (n, d) = (self.model.nodes.len(), self.dots.len());
@@ -227,7 +238,7 @@ impl ForceDistribution {
             (self.wanted[2 * k], self.wanted[2 * k + 1]) = (px.x, px.y);
         }
         for axis in 0..AXES {
-            for node in 0..n {
+            for node in (0..n).filter(|node| self.needed[*node]) {
                 let at = axis * n + node;
                 let Some(column) = self.columns.get_mut(at * rows..(at + 1) * rows) else { continue };
                 let base = self.dot_columns[2 * at * d..2 * (at + 1) * d].chunks_exact(2);
@@ -263,7 +274,7 @@ impl ForceDistribution {
         for (to, (value, per)) in self.wanted[2 * d..].iter_mut().zip(six(force, moment).iter().zip(&per)) {
             *to = value * per;
         }
-        for (node, own) in self.model.nodes.iter().enumerate() {
+        for (node, own) in self.model.nodes.iter().enumerate().filter(|(node, _)| self.needed[*node]) {
             let arm = own.at_mm + self.nodes_moved_mm[node] - about_mm;
             for axis in 0..AXES {
                 let f = self.turned[node].col(axis) * own.area_mm2;

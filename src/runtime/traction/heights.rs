@@ -1,8 +1,9 @@
 //! Heights of the skin as rows of the least squares.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::forces::ForceDistribution;
+use super::model::Node;
 use crate::shape::ShapeMap;
 
 /// Least deviation of a height, mm.
@@ -15,6 +16,8 @@ const MIN_TOUCHED: f64 = 0.04;
 /// Places in each direction about a node at which is looked whether the skin is touched, and their distance over the nodes'.
 const LOOKS: i32 = 3;
 const LOOK_STEP: f64 = 0.25;
+/// By how much the image of a square about a node may reach beyond its corners, as a part of its size.
+const BULGE: f64 = 0.1;
 
 impl ForceDistribution {
     /// Takes the heights of the nodes where they are now; none without a map.
@@ -37,9 +40,14 @@ impl ForceDistribution {
     pub(super) fn allow(&mut self, map: Option<&ShapeMap>) {
         let Some(map) = map.filter(|map| map.contact.is_some()) else { return self.set.allowed.fill(true) };
         let step_mm = LOOK_STEP * self.model.compliance.grid.spacing_mm();
+        let touched_px = touched_px(map);
         for node in 0..self.model.nodes.len() {
             let own = &self.model.nodes[node];
             let at_mm = own.at_mm + self.nodes_moved_mm[node];
+            if self.is_far(&touched_px, at_mm, own, f64::from(LOOKS) * step_mm) {
+                self.set.allowed[node] = false;
+                continue;
+            }
             let (mut touched, mut all) = (0.0, 0.0);
             for i in -LOOKS..=LOOKS {
                 for j in -LOOKS..=LOOKS {
@@ -64,6 +72,20 @@ impl ForceDistribution {
         }
     }
 
+    /// Whether no place within a square about a node is seen where anything touches.
+    fn is_far(&self, touched_px: &[DVec2; 2], at_mm: DVec3, node: &Node, half_mm: f64) -> bool {
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for [x, y] in [[-half_mm, -half_mm], [half_mm, -half_mm], [-half_mm, half_mm], [half_mm, half_mm]] {
+            let corner_mm = at_mm + node.axes.y_axis * x + node.axes.z_axis * y;
+            let Ok(px) = self.optics.project_deformed(corner_mm) else { return false };
+            (low, high) = (low.min(px), high.max(px));
+        }
+        // The square's sides are a little curved in the image.
+        let beyond = DVec2::splat(BULGE * (high - low).max_element() + 1.0);
+        let [touched_low, touched_high] = *touched_px;
+        (low - beyond).cmpgt(touched_high).any() || (high + beyond).cmplt(touched_low).any()
+    }
+
     fn take_map(&mut self, map: &ShapeMap) {
         for node in 0..self.model.nodes.len() {
             let moved_mm = self.nodes_moved_mm[node];
@@ -82,4 +104,17 @@ impl ForceDistribution {
             self.measured.push(node);
         }
     }
+}
+
+/// Corners of the box around the pixels that are touched; it is inside out where none is.
+fn touched_px(map: &ShapeMap) -> [DVec2; 2] {
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for (y, row) in map.is_touched.chunks_exact(map.width.max(1)).enumerate() {
+        let first = row.iter().position(|is_touched| *is_touched);
+        for x in first.into_iter().chain(row.iter().rposition(|is_touched| *is_touched)) {
+            let px = DVec2::new(x as f64, y as f64);
+            (low, high) = (low.min(px), high.max(px));
+        }
+    }
+    [low, high]
 }

@@ -80,12 +80,17 @@ impl ForceDistribution {
         let shown = points.filter(|(_, point)| point.is_finite());
         let borne = shown.map(|(cell, point)| {
             let at_mm = dome.nearest_mm(point.as_dvec3());
-            let is_loaded = self.model.about(at_mm).any(|(node, _)| self.set.tractions[node] > 0.0);
-            // What is there now came from beside.
-            let moved = self.model.about(at_mm).map(|(node, hat)| self.nodes_moved_mm[node] * hat);
-            let own_mm = if is_loaded { at_mm - moved.sum::<DVec3>() } else { at_mm };
-            let mut nodes = [(0, 0.0); 4];
-            nodes.iter_mut().zip(self.model.about(own_mm)).for_each(|(to, from)| *to = from);
+            let about = |at_mm: DVec3| {
+                let mut nodes = [(0, 0.0); 4];
+                nodes.iter_mut().zip(self.model.about(at_mm)).for_each(|(to, from)| *to = from);
+                nodes
+            };
+            let mut nodes = about(at_mm);
+            if nodes.iter().any(|(node, hat)| *hat > 0.0 && self.set.tractions[*node] > 0.0) {
+                // What is there now came from beside.
+                let moved = nodes.iter().map(|(node, hat)| self.nodes_moved_mm[*node] * *hat);
+                nodes = about(at_mm - moved.sum::<DVec3>());
+            }
             let area_mm2 = map.cell_area_mm2(cell);
             Borne { cell, area_mm2, nodes, own: f64::from(map.own_pressure(cell)) }
         });

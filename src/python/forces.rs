@@ -57,6 +57,7 @@ impl PyForces {
             table.triple(Some(dot.surface_mm));
             table.triple(Some(dot.traction_n_mm2));
             table.one(Some(dot.noise_sd_n_mm2));
+            table.one(Some(dot.sd_n_mm2));
         }
         table.into_array(py, "TRACTION")
     }

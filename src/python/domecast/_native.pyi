@@ -261,7 +261,7 @@ class Forces:
     def compliance_factor(self) -> float: ...
     @property
     def dots(self) -> Table:
-        """A structured array: id, surface_mm, traction_n_mm2, noise_sd_n_mm2."""
+        """A structured array: id, surface_mm, traction_n_mm2, noise_sd_n_mm2, sd_n_mm2."""
 
     @property
     def contact(self) -> tuple[Floats, Floats, Floats, Floats] | None:

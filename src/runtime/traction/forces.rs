@@ -357,6 +357,13 @@ impl ForceDistribution {
         }
     }
 
+    /// Variance of the pressure within half a node's distance of a node, (N/mm2)^2: half of what it differs by from the nodes beside it.
+    fn variance_within(&self, node: usize) -> f64 {
+        let (beside, own) = (&self.model.nodes[node].beside, self.set.tractions[node]);
+        let squares = beside.iter().map(|(other, ..)| (0.5 * (self.set.tractions[*other] - own)).powi(2));
+        squares.sum::<f64>() / beside.len().max(1) as f64
+    }
+
     fn report(&mut self, tracked: &Tracked) {
         let n = self.model.nodes.len();
         let rows = Rows {
@@ -377,11 +384,12 @@ impl ForceDistribution {
         // What the model leaves unexplained beyond the noise makes all less sure.
         self.posterior.widen((over / f64::from(count.max(1))).sqrt().max(1.0));
         for (k, (dot, found)) in self.dots.iter().zip(&tracked.black_dots).enumerate() {
-            let (mut traction, mut pressure) = (DVec3::ZERO, 0.0);
+            let (mut traction, mut pressure, mut coarse) = (DVec3::ZERO, 0.0, 0.0);
             for (node, share) in self.model.about(dot.surface_mm) {
                 let own = DVec3::from_array([0, 1, 2].map(|axis| self.set.tractions[axis * n + node]));
                 traction += self.turned[node] * own * (share / self.stretch[node]);
                 pressure += share / self.stretch[node];
+                coarse += share * self.variance_within(node) / self.stretch[node].powi(2);
             }
             let mut sd = self.posterior.sd_at(&self.model, k, dot.surface_mm) * pressure.max(0.1);
             if self.reference_mm.is_none() {
@@ -392,6 +400,7 @@ impl ForceDistribution {
                 surface_mm: dot.surface_mm + self.dots_moved_mm[k],
                 traction_n_mm2: traction,
                 noise_sd_n_mm2: sd,
+                sd_n_mm2: sd.hypot(coarse.sqrt()),
             });
         }
         self.result.rms_px = (sum / f64::from(count.max(1))).sqrt();

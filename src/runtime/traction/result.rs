@@ -38,6 +38,9 @@ pub struct DotTraction {
     /// Where nothing is found to touch, how much pressure over a correlation
     /// length could have stayed unseen.
     pub noise_sd_n_mm2: f64,
+    /// Standard deviation of its normal part with what nodes and dots are too coarse to tell: of the pressure within half a node's
+    /// distance, by the nodes beside it.
+    pub sd_n_mm2: f64,
 }
 
 /// The touched part of the skin as a whole.

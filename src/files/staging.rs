@@ -289,6 +289,10 @@ pub(crate) fn recover_one(folder: &Path) -> Option<String> {
     }
     let mut lock = File::open(&target).ok()?;
     lock.try_lock().ok()?;
+    if !target.exists() {
+        // its run ended between the look and the lock: a run removes this file before it lets the lock go
+        return None;
+    }
     let mut text = String::new();
     lock.read_to_string(&mut text).ok()?;
     // stopped while it was written: nothing else is there then

@@ -62,7 +62,7 @@ pub struct ForceDistribution {
     pub(super) heights: Vec<(f64, f64)>,
     pub(super) measured: Vec<usize>,
     /// The nodes whose columns a frame needs: those that may bear a pressure, and those beside them for its deviation.
-    needed: Vec<bool>,
+    pub(super) needed: Vec<bool>,
     pub(super) room: PressureRoom,
     softness: f64,
     /// Whether the dots have moved by more than noise.
@@ -218,13 +218,6 @@ impl ForceDistribution {
         count >= MIN_DOTS.min(self.dots.len())
     }
 
-    fn need(&mut self) {
-        self.needed.copy_from_slice(&self.set.allowed);
-        for (node, _) in self.set.allowed.iter().enumerate().filter(|(_, is_allowed)| **is_allowed) {
-            self.model.nodes[node].beside.iter().for_each(|(other, ..)| self.needed[*other] = true);
-        }
-    }
-
     /// The rows of a turn: dots, wrench, heights.
     fn fill(&mut self, tracked: &Tracked, pose: &Rigid) {
         let (n, d) = (self.model.nodes.len(), self.dots.len());
@@ -357,13 +350,6 @@ impl ForceDistribution {
         }
     }
 
-    /// Variance of the pressure within half a node's distance of a node, (N/mm2)^2: half of what it differs by from the nodes beside it.
-    fn variance_within(&self, node: usize) -> f64 {
-        let (beside, own) = (&self.model.nodes[node].beside, self.set.tractions[node]);
-        let squares = beside.iter().map(|(other, ..)| (0.5 * (self.set.tractions[*other] - own)).powi(2));
-        squares.sum::<f64>() / beside.len().max(1) as f64
-    }
-
     fn report(&mut self, tracked: &Tracked) {
         let n = self.model.nodes.len();
         let rows = Rows {
@@ -389,7 +375,8 @@ impl ForceDistribution {
                 let own = DVec3::from_array([0, 1, 2].map(|axis| self.set.tractions[axis * n + node]));
                 traction += self.turned[node] * own * (share / self.stretch[node]);
                 pressure += share / self.stretch[node];
-                coarse += share * self.variance_within(node) / self.stretch[node].powi(2);
+                coarse += share * self.model.variance_within(node, &self.set.tractions)
+                    / self.stretch[node].powi(2);
             }
             let mut sd = self.posterior.sd_at(&self.model, k, dot.surface_mm) * pressure.max(0.1);
             if self.reference_mm.is_none() {

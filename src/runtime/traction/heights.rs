@@ -86,6 +86,14 @@ impl ForceDistribution {
         (low - beyond).cmpgt(touched_high).any() || (high + beyond).cmplt(touched_low).any()
     }
 
+    /// Notes whose columns the frame needs.
+    pub(super) fn need(&mut self) {
+        self.needed.copy_from_slice(&self.set.allowed);
+        for (node, _) in self.set.allowed.iter().enumerate().filter(|(_, is_allowed)| **is_allowed) {
+            self.model.nodes[node].beside.iter().for_each(|(other, ..)| self.needed[*other] = true);
+        }
+    }
+
     fn take_map(&mut self, map: &ShapeMap) {
         for node in 0..self.model.nodes.len() {
             let moved_mm = self.nodes_moved_mm[node];

@@ -105,6 +105,13 @@ impl ElasticModel {
         Ok(model)
     }
 
+    /// Variance of the pressure within half a node's distance of a node, (N/mm2)^2: half of what it differs by from the nodes beside it.
+    pub fn variance_within(&self, node: usize, pressures: &[f64]) -> f64 {
+        let (beside, own) = (&self.nodes[node].beside, pressures[node]);
+        let squares = beside.iter().map(|(other, ..)| (0.5 * (pressures[*other] - own)).powi(2));
+        squares.sum::<f64>() / beside.len().max(1) as f64
+    }
+
     /// Nodes of the list about a point of the dome, with their shares.
     pub fn about(&self, at_mm: DVec3) -> impl Iterator<Item = (usize, f64)> + '_ {
         let parts = self.compliance.grid.hats_at(at_mm);

@@ -12,8 +12,9 @@ use super::false_dots::{MAX_FALSE_DOTS, find_false_dots};
 use super::groups::Groups;
 use super::key_check::{KeyCheck, KeyFrame, Orientation};
 use super::shifted_rows::ShiftedRows;
+use super::vanished_dots::VanishedDots;
 use crate::track::frame::{Mask, Plane};
-use crate::track::marks::{BlobScan, DarkBlob, SpotMeter};
+use crate::track::marks::{BlobScan, DarkBlob, MarkState, SpotMeter};
 use crate::track::model::{DotModel, SensorModel};
 use crate::track::options::TrackOptions;
 use domecast_optics::SensorOptics;
@@ -97,6 +98,17 @@ impl Dots {
     }
 }
 
+/// Mean level of nine pixels at a place inside of the frame.
+fn level_at(plane: &Plane<'_>, at: DVec2) -> Option<f64> {
+    let inside = |v: f64, end: usize| v > 1.0 && v < end as f64 - 2.0;
+    if !(inside(at.x, plane.width()) && inside(at.y, plane.height())) {
+        return None;
+    }
+    let mut levels = [0.0; 9];
+    plane.square_into(at.x.round() as i32 - 1, at.y.round() as i32 - 1, 3, &mut levels);
+    Some(f64::from(levels.iter().sum::<f32>()) / 9.0)
+}
+
 /// Follows the dots through the frames.
 #[derive(Debug, Clone)]
 pub(in crate::track) struct DotIdentities {
@@ -112,6 +124,7 @@ pub(in crate::track) struct DotIdentities {
     key: KeyCheck,
     faults: DotFaults,
     shifted: ShiftedRows,
+    vanished: VanishedDots,
     /// Frames so far.
     turn: usize,
 }
@@ -150,6 +163,7 @@ impl DotIdentities {
             key: KeyCheck::new(options.camera_turned_rad.is_some(), width, height),
             faults: DotFaults::new(count),
             shifted: ShiftedRows::new(count),
+            vanished: VanishedDots::new(count),
             turn: 0,
         }
     }
@@ -186,6 +200,8 @@ impl DotIdentities {
                 |at: DVec2| tracks.iter().filter_map(DotTrack::now_px).all(|p| p.distance(at) > reach_px);
             spot.is_ok_and(|spot| is_other(spot.at_px))
         });
+        let blobs = self.searched.then_some(self.false_dots.as_slice());
+        self.vanished.judge(models, &mut self.dots.tracks, blobs, |at| level_at(plane, at));
         self.dots.tracks.iter_mut().for_each(DotTrack::remember);
         self.now()
     }
@@ -206,12 +222,13 @@ impl DotIdentities {
         // What moved by half of the spacing or more between two frames leaves gaps around it, or fills the key's.
         let lost =
             self.dots.tracks.iter().filter(|t| t.is_wanted() && t.last_px.is_some() && t.spot.is_none());
+        let has_vanished = lost.clone().any(|track| track.state == MarkState::Lost);
         let has_jumped = lost.count() > (known / SUDDENLY_LOST).max(1) || torn > 0;
         let is_open = self.since_search >= OPEN_EVERY && self.dots.tracks.iter().any(|t| t.is_unsure);
         let is_filled = self.is_key_filled(frame);
         let due = self.search_every > 0 && self.since_search >= self.search_every;
         let identify = few || has_jumped || is_filled || is_open;
-        if identify || due {
+        if identify || due || has_vanished {
             self.search_frame(frame, identify, is_filled);
         }
     }
@@ -290,5 +307,6 @@ impl DotIdentities {
         self.prediction = DotPrediction::default();
         self.turn = 0;
         self.key.restart();
+        self.vanished.restart();
     }
 }

@@ -19,6 +19,7 @@ mod marker_hypotheses;
 mod markers;
 mod shifted_rows;
 mod skin;
+mod vanished_dots;
 
 pub(super) use dot_track::DotTrack;
 pub(super) use dots::{DotFrame, DotIdentities, DotsFound};

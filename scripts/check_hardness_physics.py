@@ -3,8 +3,9 @@
 
     scripts/check_hardness_physics.py [domecast] [--set DIR] [--videos N]
 
-Two second opinions: the same slope of approach over the integral of 1/(2a) - 0.33/R dF, written again in numpy with trapezoids; and,
-for balls only, Hertz' force over depth with the true radius (scipy), which needs no contact radius. The intervals must hold.
+Two second opinions: the same slope of approach over the integral of 1/(2a) - 0.33/R dF, written again in numpy with trapezoids and radii
+that need not grow as a power; and, for balls only, Hertz' force over depth with the true radius (scipy), which needs no contact radius.
+The intervals must hold.
 """
 import argparse
 import json
@@ -42,20 +43,16 @@ def approach(index, video):
 
 
 def by_slope(index, force, depth, contact):
-    """1/E* by trapezoids in F^(2/3), in which a ball's 1/a is smooth."""
+    """1/E* by trapezoids; the contact's radius is that of the punch whose pressure a growing force adds: a^2 = 3/5 d(F rho^2)/dF."""
+    degree = 2 if np.ptp(np.log(force)) > 0.5 and len(force) > 3 else 1
+    rho = np.polyfit(np.log(force), np.log(contact), degree, w=contact)
     x = [0.0]
     for i in range(1, len(force)):
-        u = np.linspace(force[i - 1] ** (2 / 3), force[i] ** (2 / 3), 33)
-        f = u**1.5
-        a = np.exp(np.interp(np.log(f), *sorted_pair(np.log(force[i - 1:i + 1]), np.log(contact[i - 1:i + 1]))))
-        g = 1 / (2 * a) - 0.33 / index["dome"]["radius_mm"]
-        x.append(x[-1] + np.trapezoid(g, f))
+        f = np.linspace(force[i - 1], force[i], 33)
+        power = np.clip(np.polyval(np.polyder(rho), np.log(f)), 0, 0.5)
+        a = np.exp(np.polyval(rho, np.log(f))) * np.sqrt(0.6 * (1 + 2 * power))
+        x.append(x[-1] + np.trapezoid(1 / (2 * a) - 0.33 / index["dome"]["radius_mm"], f))
     return np.polyfit(x, depth, 1)[0]
-
-
-def sorted_pair(x, y):
-    order = np.argsort(x)
-    return x[order], y[order]
 
 
 def by_hertz(index, video, force, depth):

@@ -1,4 +1,4 @@
-//! Sets of simulated touches for learning, and what contact mechanics makes of them.
+//! Sets of simulated touches for learning.
 //!
 //! A [`Dataset`] is read from a spec ([`spec::DatasetSpec`]). Its videos come in pairs that share everything (object, press, sensor,
 //! light, times, forces) but the object's stiffness and the noise, so that nothing but what stiffness does tells the two apart.
@@ -12,7 +12,6 @@ mod check;
 mod draw;
 mod index;
 mod make;
-pub mod physics;
 mod read;
 mod readings;
 mod record;
@@ -30,7 +29,7 @@ pub use check::Dataset;
 pub use draw::PairDraw;
 pub use index::{FORMAT, INDEX_NAME};
 pub use make::{Maker, Shard};
-pub use read::{StoredSet, StoredVideo};
+pub use read::{ReadingRow, StoredSet, StoredVideo};
 pub use readings::{COLUMNS, DOT_COLUMNS, RIGID_COLUMNS, SeenDot, dots_features};
 pub use record::Made;
 pub use rest::TrackedRest;

@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::index::{FORMAT, INDEX_NAME};
-use crate::physics::{Dome, ReadingRow};
 use crate::readings::COLUMNS;
 use domecast_design::DesignError;
 
 const BLOCK: usize = 512;
+
+/// A row of readings in the order of [`COLUMNS`].
+pub type ReadingRow = [f64; COLUMNS.len()];
 
 /// A set as it lies in a folder.
 #[derive(Debug, Clone)]
@@ -64,18 +66,6 @@ impl StoredSet {
             return Err(fault(&path, "shards", "none of its shards is there", "a folder with shards"));
         }
         Ok(Self { index, files })
-    }
-
-    /// The nominal dome; moments are about the springs' point, which labels do not need and the index gives.
-    pub fn dome(&self) -> Option<Dome> {
-        let number = |path: &str| self.index.pointer(path).and_then(Value::as_f64);
-        let at = |k: usize| number(&format!("/dome/reference_mm/{k}"));
-        Some(Dome {
-            radius_mm: number("/dome/radius_mm")?,
-            young_mpa: number("/dome/youngs_modulus_mpa")?,
-            poisson: number("/dome/poisson")?,
-            at_mm: glam::DVec3::new(at(0)?, at(1)?, at(2)?),
-        })
     }
 
     /// Calls `take` with every video of the shards that are there, in order.

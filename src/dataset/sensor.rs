@@ -243,3 +243,28 @@ fn design_of(file: &DesignFile, scale: f64) -> Result<Design, DesignError> {
     // numbers, strings and lists only: nothing here can fail to be written
     serde_json::to_string(&file).unwrap_or_default().parse()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sensor_with_a_marker_under_the_dome_is_drawn_again() {
+        let tiny = concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs/datasets/tiny.json");
+        let dataset = Dataset::load(tiny.as_ref()).expect("a spec");
+        let drawn = |sensor: u32, attempt: u64| {
+            let stream = STREAM_SENSOR | attempt << 32 | u64::from(sensor);
+            let mut deviations = Deviations(SeededRandom::stream(dataset.spec.seed, stream));
+            design_of(&dataset.built_file(&mut deviations), dataset.scale())
+        };
+        let forbidden = |built: &Result<Design, DesignError>| {
+            built.as_ref().is_err_and(|error| error.to_string().contains("lies under the dome"))
+        };
+        let sensor = (0..1000).find(|sensor| forbidden(&drawn(*sensor, 0)));
+        let sensor = sensor.expect("one of a thousand has a marker under the dome");
+        assert!(matches!(dataset.attempt_sensor(sensor, 0), Err(SimError::Input(_))));
+        let allowed = (1..MAX_ATTEMPTS).find_map(|attempt| drawn(sensor, attempt).ok());
+        let built = dataset.build_sensor(sensor).expect("another draw");
+        assert_eq!(Some(built.scene.design().text()), allowed.as_ref().map(Design::text));
+    }
+}

@@ -1,4 +1,4 @@
-//! Hardness from touch: a small network that sees the picture's difference from rest and what `track` measures beside it,
+//! Hardness from touch: by contact mechanics ([`physics`]), and by a small network that sees the picture's difference from rest and what `track` measures beside it,
 //! over a window of frames, and states class and Young's modulus, or that it is unsure.
 //!
 //! [`HardnessReader`] is the one state object. A model is an ONNX file ([`read_onnx`], [`write_onnx`]) of the few kinds of
@@ -16,6 +16,7 @@ mod network;
 mod nodes;
 mod onnx_read;
 mod onnx_write;
+pub mod physics;
 mod picture;
 mod protobuf;
 mod reader;

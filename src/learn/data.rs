@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use domecast_hardness::physics::{Dome, PressRow, Prior, READINGS, hardness};
 use domecast_hardness::{FrameView, Shrinker, rest_profile};
 use serde_json::Value;
 
@@ -18,6 +19,9 @@ const WRENCH: [&str; 12] = [
 ];
 /// The hand's travel, which a robot knows and `track` does not.
 const TRAVEL: [&str; 1] = ["robot_travel_mm"];
+/// What contact mechanics makes of the frames so far, travel and contact included: log10 of the modulus in MPa, and half of the 90 %
+/// interval.
+const PHYSICS: [&str; 2] = ["physics_log10_e", "physics_half_width"];
 const DOTS: [&str; 3] = ["dots_mean_px", "dots_radial_px", "dots_divergence"];
 
 /// Which of three parts of the set a video belongs to.
@@ -87,13 +91,64 @@ impl DataSet {
     }
 }
 
+/// Where a reading comes from.
+#[derive(Debug, Clone, Copy)]
+enum Reading {
+    /// A column of the set's table.
+    Column(usize),
+    /// One of [`PHYSICS`].
+    Physics(usize),
+}
+
+impl Reading {
+    fn named(name: &str, columns: &[String]) -> Result<Self, Problem> {
+        if let Some(at) = PHYSICS.iter().position(|known| *known == name) {
+            return Ok(Self::Physics(at));
+        }
+        let at = columns.iter().position(|column| column == name);
+        at.map(Self::Column).ok_or_else(|| format!("no column `{name}`"))
+    }
+}
+
+/// What contact mechanics needs.
+struct Physics {
+    dome: Dome,
+    prior: Prior,
+    columns: [usize; READINGS.len()],
+}
+
+impl Physics {
+    fn new(set: &Value, columns: &[String]) -> Result<Self, Problem> {
+        let place = |name: &&str| columns.iter().position(|c| c == name);
+        let places: Option<Vec<usize>> = READINGS.iter().map(place).collect();
+        let places = places.and_then(|places| places.try_into().ok());
+        let (dome, prior) = (Dome::of_set(set), Prior::of_set(set));
+        let (columns, (dome, prior)) =
+            places.zip(dome.zip(prior)).ok_or("has not all that contact mechanics needs")?;
+        Ok(Self { dome, prior, columns })
+    }
+
+    /// The numbers of each frame, from it and those before.
+    fn of(&self, frames: &[&[f32]]) -> Vec<[f32; PHYSICS.len()]> {
+        let row = |frame: &&[f32]| self.columns.map(|at| f64::from(frame[at]));
+        let rows: Vec<PressRow> = frames.iter().map(row).collect();
+        let until = |count: usize| {
+            let found = hardness(&rows[..count], &self.dome, &self.prior);
+            let [low, high] = found.interval;
+            [found.log10_young as f32, (0.5 * (high - low)) as f32]
+        };
+        (1..=rows.len()).map(until).collect()
+    }
+}
+
 /// How the members of a video are read.
 struct Layout {
     frames: usize,
     size: [usize; 2],
     picture: Option<[usize; 2]>,
     columns: usize,
-    used: Vec<usize>,
+    used: Vec<Reading>,
+    physics: Option<Physics>,
     leak: Leak,
     middle_log10: Option<f32>,
 }
@@ -138,11 +193,14 @@ impl Layout {
         }
         let table: Vec<f32> =
             content.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-        let readings: Vec<f32> = shown
-            .iter()
-            .flat_map(|f| self.used.iter().map(move |c| (f, c)))
-            .map(|(f, c)| table[f * self.columns + c])
-            .collect();
+        let rows: Vec<&[f32]> = shown.iter().map(|f| &table[f * self.columns..][..self.columns]).collect();
+        let physics = self.physics.as_ref().map(|physics| physics.of(&rows)).unwrap_or_default();
+        let value = |frame: usize, reading: &Reading| match *reading {
+            Reading::Column(at) => rows[frame][at],
+            Reading::Physics(at) => physics[frame][at],
+        };
+        let readings: Vec<f32> =
+            (0..rows.len()).flat_map(|frame| self.used.iter().map(move |r| value(frame, r))).collect();
         if readings.iter().any(|value| !value.is_finite()) || !log10_e.is_finite() {
             return Ok(Err("a reading is missing"));
         }
@@ -211,15 +269,13 @@ pub fn load(folder: &Path, options: &Options) -> Result<DataSet, Problem> {
     let groups = [(options.wrench, &WRENCH[..]), (options.dots, &DOTS[..])];
     let group =
         |is_seen: bool| groups.iter().filter(move |(seen, _)| *seen == is_seen).flat_map(|(_, names)| *names);
-    let travel = TRAVEL.iter().filter(|_| options.travel);
-    let wanted = group(true).chain(travel.clone()).chain(group(false));
-    let seen = group(true).chain(travel).count();
-    let used: Result<Vec<usize>, Problem> = wanted
-        .map(|name| {
-            columns.iter().position(|c| c == name).ok_or_else(|| fault(format!("no column `{name}`")))
-        })
-        .collect();
-    let used = used?;
+    // those that `track` does not have are seen or left out
+    let beside = TRAVEL.iter().filter(|_| options.travel).chain(PHYSICS.iter().filter(|_| options.physics));
+    let wanted: Vec<&str> = group(true).chain(beside.clone()).chain(group(false)).copied().collect();
+    let seen = group(true).chain(beside).count();
+    let used = wanted.iter().map(|name| Reading::named(name, &columns)).collect::<Result<Vec<_>, Problem>>();
+    let used = used.map_err(fault)?;
+    let physics = options.physics.then(|| Physics::new(&set, &columns)).transpose().map_err(fault)?;
     let size = [count("height")?, count("width")?];
     // the nearest height of the same shape that halves four times
     let height = ((options.width * size[0]) as f64 / (16 * size[1]) as f64).round().max(1.0) as usize * 16;
@@ -241,6 +297,7 @@ pub fn load(folder: &Path, options: &Options) -> Result<DataSet, Problem> {
         leak: options.leak,
         middle_log10,
         used,
+        physics,
     };
     let own_classes = classes.is_some();
     let cut = || middle_log10.map_or(0.0, |middle| 10_f32.powf(middle));
@@ -249,7 +306,7 @@ pub fn load(folder: &Path, options: &Options) -> Result<DataSet, Problem> {
     let mut result = DataSet {
         videos: Vec::new(),
         own_classes,
-        readings: layout.used.iter().map(|at| columns[*at].clone()).collect(),
+        readings: wanted.into_iter().map(str::to_string).collect(),
         seen,
         frames: layout.frames,
         picture: layout.picture,

@@ -34,6 +34,7 @@ fn setup(set: &DataSet, options: &Options, net: &Net) -> serde_json::Value {
         ("dots", options.dots),
         ("wrench", options.wrench),
         ("travel", options.travel),
+        ("physics", options.physics),
     ];
     json!({
         "dataset": set.name,

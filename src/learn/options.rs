@@ -11,8 +11,8 @@ Trains a network that reads hardness from touch, on a data set of `domecast data
 usage: domecast-learn DATASET --out DIR [OPTIONS]
 
   --net small|paper     small residual network (default), or the paper's ResNet-18; a bidirectional GRU behind either
-  --inputs LIST         of picture, dots, wrench, travel, separated by commas (default: the first three, which `track` has;
-                        paper: picture); travel is the robot hand's
+  --inputs LIST         of picture, dots, wrench, travel, physics, separated by commas (default: the first three, which `track` has;
+                        paper: picture); travel is the robot hand's, physics the modulus by contact mechanics, which needs it
   --width N             width of the picture, pixels, 16 to 512 (default 64)
   --epochs N            (default 20)
   --batch N             videos of a step (default 16)
@@ -52,6 +52,8 @@ pub(crate) struct Options {
     pub wrench: bool,
     /// Whether the robot hand's travel is seen.
     pub travel: bool,
+    /// Whether the modulus by contact mechanics is seen.
+    pub physics: bool,
     /// Of the picture, pixels.
     pub width: usize,
     /// Passes over the training videos.
@@ -85,14 +87,18 @@ fn number<T: std::str::FromStr + PartialOrd + std::fmt::Display>(
 
 impl Options {
     fn inputs(&mut self, list: &str) -> Result<(), Problem> {
-        (self.picture, self.dots, self.wrench, self.travel) = (false, false, false, false);
+        (self.picture, self.dots, self.wrench, self.travel, self.physics) =
+            (false, false, false, false, false);
         for name in list.split(',') {
             match name.trim() {
                 "picture" => self.picture = true,
                 "dots" => self.dots = true,
                 "wrench" => self.wrench = true,
                 "travel" => self.travel = true,
-                other => return Err(format!("--inputs {other}: allowed: picture, dots, wrench, travel")),
+                "physics" => self.physics = true,
+                other => {
+                    return Err(format!("--inputs {other}: allowed: picture, dots, wrench, travel, physics"));
+                }
             }
         }
         Ok(())
@@ -111,6 +117,7 @@ impl Options {
             dots: true,
             wrench: true,
             travel: false,
+            physics: false,
             width: 64,
             epochs: 20,
             batch: 16,

@@ -6,15 +6,10 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::output::{Failure, Output};
-use domecast_dataset::physics::{Hardness, Prior, hardness};
-use domecast_dataset::{INDEX_NAME, StoredSet};
+use domecast_dataset::{COLUMNS, INDEX_NAME, StoredSet};
 use domecast_design::DesignError;
 use domecast_files::StagedFile;
-
-/// Two classes may be of any modulus within this factor of theirs.
-const BEYOND_CLASSES: f64 = 3.0;
-/// Noise of a hand's travel where the set says none, mm.
-const USUAL_TRAVEL_SD_MM: f64 = 0.02;
+use domecast_hardness::physics::{Dome, Hardness, PressRow, Prior, READINGS, hardness};
 
 /// What came of a split.
 #[derive(Default)]
@@ -51,15 +46,16 @@ pub fn run(output: &Output, folder: &Path, out: Option<&Path>) -> Result<(), Fai
         DesignError::at(field, "", problem, "what `domecast dataset` writes")
             .in_file(&folder.join(INDEX_NAME))
     };
-    let dome = set.dome().ok_or_else(|| in_index("dome", "a number of the dome is missing"))?;
-    let (prior, border) =
-        prior(&set.index).ok_or_else(|| in_index("spec.hardness", "no range of hardness"))?;
+    let dome = Dome::of_set(&set.index).ok_or_else(|| in_index("dome", "a number of the dome is missing"))?;
+    let prior = Prior::of_set(&set.index).ok_or_else(|| in_index("spec.hardness", "no range of hardness"))?;
+    let (border, columns) = (border(&set.index), columns());
     let mut staged =
         out.map(|path| StagedFile::new(path, "hardness", &output.rules(&[folder]))).transpose()?;
     let mut splits: BTreeMap<String, Tally> = BTreeMap::new();
     let mut lines = String::new();
     set.each(&mut |video| {
-        let found = hardness(&video.rows, &dome, &prior);
+        let rows: Vec<PressRow> = video.rows.iter().map(|row| columns.map(|at| row[at])).collect();
+        let found = hardness(&rows, &dome, &prior);
         let text = |key: &str| video.label.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
         let truth = video.label.get("log10_youngs_modulus_mpa").and_then(Value::as_f64);
         let label = video.label.get("label").and_then(Value::as_u64);
@@ -100,17 +96,25 @@ fn add(tally: &mut Tally, found: &Hardness, truth: Option<f64>, class: Option<(u
     *tally.by_status.entry(found.status.as_str()).or_insert(0) += 1;
 }
 
-/// What is known before, and for two classes the border between them.
-fn prior(index: &Value) -> Option<(Prior, Option<f64>)> {
-    let number = |path: &str| index.pointer(path).and_then(Value::as_f64);
-    let poisson = 0.5 * (number("/spec/poisson/0")? + number("/spec/poisson/1")?);
-    let travel_sd_mm = number("/spec/readings/robot_travel_sd_mm").unwrap_or(USUAL_TRAVEL_SD_MM);
-    let range = number("/label_range_mpa/0").zip(number("/label_range_mpa/1"));
-    if let Some((low, high)) = range {
-        return Some((Prior { young_mpa: [low, high], poisson, travel_sd_mm }, None));
+/// For each reading that the formula needs its number in [`COLUMNS`].
+fn columns() -> [usize; READINGS.len()] {
+    READINGS.map(|name| COLUMNS.iter().position(|other| *other == name).unwrap_or_default())
+}
+
+/// The border between two classes, log10 of MPa.
+fn border(index: &Value) -> Option<f64> {
+    let class =
+        |k: usize| index.pointer(&format!("/spec/hardness/classes/{k}/young_mpa")).and_then(Value::as_f64);
+    Some(0.5 * (class(0)?.log10() + class(1)?.log10()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_have_all_that_the_formula_needs() {
+        let names = columns().map(|at| COLUMNS[at]);
+        assert_eq!(names, READINGS);
     }
-    let class = |k: usize| number(&format!("/spec/hardness/classes/{k}/young_mpa"));
-    let (one, other) = (class(0)?, class(1)?);
-    let young_mpa = [one.min(other) / BEYOND_CLASSES, one.max(other) * BEYOND_CLASSES];
-    Some((Prior { young_mpa, poisson, travel_sd_mm }, Some(0.5 * (one.log10() + other.log10()))))
 }

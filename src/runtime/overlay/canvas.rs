@@ -7,6 +7,8 @@ use crate::track::CameraFrame;
 
 /// Picture pixels for each of the frame's: arrows of a pixel are seen then.
 const ZOOM: u32 = 2;
+/// No line is longer, and nothing lies farther from the corner, in the frame's pixels: what is drawn has no room for more than 32767.
+const MAX_PX: f64 = 8000.0;
 
 /// The picture.
 pub(super) struct Canvas {
@@ -47,6 +49,7 @@ impl Canvas {
 
     fn place(at: DVec2) -> (f32, f32) {
         let zoom = f64::from(ZOOM);
+        let at = at.clamp(DVec2::splat(-MAX_PX), DVec2::splat(MAX_PX));
         ((zoom * (at.x + 0.5)) as f32, (zoom * (at.y + 0.5)) as f32)
     }
 
@@ -84,6 +87,7 @@ impl Canvas {
         }
         let head = (0.5 * length).min(2.5 + 0.8 * f64::from(width));
         let (unit, side) = (along / length, along.perp() / length);
+        let to = from + unit * length.min(MAX_PX);
         let wing = |sign: f64| to - unit * head + side * (sign * 0.5 * head);
         self.stroke(
             |path| {
@@ -100,7 +104,7 @@ impl Canvas {
 
     /// A circle.
     pub fn circle(&mut self, at: DVec2, radius: f64, color: [u8; 3], width: f32) {
-        let ((x, y), r) = (Self::place(at), (f64::from(ZOOM) * radius) as f32);
+        let ((x, y), r) = (Self::place(at), (f64::from(ZOOM) * radius.min(MAX_PX)) as f32);
         self.stroke(|path| path.push_circle(x, y, r), color, width);
     }
 
@@ -130,4 +134,32 @@ fn paint([red, green, blue]: [u8; 3], alpha: u8) -> Paint<'static> {
     paint.set_color(Color::from_rgba8(red, green, blue, alpha));
     paint.anti_alias = true;
     paint
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_is_drawn_anywhere_is_drawn_or_left_out() {
+        let bytes = vec![0; 64 * 48];
+        let frame = CameraFrame::new(64, 48, 1, &bytes).expect("a frame");
+        let mut canvas = Canvas::new(&frame).expect("a picture");
+        let middle = DVec2::new(30.0, 20.0);
+        for size in [0.0, 1.0, 1e3, 3e4, 1e5, 1e7, 1e9, 1e12, 1e300, f64::INFINITY, f64::NAN] {
+            for k in 0..24 {
+                let away = DVec2::from_angle(f64::from(k) * 0.26) * size;
+                for width in [1.0, 1.5, 5.0] {
+                    canvas.arrow(middle, middle + away, [255, 0, 0], width);
+                    canvas.arrow(middle - away, middle, [255, 0, 0], width);
+                    canvas.arrow(middle + away, middle + 2.0 * away.perp(), [255, 0, 0], width);
+                    canvas.line(&[middle, away, away.perp()], true, [0, 255, 0], width);
+                    canvas.circle(middle + away, size, [0, 255, 0], width);
+                    canvas.circle(middle, size, [0, 255, 0], width);
+                }
+                canvas.fill(middle - away.abs(), middle + away.abs(), [0, 0, 255], 9);
+            }
+        }
+        assert!(canvas.to_png().is_ok());
+    }
 }

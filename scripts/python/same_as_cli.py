@@ -202,6 +202,17 @@ def shapes(folder, frames, rest):
         if number:
             pictures = [found._repr_png_(), reading._repr_png_(), reading.overlay_png(frame, rgb=True, shape=found, forces=pressed)]
             check(all(one.startswith(b"\x89PNG") for one in pictures), "pictures of a touch")
+    for order in ([2, 1, 0], [1, 2, 0], [0, 2, 1]):
+        try:
+            shape.update(np.ascontiguousarray(frames[-1][:, :, order]), reading, rgb=True)
+            check(False, f"shape: a frame with its colours as {order} is refused")
+        except domecast.DomecastError as error:
+            check("another order" in str(error), f"shape: {error}")
+    for name in ("picam-r20", "thumb24-wide"):
+        found = domecast.Traction(domecast.Design.load(REPOSITORY / f"designs/{name}.json").sensor()).update(reading)
+        check(found.status == "foreign_reading" and found.contact is None and not len(found.dots), f"traction by the constants of {name}: {found!r}")
+    for magnify in (1e5, 1e9, -1e9, 1e300, float("inf"), float("nan")):
+        check(reading.overlay_png(frames[-1], rgb=True, magnify=magnify).startswith(b"\x89PNG"), f"an overlay magnified {magnify} times")
     swapped = read_png(rest)[:, :, ::-1]
     for name, call in [("tracker", lambda: domecast.Tracker(sensor).update(swapped, rgb=True)),
                        ("shape", lambda: shape.set_rest(swapped, rgb=True))]:

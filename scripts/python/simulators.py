@@ -97,7 +97,11 @@ def mujoco_side():
     put(model, data, (0, 0, 0.0111))
     both = sensor.read(data)
     check(len(sensor.geoms) == 2 and both.wrench[2] < 0 and abs(both.wrench[0]) < 0.05 * -both.wrench[2], f"two geoms at once: {np.round(both.wrench, 3)}")
-    for geoms, words in [("fingertips", "no geom named"), ([0], "plane")]:
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        domecast.mujoco.TouchSensor(model, "fingertip", DESIGN, images=False)
+    check(len(said) == 1 and "planes" in str(said[0].message), f"a plane that is not felt: {[str(one.message) for one in said]}")
+    for geoms, words in [([-1], "no geom of number"), ([99], "no geom of number"), ("fingertips", "no geom named"), ([0], "plane")]:
         try:
             domecast.mujoco.TouchSensor(model, "fingertip", DESIGN, geoms=[geoms] if isinstance(geoms, str) else geoms)
             check(False, f"{geoms} is refused")

@@ -123,6 +123,9 @@ fn read(source: &mut dyn LiveSource, shared: &Shared, max_frames: usize) {
         match source.next_frame() {
             Ok(Some(frame)) => shared.push(LiveEvent::Frame(frame, 0), max_frames),
             Ok(None) => return shared.push(LiveEvent::Ended(None), max_frames),
+            Err(lost) if !source.comes_back() => {
+                return shared.push(LiveEvent::Ended(Some(lost.0)), max_frames);
+            }
             Err(lost) => {
                 let since = Instant::now();
                 shared.push(LiveEvent::Unplugged(lost.0), max_frames);
@@ -175,6 +178,14 @@ mod tests {
             self.gone -= 1;
             if self.gone == 0 { Ok(()) } else { Err(SourceLost("gone".into())) }
         }
+    }
+
+    #[test]
+    fn a_stream_that_breaks_off_ends() {
+        let stream = std::io::Cursor::new(b"P6 640 480 255\ncut off".to_vec());
+        let reader = LiveReader::start(Box::new(crate::source::PictureStream::new(stream)), 4).unwrap();
+        let event = reader.next(Duration::from_secs(60)).unwrap();
+        assert!(matches!(&event, LiveEvent::Ended(Some(why)) if !why.is_empty()), "{event:?}");
     }
 
     #[test]

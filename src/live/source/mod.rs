@@ -122,6 +122,11 @@ pub trait LiveSource: Send {
     /// [`SourceLost`]: the device is gone; [`LiveSource::reopen`] may bring it back.
     fn next_frame(&mut self) -> Result<Option<ArrivedFrame>, SourceLost>;
 
+    /// Whether a source that is lost may come back.
+    fn comes_back(&self) -> bool {
+        true
+    }
+
     /// Tries once to open it again, with the same settings.
     ///
     /// # Errors

@@ -41,6 +41,10 @@ impl<R: Read + Send> LiveSource for PictureStream<R> {
         }))
     }
 
+    fn comes_back(&self) -> bool {
+        false
+    }
+
     fn reopen(&mut self) -> Result<(), SourceLost> {
         Err(SourceLost("a stream that broke off does not come back".into()))
     }

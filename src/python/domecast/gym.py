@@ -144,6 +144,10 @@ class PressToForce(_Touching):
     goals: ClassVar[int] = 1
 
     def __init__(self, design: Design | str | os.PathLike[str], *, force_n: tuple[float, float] = (0.2, 1.0), **options: Any) -> None:
+        low_n, high_n = force_n
+        if not 0 < low_n <= high_n < MAX_N:
+            raise DomecastError(f"force_n is {force_n}; allowed: two forces, 0 < first <= second < {MAX_N:g} N",
+                                field="force_n", value=repr(force_n), allowed=f"0 < first <= second < {MAX_N:g} N")
         self._range_n = force_n
         self._force_n = force_n[0]
         super().__init__(design, **options)

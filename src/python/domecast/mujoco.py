@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,11 @@ def _id(model: Any, kind: Any, given: str | int) -> int:
         if found < 0:
             raise DomecastError(f"the model has no {kind.name.removeprefix('mjOBJ_').lower()} named {given!r}", value=repr(given))
         return found
-    return int(given)
+    number, count = int(given), int({_mj.mjtObj.mjOBJ_SITE: model.nsite, _mj.mjtObj.mjOBJ_GEOM: model.ngeom}[kind])
+    if not 0 <= number < count:
+        what = kind.name.removeprefix("mjOBJ_").lower()
+        raise DomecastError(f"the model has no {what} of number {number}; allowed: 0 to {count - 1}", value=str(number), allowed=f"0 to {count - 1}")
+    return number
 
 
 def _matrix(rotation: Any, position: Any) -> Floats:
@@ -56,7 +61,7 @@ class TouchSensor:
     pole; z towards the pole), in metres as all of MuJoCo.
 
     `geoms` may touch it, by name or number: spheres, capsules, cylinders, boxes, ellipsoids and closed meshes, at most 16; left out,
-    all geoms that collide and belong to other bodies than the site's own. They are rigid here: the dome yields. MuJoCo's own
+    all geoms that collide, but for planes and height fields, which are not felt (a warning names them), and belong to other bodies than the site's own. They are rigid here: the dome yields. MuJoCo's own
     contact forces are not read, and none are given back: let the geoms near the dome not collide with the sensor's own, or make these as soft
     as it is. Keywords are those of `domecast.live.LiveSensor`.
     """
@@ -89,10 +94,15 @@ class TouchSensor:
         model, own = self.model, int(self.model.site_bodyid[self.site])
         # a site of the world is no body's: everything else may touch it
         mine = [own > 0 and _is_below(model, int(body), own) for body in model.geom_bodyid]
-        shapes = {_mj.mjtGeom.mjGEOM_PLANE, _mj.mjtGeom.mjGEOM_HFIELD}
-        collide = [bool(model.geom_contype[geom] or model.geom_conaffinity[geom]) for geom in range(model.ngeom)]
-        return [geom for geom in range(model.ngeom)
-                if collide[geom] and not mine[geom] and _mj.mjtGeom(int(model.geom_type[geom])) not in shapes]
+        not_felt = {_mj.mjtGeom.mjGEOM_PLANE, _mj.mjtGeom.mjGEOM_HFIELD}
+        others = [geom for geom in range(model.ngeom)
+                  if (model.geom_contype[geom] or model.geom_conaffinity[geom]) and not mine[geom]]
+        left_out = [geom for geom in others if _mj.mjtGeom(int(model.geom_type[geom])) in not_felt]
+        if left_out:
+            names = ", ".join(repr(_mj.mj_id2name(model, _mj.mjtObj.mjOBJ_GEOM, geom) or geom) for geom in left_out)
+            warnings.warn(f"planes and height fields are not felt: {names}; put a box where the sensor may touch them, or name in `geoms` what may touch it",
+                          stacklevel=3)
+        return [geom for geom in others if geom not in left_out]
 
     def _shape(self, geom: int, place: Path) -> dict[str, Any]:
         model, kinds = self.model, _mj.mjtGeom

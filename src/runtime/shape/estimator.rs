@@ -34,6 +34,10 @@ const STILL_STEP_MM: f64 = 0.005;
 /// How closely the passes before the last are solved, mm.
 const PASS_END_MM: f64 = 3e-3;
 
+/// Every seventh cell is asked for the order of its colours; the part of their misfit that another order must leave to be taken for theirs.
+const COLOUR_STEP: usize = 7;
+const OTHER_ORDER: f32 = 0.5;
+
 /// Most by which the skin moves, part of its height over the sheet: it is bonded at the rim.
 const MAX_STRAIN: f32 = 0.5;
 
@@ -211,6 +215,7 @@ impl ShapeFromColor {
         }
         let (shifts, gain) = (&mut self.shifts, &mut self.gain);
         rest.at_pose(&self.cells, &self.view, &self.rest_seen, shifts, self.is_rigid, gain);
+        self.check_colours()?;
         let mut status = SolveStatus::default();
         for pass in 0..self.options.max_passes {
             self.choose(pass == 0);
@@ -236,6 +241,31 @@ impl ShapeFromColor {
         let skin = Skin { view: &self.view, moved_mm: &self.moved_mm, dome: self.optics.dome() };
         self.map.draw(&self.cells, &skin, sd_mm, &mut self.chart, status);
         Ok(&self.map)
+    }
+
+    /// Refuses a frame whose colours are those at rest only in another order: a touch changes some of the skin, never all of it so.
+    fn check_colours(&self) -> Result<(), ShapeError> {
+        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+        let mut off = [0.0_f32; 6];
+        for (cell, level) in self.levels.iter().enumerate().step_by(COLOUR_STEP) {
+            if !self.view.is_dome[cell] || self.covered[cell] {
+                continue;
+            }
+            let expected = self.light.passed(self.view.ray[cell].z) * self.light.still(self.view.place[cell]);
+            let at_rest = self.gain[cell] * expected;
+            let seen = level.light - Vec3A::splat(self.light.stray);
+            for (off, order) in off.iter_mut().zip(ORDERS) {
+                let difference = (Vec3A::new(seen[order[0]], seen[order[1]], seen[order[2]]) - at_rest).abs();
+                *off += if difference.is_finite() { difference.element_sum() } else { 0.0 };
+            }
+        }
+        let least = off.into_iter().fold(f32::INFINITY, f32::min);
+        if least < OTHER_ORDER * off[0] {
+            let problem = "has its colours in another order than the frame at rest";
+            let cure = "give both in the same order: red, green, blue, or say which (--raw ..:rgb or :bgr; rgb=False)";
+            return Err(ShapeError::new("frame", problem, cure));
+        }
+        Ok(())
     }
 
     /// How readings turn with depth, on the undeformed dome: with it the light need not be taken again and again.

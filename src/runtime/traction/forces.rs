@@ -4,9 +4,10 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::active_set::{ActiveSet, Ended, Rows};
 use super::model::{AXES, ElasticModel};
-use super::posterior::{Posterior, USUAL_DOT_SD_PX};
+use super::posterior::Posterior;
 use super::pressure_room::PressureRoom;
 use super::result::{DotTraction, LocalForces, TractionStatus};
+use super::seen_dots::Dot;
 use crate::constants::Constants;
 use crate::shape::ShapeMap;
 use crate::track::TrackError;
@@ -16,19 +17,11 @@ use domecast_optics::numeric::Rigid;
 
 /// Turns of the forces with the skin, and of the rays with its motion, in a frame: each leaves a few hundredths.
 const TURNS: u32 = 3;
-/// What the elastic model may be off, as a part of each dot's motion: coarse elements and small strain.
-const MODEL_PART: f64 = 0.05;
-/// Least standard deviation of a dot on each axis, px: what `track` is off by on clean frames, which its noise does not say.
-const MIN_DOT_SD_PX: f64 = 0.01;
-/// Dots whose motions' sum of squares is no more than so many deviations over that of noise have not moved.
-const MIN_MOTION_OVER_SD: f64 = 4.0;
 /// How closely the forces must add to the wrench beside its own noise: a part of the force, and least, N; moments by the dome's radius.
 const WRENCH_PART: f64 = 0.002;
 const MIN_WRENCH_SD_N: f64 = 0.001;
 /// Variance of shear over that of pressure: friction of a half or so, slipping seldom.
 const SHEAR_RATIO: f64 = 0.09;
-/// Dots at least that must be seen.
-const MIN_DOTS: usize = 8;
 /// The softness is looked for where the force is so many of its deviations.
 const SOFTNESS_OVER_SD: f64 = 20.0;
 /// Bounds of the dome's softness against the constants.
@@ -43,7 +36,7 @@ pub struct ForceDistribution {
     pub(super) model: ElasticModel,
     pub(super) set: ActiveSet,
     pub(super) posterior: Posterior,
-    dots: Vec<Dot>,
+    pub(super) dots: Vec<Dot>,
     pub(super) optics: SensorOptics,
     reference_mm: Option<DVec3>,
     pub(super) radius_mm: f64,
@@ -66,19 +59,8 @@ pub struct ForceDistribution {
     pub(super) room: PressureRoom,
     softness: f64,
     /// Whether the dots have moved by more than noise.
-    is_moved: bool,
+    pub(super) is_moved: bool,
     result: LocalForces,
-}
-
-/// A dot and how its image moves with it.
-#[derive(Debug, Clone)]
-struct Dot {
-    surface_mm: DVec3,
-    by_point: [DVec3; 2],
-    /// Its motion in the image by the forces so far, px, what is seen of it, and one over the deviation; 0 where it is not seen.
-    seen_px: DVec2,
-    linear_px: DVec2,
-    per_sd: f64,
 }
 
 impl ForceDistribution {
@@ -166,6 +148,11 @@ impl ForceDistribution {
             self.result.status = TractionStatus::NoMotion;
             return &self.result;
         };
+        if !self.is_ours(tracked) {
+            self.set.clear();
+            self.result.status = TractionStatus::ForeignReading;
+            return &self.result;
+        }
         let mut ended = Ended::Solved;
         self.softness = 1.0;
         self.move_skin();
@@ -197,25 +184,6 @@ impl ForceDistribution {
         };
         self.report(tracked);
         &self.result
-    }
-
-    /// Takes the dots of a frame; whether there are enough.
-    fn see(&mut self, tracked: &Tracked) -> bool {
-        let (mut count, mut over) = (0, 0.0);
-        for (dot, found) in self.dots.iter_mut().zip(&tracked.black_dots) {
-            dot.per_sd = 0.0;
-            let Some((now, rest)) = found.image_px.zip(found.undeformed_px) else { continue };
-            dot.seen_px = now - rest;
-            let sd_px = found.sd_px.unwrap_or(USUAL_DOT_SD_PX).max(MIN_DOT_SD_PX);
-            let off_px = MODEL_PART * dot.seen_px.length();
-            dot.per_sd = 1.0 / (sd_px * sd_px + off_px * off_px).sqrt();
-            over += dot.seen_px.length_squared() / (sd_px * sd_px);
-            count += 1;
-        }
-        // Of 2 n squares of noise the sum is 2 n, and the deviation of that the root of 4 n.
-        let squares = 2.0 * count as f64;
-        self.is_moved = over > squares + MIN_MOTION_OVER_SD * (2.0 * squares).sqrt();
-        count >= MIN_DOTS.min(self.dots.len())
     }
 
     /// The rows of a turn: dots, wrench, heights.

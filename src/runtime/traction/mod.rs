@@ -39,6 +39,7 @@ mod posterior;
 mod pressure;
 mod pressure_room;
 mod result;
+mod seen_dots;
 mod write;
 
 pub use forces::ForceDistribution;

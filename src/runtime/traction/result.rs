@@ -10,6 +10,8 @@ pub enum TractionStatus {
     Ok,
     /// The platform's pose or too many dots are not known: nothing is said.
     NoMotion,
+    /// The dots are not where those of these constants are: the reading is another sensor's. Nothing is said.
+    ForeignReading,
     /// A bound on steps or loaded nodes was reached: the numbers are the last ones.
     NotConverged,
 }
@@ -20,6 +22,7 @@ impl TractionStatus {
         match self {
             Self::Ok => "ok",
             Self::NoMotion => "no_motion",
+            Self::ForeignReading => "foreign_reading",
             Self::NotConverged => "not_converged",
         }
     }

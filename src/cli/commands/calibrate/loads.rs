@@ -236,6 +236,11 @@ pub fn looks_like(
     knowledge: &SpringKnowledge,
     surprise: impl Fn(&SpringKnowledge, &Load) -> Option<f64>,
 ) -> Option<String> {
+    // before all: of a small load every unit that makes it smaller would do
+    let none = Load { force_n: 1e-6 * load.force_n, ..*load };
+    if surprise(knowledge, &none).is_some_and(|surprise| surprise < EXPLAINED) {
+        return Some("no load at all: does it hang free?".into());
+    }
     let mut others: Vec<(Load, String)> = Vec::new();
     let times = [
         (1e3, "kg instead of g"),

@@ -83,15 +83,29 @@ fn lost_dots_are_found_again_under_their_own_names() {
         let drawn = drawn(&picture);
         let tracked = tracker.track(number, &frame(&drawn.bytes));
         let s = score(tracked, &drawn);
-        assert_eq!(s.ok, s.wanted, "frame {number}");
+        // Bare skin where dots were: those beside it may be them.
+        let unsure = ids(MarkState::IdentityUnsure, tracked);
+        assert_eq!(s.ok + unsure.len(), s.wanted, "frame {number}");
+        assert!(
+            unsure.iter().all(|dot| gone && hidden.iter().any(|other| is_beside(*dot, *other))),
+            "{unsure:?}"
+        );
         assert!(s.worst_px < 0.15, "frame {number} {}", s.worst_px);
         assert_eq!(
             ids(MarkState::Lost, tracked),
             if gone { hidden.clone() } else { vec![] },
             "frame {number}"
         );
-        assert_eq!(names(tracked), if gone { vec!["dots_lost"] } else { vec![] }, "frame {number}");
+        let named = names(tracked).into_iter().filter(|name| *name != "identity_unsure").collect::<Vec<_>>();
+        assert_eq!(named, if gone { vec!["dots_lost"] } else { vec![] }, "frame {number}");
     }
+}
+
+/// Whether two dots are neighbours in the image of the sensor at rest.
+fn is_beside(one: u32, other: u32) -> bool {
+    let at =
+        |id: u32| SENSOR.constants.black_dots.iter().find(|dot| dot.id as u32 == id).map(|dot| dot.image_px);
+    at(one).zip(at(other)).is_some_and(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) < 30.0)
 }
 
 #[test]

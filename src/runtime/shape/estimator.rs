@@ -259,8 +259,8 @@ impl ShapeFromColor {
                 *off += if difference.is_finite() { difference.element_sum() } else { 0.0 };
             }
         }
-        let least = off.into_iter().fold(f32::INFINITY, f32::min);
-        if least < OTHER_ORDER * off[0] {
+        let smallest = off.into_iter().fold(f32::INFINITY, f32::min);
+        if smallest < OTHER_ORDER * off[0] {
             let problem = "has its colours in another order than the frame at rest";
             let cure = "give both in the same order: red, green, blue, or say which (--raw ..:rgb or :bgr; rgb=False)";
             return Err(ShapeError::new("frame", problem, cure));

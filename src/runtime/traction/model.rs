@@ -1,6 +1,6 @@
 //! The elastic dome as the tracker needs it: what a pressure on each of its nodes moves, and what pressures are likely.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -30,6 +30,17 @@ pub(super) struct Node {
     pub axes: DMat3,
     /// Nodes beside it with the weights that give the skin's derivatives along the second and third axis.
     pub beside: Vec<(usize, f64, f64)>,
+}
+
+/// A dot and how its image moves with it.
+#[derive(Debug, Clone)]
+pub(super) struct Dot {
+    pub surface_mm: DVec3,
+    pub by_point: [DVec3; 2],
+    /// Its motion in the image by the forces so far, px, what is seen of it, and one over the deviation; 0 where it is not seen.
+    pub seen_px: DVec2,
+    pub linear_px: DVec2,
+    pub per_sd: f64,
 }
 
 /// What forces on the nodes move.

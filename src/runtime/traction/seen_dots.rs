@@ -1,8 +1,7 @@
 //! The dots of a reading, as the forces take them.
 
-use glam::{DVec2, DVec3};
-
 use super::forces::ForceDistribution;
+use super::model::Dot;
 use super::posterior::USUAL_DOT_SD_PX;
 use crate::track::{DotResult, Tracked};
 
@@ -16,17 +15,6 @@ const MIN_MOTION_OVER_SD: f64 = 4.0;
 const MIN_DOTS: usize = 8;
 /// From so many px on, an undeformed dot is not that of these constants: the two lie within some hundredths.
 const FOREIGN_PX: f64 = 2.0;
-
-/// A dot and how its image moves with it.
-#[derive(Debug, Clone)]
-pub(super) struct Dot {
-    pub surface_mm: DVec3,
-    pub by_point: [DVec3; 2],
-    /// Its motion in the image by the forces so far, px, what is seen of it, and one over the deviation; 0 where it is not seen.
-    pub seen_px: DVec2,
-    pub linear_px: DVec2,
-    pub per_sd: f64,
-}
 
 impl ForceDistribution {
     /// Whether the undeformed dots of a reading are where these constants have them; every eighth is asked.

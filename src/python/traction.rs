@@ -44,13 +44,7 @@ impl PyTraction {
         shape: Option<&PyShapeMap>,
     ) -> PyResult<PyForces> {
         let tracked = reading.tracked();
-        let forces = py.detach(|| {
-            let found = match shape {
-                Some(map) => self.forces.update_with_shape(tracked, map.map()),
-                None => self.forces.update(tracked),
-            };
-            found.clone()
-        });
+        let forces = py.detach(|| self.forces.update(tracked, shape.map(PyShapeMap::map)).clone());
         Ok(PyForces::new(forces, Arc::clone(tracked)))
     }
 

@@ -60,7 +60,7 @@ fn shape_and_forces_allocate_nothing_once_they_run() {
             let frame = &frames[number as usize % frames.len()];
             let tracked = tracker.track(number, frame);
             let map = shape.measure(frame, tracked).expect("a map");
-            forces.update_with_shape(tracked, map);
+            forces.update(tracked, Some(map));
             forces.draw_pressure(map, &mut pressure);
             assert_eq!(map.contact.is_some(), matches!(number % 4, 1 | 2), "frame {number}");
         }

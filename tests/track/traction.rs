@@ -41,7 +41,7 @@ fn forces_are_finite_whatever_is_seen_and_allocate_nothing_once_they_run() {
     let mut run = |numbers: std::ops::Range<u64>| {
         for number in numbers {
             let tracked = tracker.track(number, &frame(&frames[number as usize % 3].bytes));
-            let found = forces.update(tracked);
+            let found = forces.update(tracked, None);
             if found.status == TractionStatus::NoMotion {
                 assert!(found.dots.is_empty() && found.contact.is_none());
             }

@@ -74,10 +74,7 @@ impl Painter {
     fn tractions(&mut self, reading: &LiveReading) -> Vec<[[f64; 2]; 2]> {
         let tracked = &reading.tracked;
         let Some(forces) = &mut self.sensor.forces else { return Vec::new() };
-        let found = match reading.skin.as_deref() {
-            Some(skin) => forces.update_with_shape(tracked, skin),
-            None => forces.update(tracked),
-        };
+        let found = forces.update(tracked, reading.skin.as_deref());
         let Some(optics) = tracked.pose.and_then(|pose| self.sensor.optics.at_pose(&pose).ok()) else {
             return Vec::new();
         };

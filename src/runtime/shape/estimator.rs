@@ -13,7 +13,7 @@ use super::light::ShapeLight;
 use super::map::{ShapeMap, Skin};
 use super::marks::Marks;
 use super::normals::{self, CellReading};
-use super::rest::RestMap;
+use super::rest::{RestMap, Seen, seen};
 use super::system::{END_MM, SolveStatus, System};
 use super::volume::Volume;
 use crate::constants::Constants;
@@ -247,13 +247,10 @@ impl ShapeFromColor {
     fn check_colours(&self) -> Result<(), ShapeError> {
         const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
         let mut off = [0.0_f32; 6];
-        for (cell, level) in self.levels.iter().enumerate().step_by(COLOUR_STEP) {
-            if !self.view.is_dome[cell] || self.covered[cell] {
-                continue;
-            }
-            let expected = self.light.passed(self.view.ray[cell].z) * self.light.still(self.view.place[cell]);
+        for Seen { cell, expected, level: seen, .. } in
+            seen(&self.levels, &self.covered, &self.view, &self.light, COLOUR_STEP)
+        {
             let at_rest = self.gain[cell] * expected;
-            let seen = level.light - Vec3A::splat(self.light.stray);
             for (off, order) in off.iter_mut().zip(ORDERS) {
                 let difference = (Vec3A::new(seen[order[0]], seen[order[1]], seen[order[2]]) - at_rest).abs();
                 *off += if difference.is_finite() { difference.element_sum() } else { 0.0 };

@@ -30,21 +30,22 @@ pub(super) struct RestMap {
 }
 
 /// What a level says of one place.
-struct Seen {
-    cell: usize,
+pub(super) struct Seen {
+    pub cell: usize,
     ratio: Vec3A,
-    expected: Vec3A,
-    level: Vec3A,
+    pub expected: Vec3A,
+    pub level: Vec3A,
 }
 
-/// Ratio of picture and light at the cells that see the bare membrane.
-fn seen<'a>(
+/// Ratio of picture and light at the cells that see the bare membrane, of each `step` one.
+pub(super) fn seen<'a>(
     levels: &'a [Level],
     covered: &'a [bool],
     view: &'a View,
     light: &'a ShapeLight,
+    step: usize,
 ) -> impl Iterator<Item = Seen> + 'a {
-    let cells = levels.iter().zip(covered).enumerate();
+    let cells = levels.iter().zip(covered).enumerate().step_by(step);
     cells.filter(|(i, (_, is_covered))| view.is_dome[*i] && !**is_covered).filter_map(|(cell, (level, _))| {
         let expected = light.passed(view.ray[cell].z) * light.still(view.place[cell]);
         let level_there = level.light - Vec3A::splat(light.stray);
@@ -107,7 +108,7 @@ impl RestMap {
         light: &ShapeLight,
         noise: Vec3A,
     ) -> Result<Self, ShapeError> {
-        let seen: Vec<Seen> = seen(levels, covered, view, light).collect();
+        let seen: Vec<Seen> = seen(levels, covered, view, light, 1).collect();
         let medians = medians(&seen);
         check(&seen, medians)?;
         let falloff = falloff(&seen, cells);

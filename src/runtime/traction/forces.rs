@@ -121,16 +121,12 @@ impl ForceDistribution {
         &self.result
     }
 
-    /// The forces in a frame, from its dots and wrench alone.
-    pub fn update(&mut self, tracked: &Tracked) -> &LocalForces {
-        self.find(tracked, None)
-    }
-
-    /// The forces in a frame whose skin is measured: they press where it is touched, and as deep as it is. `map` is the same
-    /// frame's ([`ShapeFromColor`](crate::shape::ShapeFromColor)).
-    pub fn update_with_shape(&mut self, tracked: &Tracked, map: &ShapeMap) -> &LocalForces {
-        self.find(tracked, Some(map));
-        if let (Some(contact), Some(seen)) = (&mut self.result.contact, &map.contact) {
+    /// The forces in a frame, from its dots and wrench; where its skin is measured they press where that is touched, and as deep as it
+    /// is. `map` is the same frame's ([`ShapeFromColor`](crate::shape::ShapeFromColor)).
+    pub fn update(&mut self, tracked: &Tracked, map: Option<&ShapeMap>) -> &LocalForces {
+        self.find(tracked, map);
+        let seen = map.and_then(|map| map.contact.as_ref());
+        if let (Some(contact), Some(seen)) = (&mut self.result.contact, seen) {
             // Finer than the nodes, and as `draw_pressure` shares the force out.
             contact.point_mm = seen.point_mm;
         }

@@ -13,7 +13,7 @@
 //! let mut forces = ForceDistribution::new(&constants, None)?;
 //! let bytes = std::fs::read("frame.rgb")?;
 //! let tracked = tracker.track(0, &CameraFrame::new(640, 480, 3, &bytes)?);
-//! for dot in &forces.update(tracked).dots {
+//! for dot in &forces.update(tracked, None).dots {
 //!     println!("{} N/mm2 at {}", dot.traction_n_mm2, dot.surface_mm);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -41,6 +41,9 @@ mod pressure_room;
 mod result;
 mod seen_dots;
 mod write;
+
+/// Over how far pressures are taken to be alike where the skin's heights are measured, mm: those tell pressures apart that dots do not.
+pub const SHAPE_CORRELATION_MM: f64 = 1.0;
 
 pub use forces::ForceDistribution;
 pub use pressure::PressureMap;

@@ -11,7 +11,6 @@ use std::time::{Duration, Instant};
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
 use super::recording::{Recording, RecordingPace};
-use super::track::SHAPE_CORRELATION_MM;
 use domecast_files::StopWish;
 use domecast_live::decode::picture;
 use domecast_live::frame_files::read_whole;
@@ -21,7 +20,7 @@ use domecast_live::{HeightReader, LiveEvent, LiveReader};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeFromColor, ShapeOptions};
 use domecast_runtime::track::{CameraFrame, Tracker};
-use domecast_runtime::traction::ForceDistribution;
+use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
 use session::{Outlets, Session};
 
 pub use arguments::{LiveArguments, milliseconds, rate};

@@ -16,9 +16,8 @@ use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
 use domecast_live::decode::Picture;
 use domecast_runtime::constants::Constants;
-use domecast_runtime::shape::ShapeMap;
 use domecast_runtime::track::{CameraFrame, CameraTurn, Tracked, Tracker};
-use domecast_runtime::traction::ForceDistribution;
+use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
 use results::Results;
 use source::FrameSource;
 use tally::Tally;
@@ -66,25 +65,13 @@ fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
     named.map(PathBuf::as_path).collect()
 }
 
-/// Over how far pressures are taken to be alike where the skin's heights are measured, mm.
-pub const SHAPE_CORRELATION_MM: f64 = 1.0;
-
 fn forces_of(
     arguments: &TrackArguments,
     constants: &Constants,
 ) -> Result<Option<ForceDistribution>, Failure> {
-    // Heights tell pressures apart that dots do not.
     let correlation_mm = arguments.shape.is_some().then_some(SHAPE_CORRELATION_MM);
     let forces = arguments.traction.then(|| ForceDistribution::new(constants, correlation_mm));
     forces.transpose().map_err(|e| arguments.unfit(&e))
-}
-
-/// Finds the forces of a frame, with its heights where they are measured.
-fn press(forces: &mut ForceDistribution, tracked: &Tracked, skin: Option<&ShapeMap>) {
-    match skin {
-        Some(skin) => forces.update_with_shape(tracked, skin),
-        None => forces.update(tracked),
-    };
 }
 
 fn frame_of(picture: &Result<Picture, String>) -> Result<CameraFrame<'_>, String> {
@@ -133,7 +120,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             results.measure(frame, tracked)?;
         }
         if let Some(forces) = &mut forces {
-            press(forces, tracked, results.skin().filter(|_| picture.is_ok()));
+            forces.update(tracked, results.skin().filter(|_| picture.is_ok()));
         }
         if picture.is_ok() {
             tally.times.push(began.elapsed());

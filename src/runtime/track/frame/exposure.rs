@@ -20,8 +20,11 @@ const MIN_JUMP: f64 = 1.2;
 /// again, coded anew; below so many levels a camera has no noise to tell.
 const SAME_PART: f64 = 0.5;
 const MIN_CHANGE: f64 = 0.2;
-/// The least change so far is given up by this part a frame: light and gain change.
+/// The least change so far is given up by this part a frame, up or down: light and gain change.
 const FORGOTTEN: f64 = 0.02;
+/// How two frames differ is the mean over this part of the samples, those that differ least: what moves through a picture
+/// says nothing of its noise.
+const QUIET_PART: f64 = 0.75;
 
 /// Takes the exposure of frames; keeps the last frame's samples.
 #[derive(Debug, Clone, Default)]
@@ -101,14 +104,26 @@ impl ExposureMeter {
 
     /// Whether the samples are the last ones, but for less than what always changes between two frames.
     fn is_same(&mut self) -> bool {
-        let apart = self.samples.iter().zip(&self.before).map(|(a, b)| u64::from(a.abs_diff(*b)));
-        let change = apart.sum::<u64>() as f64 / self.samples.len() as f64;
-        if change == 0.0 {
+        let mut counts = [0_u64; 256];
+        for (a, b) in self.samples.iter().zip(&self.before) {
+            counts[usize::from(a.abs_diff(*b))] += 1;
+        }
+        if counts[0] == self.samples.len() as u64 {
             return true;
         }
+        let quiet = (self.samples.len() as f64 * QUIET_PART).max(1.0) as u64;
+        let (mut left, mut sum) = (quiet, 0);
+        for (apart, count) in counts.into_iter().enumerate() {
+            let taken = count.min(left);
+            sum += taken * apart as u64;
+            left -= taken;
+        }
+        let change = sum as f64 / quiet as f64;
         let so_far = self.min_change.unwrap_or(change);
-        self.min_change = Some(change.min(so_far * (1.0 + FORGOTTEN)));
-        so_far > MIN_CHANGE && change < SAME_PART * so_far
+        let is_same = so_far > MIN_CHANGE && change < SAME_PART * so_far;
+        self.min_change =
+            Some(if is_same { so_far * (1.0 - FORGOTTEN) } else { change.min(so_far * (1.0 + FORGOTTEN)) });
+        is_same
     }
 
     /// Forgets the last frame.

@@ -9,8 +9,10 @@ use super::dot_track::DotTrack;
 use crate::track::marks::{DarkSpot, MarkState, SpotOutline};
 use crate::track::model::DotModel;
 
-/// Dots around one that its size and its sides are compared with.
+/// Dots around one that its size and its sides are compared with. Where there are fewer than so many, what is usual in the
+/// frame stands for the others: at the rim two smeared neighbours of three would make a third.
 const MAX_AROUND: usize = 8;
+const MIN_AROUND: usize = 5;
 /// What shape, size and sides may differ by at least before it counts: prints and touches do as much.
 const FREE: [f64; 3] = [0.03, 0.06, 0.06];
 /// The same in parts of what is usual in the frame.
@@ -128,6 +130,12 @@ impl DotFaults {
                     }
                     count += 1;
                 }
+                while count < MIN_AROUND {
+                    for (list, value) in around.iter_mut().zip(frame) {
+                        list[count] = value;
+                    }
+                    count += 1;
+                }
                 let around = around.map(|mut list| median(&mut list[..count]));
                 // A touch changes the dots around too, and dirt beside a dot is none on it: the likelier of both counts.
                 let beside = |k: usize| own[k] - around[k].unwrap_or(frame[k]);
@@ -198,6 +206,26 @@ mod tests {
             assert!(others.clone().count() == 29 && others.clone().all(|(_, track)| track.fault.is_none()));
             assert!(others.into_iter().all(|(_, track)| track.spot.unwrap().sd_px == 0.01), "{state:?}");
         }
+    }
+
+    #[test]
+    fn a_dot_at_the_rim_is_named_though_two_of_its_three_neighbours_are_spoilt_alike() {
+        let outline = SpotOutline { radius_px: 4.0, area_px: 50.0, spread_px2: 8.0, elongation: DVec2::ZERO };
+        let mut models = DotModel::lattice(6, 5, 20.0, outline);
+        // The middle of the left column, of whose neighbours the ones above and below are spoilt too.
+        let spoilt = [6, 12, 18];
+        models[12].neighbors = vec![6, 18, 13];
+        let mut tracks: Vec<DotTrack> = (0..models.len())
+            .map(|index| {
+                let mut spot =
+                    DarkSpot { area_px: 50.0, spread_px2: 8.0, sd_px: 0.01, ..DarkSpot::default() };
+                spot.area_px *= if spoilt.contains(&index) { 1.8 } else { 1.0 };
+                DotTrack { spot: Some(spot), outline, ..DotTrack::default() }
+            })
+            .collect();
+        DotFaults::new(models.len()).judge(&models, &mut tracks);
+        assert!(spoilt.iter().all(|index| tracks[*index].fault.is_some()));
+        assert_eq!(tracks.iter().filter(|track| track.fault.is_some()).count(), 3);
     }
 
     #[test]

@@ -9,10 +9,8 @@ use super::dot_track::DotTrack;
 use crate::track::marks::{DarkSpot, MarkState, SpotOutline};
 use crate::track::model::DotModel;
 
-/// Dots around one that its size and its sides are compared with. Where there are fewer than so many, what is usual in the
-/// frame stands for the others: at the rim two smeared neighbours of three would make a third.
+/// Dots around one that its size and its sides are compared with.
 const MAX_AROUND: usize = 8;
-const MIN_AROUND: usize = 5;
 /// What shape, size and sides may differ by at least before it counts: prints and touches do as much.
 const FREE: [f64; 3] = [0.03, 0.06, 0.06];
 /// The same in parts of what is usual in the frame.
@@ -23,6 +21,9 @@ const RADII_BY_PART: f64 = 0.5;
 /// Dots that may be farther off than this have no numbers: px, and in parts of the radius.
 const MAX_SD_PX: f64 = 0.2;
 const MAX_SD_RADII: f64 = 0.06;
+/// What is farther beyond the gate than this says nothing of what is usual around it: at the rim two smeared neighbours of
+/// three would vouch for a third.
+const GROSS: f64 = 1.5;
 /// Part of the spot's area that is brighter than the ground from which on it is glare.
 const GLARE: f64 = 0.01;
 /// What is smaller than it should be by this (logarithm of the area) is partly hidden.
@@ -37,6 +38,11 @@ pub(super) struct DotFaults {
     sides: Vec<Option<[f64; 3]>>,
     /// By how much shape, size and sides of each dot differ.
     unlike: Vec<Option<Unlike>>,
+    /// What no ellipse explains of the frame's dots, their size and sides: medians.
+    misfit: f64,
+    frame: [f64; 3],
+    /// Which dots are too far off to say what is usual around them.
+    is_gross: Vec<bool>,
     values: Vec<f64>,
 }
 
@@ -52,12 +58,27 @@ impl Unlike {
     fn parts(self) -> [f64; 3] {
         [self.misfit, self.area.abs(), self.elongation]
     }
+
+    /// Deviation of a centroid that it means, where so much is usual in the frame, px.
+    fn sd_px(self, usual: [f64; 3], radius_px: f64) -> f64 {
+        let mut square = 0.0;
+        for ((part, free), usual) in self.parts().into_iter().zip(FREE).zip(usual) {
+            let free = f64::max(free, FREE_OF_USUAL * usual);
+            square += (part - free).max(0.0).powi(2);
+        }
+        RADII_BY_PART * radius_px * square.sqrt()
+    }
 }
 
 /// Size and sides of a spot against its outline.
 fn sides_of(spot: &DarkSpot, outline: &SpotOutline) -> [f64; 3] {
     let elongation = spot.elongation_beside(outline);
     [(spot.area_px / outline.area_px).ln(), elongation.x, elongation.y]
+}
+
+/// What does not look like a dot: beside an ellipse, and beyond the window.
+fn misfit_of(spot: &DarkSpot) -> f64 {
+    spot.shape.misfit() + spot.shape.one_sided
 }
 
 /// The median, the mean of the two in the middle where there are two.
@@ -77,61 +98,75 @@ impl DotFaults {
             sides: Vec::with_capacity(dots),
             unlike: Vec::with_capacity(dots),
             values: Vec::with_capacity(dots),
+            ..Self::default()
         }
     }
 
     /// Adds to the deviation of each found dot what its looks mean, and names what is beyond the gate.
     pub fn judge(&mut self, models: &[DotModel], tracks: &mut [DotTrack]) {
-        self.compare(models, tracks);
-        let usual: [f64; 3] = std::array::from_fn(|k| {
-            self.values.clear();
-            self.values.extend(self.unlike.iter().flatten().map(|unlike| unlike.parts()[k].abs()));
-            median(&mut self.values).unwrap_or(0.0)
-        });
-        for (track, unlike) in tracks.iter_mut().zip(&self.unlike) {
+        for track in &mut *tracks {
             track.fault = None;
+        }
+        self.measure(tracks);
+        let mut usual = [0.0; 3];
+        // Then without the gross ones.
+        self.is_gross.clear();
+        self.is_gross.resize(tracks.len(), false);
+        for is_first in [true, false] {
+            self.compare(models, tracks);
+            if is_first {
+                usual = std::array::from_fn(|k| {
+                    self.values.clear();
+                    self.values.extend(self.unlike.iter().flatten().map(|unlike| unlike.parts()[k].abs()));
+                    median(&mut self.values).unwrap_or(0.0)
+                });
+            }
+            let judged = tracks.iter_mut().zip(&self.unlike).zip(&mut self.is_gross);
+            for ((track, unlike), is_gross) in judged {
+                let (Some(spot), Some(unlike)) = (&track.spot, unlike) else { continue };
+                let radius_px = (track.outline.area_px / std::f64::consts::PI).sqrt();
+                let over = unlike.sd_px(usual, radius_px) / f64::max(MAX_SD_PX, MAX_SD_RADII * radius_px);
+                if over > 1.0 {
+                    track.fault = Some(reason(spot, *unlike));
+                }
+                *is_gross |= over > GROSS;
+            }
+            if !self.is_gross.contains(&true) {
+                break;
+            }
+        }
+        for (track, unlike) in tracks.iter_mut().zip(&self.unlike) {
             let (Some(spot), Some(unlike)) = (&mut track.spot, unlike) else { continue };
-            let mut square = 0.0;
-            for ((part, free), usual) in unlike.parts().into_iter().zip(FREE).zip(usual) {
-                square += (part - f64::max(free, FREE_OF_USUAL * usual)).max(0.0).powi(2);
-            }
-            if square == 0.0 {
-                continue;
-            }
             let radius_px = (track.outline.area_px / std::f64::consts::PI).sqrt();
-            let sd_px = RADII_BY_PART * radius_px * square.sqrt();
-            spot.sd_px = spot.sd_px.hypot(sd_px);
-            if sd_px > f64::max(MAX_SD_PX, MAX_SD_RADII * radius_px) {
-                track.fault = Some(reason(spot, *unlike));
-            }
+            spot.sd_px = spot.sd_px.hypot(unlike.sd_px(usual, radius_px));
         }
     }
 
-    /// Each dot against the frame and the dots around it.
-    fn compare(&mut self, models: &[DotModel], tracks: &[DotTrack]) {
+    /// What is usual in the frame.
+    fn measure(&mut self, tracks: &[DotTrack]) {
         self.values.clear();
-        self.values.extend(tracks.iter().filter_map(|track| Some(track.spot?.shape.misfit())));
-        let misfit = median(&mut self.values).unwrap_or(0.0);
+        self.values.extend(tracks.iter().filter_map(|track| Some(misfit_of(&track.spot?))));
+        self.misfit = median(&mut self.values).unwrap_or(0.0);
         self.sides.clear();
         self.sides.extend(tracks.iter().map(|track| Some(sides_of(&track.spot?, &track.outline))));
-        let frame: [f64; 3] = std::array::from_fn(|k| {
+        self.frame = std::array::from_fn(|k| {
             self.values.clear();
             self.values.extend(self.sides.iter().flatten().map(|sides| sides[k]));
             median(&mut self.values).unwrap_or(0.0)
         });
+    }
+
+    /// Each dot against the frame and the dots around it.
+    fn compare(&mut self, models: &[DotModel], tracks: &[DotTrack]) {
+        let (misfit, frame) = (self.misfit, self.frame);
         self.unlike.clear();
         for (index, model) in models.iter().enumerate() {
             let unlike = self.sides[index].zip(tracks[index].spot).map(|(own, spot)| {
                 let mut around = [[0.0; MAX_AROUND]; 3];
                 let mut count = 0;
-                for sides in model.neighbors.iter().filter_map(|other| self.sides[*other]).take(MAX_AROUND) {
+                let sound = model.neighbors.iter().filter(|other| !self.is_gross[**other]);
+                for sides in sound.filter_map(|other| self.sides[*other]).take(MAX_AROUND) {
                     for (list, value) in around.iter_mut().zip(sides) {
-                        list[count] = value;
-                    }
-                    count += 1;
-                }
-                while count < MIN_AROUND {
-                    for (list, value) in around.iter_mut().zip(frame) {
                         list[count] = value;
                     }
                     count += 1;
@@ -142,7 +177,7 @@ impl DotFaults {
                 let alone = |k: usize| own[k] - frame[k];
                 let area = if beside(0).abs() < alone(0).abs() { beside(0) } else { alone(0) };
                 let elongation = beside(1).hypot(beside(2)).min(alone(1).hypot(alone(2)));
-                Unlike { misfit: spot.shape.misfit() - misfit, area, elongation }
+                Unlike { misfit: misfit_of(&spot) - misfit, area, elongation }
             });
             self.unlike.push(unlike);
         }

@@ -27,6 +27,9 @@ pub struct SpotShape {
     pub under: f64,
     /// The part of that which is brighter than the ground.
     pub bright: f64,
+    /// How one-sided what is dark at the window's rim is, in parts of the circumference: something that is larger than a
+    /// dot, of which the window shows a part that looks like one.
+    pub one_sided: f64,
     /// Centroid of its odd rows less that of its even ones, px.
     pub odd_rows_px: DVec2,
 }
@@ -92,7 +95,7 @@ pub(super) fn shape_of(window: &SoftWindow<'_>, contrast: f64, is_first_odd: boo
     let form = [yy * per, -m.xy * per, xx * per].map(|v| v as f32);
     let half_px = SMOOTHSTEP * edge_px.clamp(EDGE_PX.start, EDGE_PX.end);
     let rest = residuals(window, contrast as f32, form, radius_px as f32, half_px as f32);
-    let [over, under, bright, odd_x, odd_y] = rest;
+    let [over, under, bright, odd_x, odd_y, rim_x, rim_y] = rest;
     let side = if is_first_odd { -1.0 } else { 1.0 };
     let shape = SpotShape {
         elongation,
@@ -100,25 +103,31 @@ pub(super) fn shape_of(window: &SoftWindow<'_>, contrast: f64, is_first_odd: boo
         over: over / area_px,
         under: under / area_px,
         bright: bright / area_px,
+        one_sided: rim_x.hypot(rim_y) / window.rim_px2(),
         // Each half of the rows has half of the area.
         odd_rows_px: DVec2::new(odd_x, odd_y) * (2.0 * side / area_px),
     };
-    let is_finite = shape.misfit().is_finite() && edge_px.is_finite() && shape.odd_rows_px.is_finite();
+    let is_finite = shape.misfit().is_finite()
+        && shape.one_sided.is_finite()
+        && edge_px.is_finite()
+        && shape.odd_rows_px.is_finite();
     is_finite.then_some(shape)
 }
 
-/// Sums of what is darker than a soft ellipse, brighter, and brighter than the ground, in parts of the contrast; and first
+/// Sums of what is darker than a soft ellipse, brighter, and brighter than the ground, in parts of the contrast; first
 /// moments of the window's odd rows less those of its even ones, of what is left beside the ellipse: sharp dots alone put
-/// their odd rows up to 0.4 px above or below the even ones, by where they lie on the rows.
+/// their odd rows up to 0.4 px above or below the even ones, by where they lie on the rows; and first moments of what is dark
+/// at the window's rim.
 fn residuals(
     window: &SoftWindow<'_>,
     contrast: f32,
     [a, b, c]: [f32; 3],
     radius_px: f32,
     half_px: f32,
-) -> [f64; 5] {
+) -> [f64; 7] {
     let (per, per_edge) = (1.0 / contrast, 0.5 / half_px);
     let [mut overs, mut unders, mut brights, mut odd_xs, mut odd_ys] = [[0.0_f32; LANES]; 5];
+    let [mut rim_xs, mut rim_ys] = [[0.0_f32; LANES]; 2];
     for row in window.rows() {
         let side = if row.index % 2 == 0 { -1.0 } else { 1.0 };
         let (bdy, cdy) = (2.0 * b * row.dy, c * row.dy * row.dy);
@@ -135,10 +144,13 @@ fn residuals(
                 brights[k] += weight * (BRIGHT - value).max(0.0);
                 odd_xs[k] += side * rest * dx;
                 odd_ys[k] += side * rest * row.dy;
+                let rim = weight * (1.0 - weight) * value;
+                rim_xs[k] += rim * dx;
+                rim_ys[k] += rim * row.dy;
             }
         }
     }
-    [overs, unders, brights, odd_xs, odd_ys].map(|lanes| f64::from(lanes.iter().sum::<f32>()))
+    [overs, unders, brights, odd_xs, odd_ys, rim_xs, rim_ys].map(|lanes| f64::from(lanes.iter().sum::<f32>()))
 }
 
 #[cfg(test)]

@@ -39,6 +39,13 @@ impl<'a> SoftWindow<'a> {
         }
     }
 
+    /// What the first moment of the rim, each pixel by its weight times what it lacks of the whole, would be if all of it lay
+    /// on one side, px^2: over the pixel that the window takes to end, the weight times the rest is a sixth in the mean.
+    pub fn rim_px2(&self) -> f64 {
+        let reach_px = 0.5 / f64::from(self.per);
+        std::f64::consts::TAU * reach_px * reach_px / 6.0
+    }
+
     /// Its rows from the top.
     #[inline(always)]
     pub fn rows(&self) -> impl Iterator<Item = WindowRow<'_>> {

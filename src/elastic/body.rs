@@ -100,8 +100,8 @@ impl BondedBody {
         let mut values = Vec::with_capacity(rows.len());
         for column in 0..self.unknowns() {
             let alive = self.lives(column, m);
-            for at in columns[column]..columns[column + 1] {
-                let row = rows[at];
+            let range = columns[column]..columns[column + 1];
+            for (at, &row) in range.clone().zip(&rows[range]) {
                 values.push(if alive && self.lives(row, m) {
                     sweep * (self.values[0][at] + h * (self.values[1][at] + h * self.values[2][at]))
                 } else {

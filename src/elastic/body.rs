@@ -2,10 +2,7 @@
 
 use std::f64::consts::PI;
 
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Mat, Side};
-
+use crate::cholesky::{Cholesky, Elimination};
 use crate::dome::{ElasticDome, FactorError};
 use crate::element::{DOFS, stiffness};
 use crate::mesh::Meridian;
@@ -14,10 +11,8 @@ use crate::mesh::Meridian;
 #[derive(Debug)]
 pub struct BondedBody {
     pub(crate) mesh: Meridian,
-    columns: Vec<usize>,
-    rows: Vec<usize>,
+    cholesky: Cholesky,
     values: [Vec<f64>; 3],
-    symbolic: SymbolicLlt<usize>,
     /// What each unknown is at each harmonic.
     kinds: Vec<Kind>,
 }
@@ -30,11 +25,6 @@ enum Kind {
     Never,
     /// On the axis: alive in this harmonic only.
     Only(usize),
-}
-
-/// The factors of one harmonic.
-pub(crate) struct Harmonic {
-    factors: Llt<usize, f64>,
 }
 
 impl BondedBody {
@@ -84,11 +74,8 @@ impl BondedBody {
                 }
             }
         }
-        let n = 3 * nodes;
-        let view = SymbolicSparseColMatRef::new_checked(n, n, &columns, None, &rows);
-        let symbolic =
-            SymbolicLlt::try_new(view, Side::Lower).map_err(|error| FactorError(format!("{error:?}")))?;
-        Ok(Self { mesh, columns, rows, values, symbolic, kinds })
+        let cholesky = Cholesky::new(columns, rows, Elimination::MinimumDegree)?;
+        Ok(Self { mesh, cholesky, values, kinds })
     }
 
     /// Unknowns of one harmonic.
@@ -96,7 +83,8 @@ impl BondedBody {
         self.kinds.len()
     }
 
-    fn lives(&self, unknown: usize, m: usize) -> bool {
+    /// Whether a harmonic has an unknown.
+    pub(crate) fn lives(&self, unknown: usize, m: usize) -> bool {
         match self.kinds[unknown] {
             Kind::Free => true,
             Kind::Never => false,
@@ -108,11 +96,12 @@ impl BondedBody {
     fn matrix(&self, m: usize) -> Vec<f64> {
         let sweep = if m == 0 { 2.0 * PI } else { PI };
         let h = m as f64;
-        let mut values = Vec::with_capacity(self.rows.len());
+        let (columns, rows) = (self.cholesky.columns(), self.cholesky.rows());
+        let mut values = Vec::with_capacity(rows.len());
         for column in 0..self.unknowns() {
             let alive = self.lives(column, m);
-            for at in self.columns[column]..self.columns[column + 1] {
-                let row = self.rows[at];
+            let range = columns[column]..columns[column + 1];
+            for (at, &row) in range.clone().zip(&rows[range]) {
                 values.push(if alive && self.lives(row, m) {
                     sweep * (self.values[0][at] + h * (self.values[1][at] + h * self.values[2][at]))
                 } else {
@@ -123,18 +112,14 @@ impl BondedBody {
         values
     }
 
-    /// Factors one harmonic.
-    pub fn factor(&self, m: usize) -> Result<Harmonic, FactorError> {
-        let values = self.matrix(m);
-        let n = self.unknowns();
-        let view = SymbolicSparseColMatRef::new_checked(n, n, &self.columns, None, &self.rows);
-        let factors = Llt::try_new_with_symbolic(
-            self.symbolic.clone(),
-            SparseColMatRef::new(view, &values),
-            Side::Lower,
-        )
-        .map_err(|error| FactorError(format!("harmonic {m}: {error:?}")))?;
-        Ok(Harmonic { factors })
+    /// Solves one harmonic in place, for right sides one after the other.
+    pub(crate) fn solve(&self, m: usize, rhs: &mut [f64]) -> Result<(), FactorError> {
+        let factors = self
+            .cholesky
+            .factor(&self.matrix(m))
+            .map_err(|FactorError(why)| FactorError(format!("harmonic {m}: {why}")))?;
+        self.cholesky.solve(&factors, rhs);
+        Ok(())
     }
 
     /// The unknowns of surface node `p` in the direction r, z or phi (0, 1, 2), with weights.
@@ -142,25 +127,6 @@ impl BondedBody {
         let node = self.mesh.surface[p] as usize;
         // At the pole u_phi = -s.
         if p == 0 && direction == 2 { (3 * node, -1.0) } else { (3 * node + direction, 1.0) }
-    }
-
-    /// Puts zeros where a harmonic has no unknown.
-    pub(crate) fn mask(&self, m: usize, rhs: &mut Mat<f64>) {
-        for row in 0..self.unknowns() {
-            if !self.lives(row, m) {
-                for column in 0..rhs.ncols() {
-                    rhs[(row, column)] = 0.0;
-                }
-            }
-        }
-    }
-}
-
-impl Harmonic {
-    /// Solves in place.
-    pub fn solve(&self, rhs: &mut Mat<f64>) {
-        use faer::linalg::solvers::Solve;
-        self.factors.solve_in_place(rhs.as_mut());
     }
 }
 

@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use faer::Mat;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -170,15 +169,17 @@ pub(crate) fn harmonic(
             ring_load(grid, &hats[ring], ring, column % AXES, m)
         })
         .collect();
-    let mut rhs = Mat::<f64>::zeros(body.unknowns(), AXES * rings);
+    let n = body.unknowns();
+    let mut rhs = vec![0.0; n * AXES * rings];
     for (column, load) in loads.iter().enumerate() {
         for &((p, direction), part) in load {
             let (unknown, sign) = body.surface_unknown(p, direction);
-            rhs[(unknown, column)] += sign * part;
+            if body.lives(unknown, m) {
+                rhs[column * n + unknown] += sign * part;
+            }
         }
     }
-    body.mask(m, &mut rhs);
-    body.factor(m)?.solve(&mut rhs);
+    body.solve(m, &mut rhs)?;
     let surface = 2 * grid.elements + 1;
     let mut columns = Vec::with_capacity(AXES * rings);
     for column in 0..AXES * rings {
@@ -186,7 +187,7 @@ pub(crate) fn harmonic(
         for p in 0..surface {
             for axis in 0..AXES {
                 let (unknown, sign) = body.surface_unknown(p, axis);
-                values.push(sign * rhs[(unknown, column)]);
+                values.push(sign * rhs[column * n + unknown]);
             }
         }
         columns.push(values);

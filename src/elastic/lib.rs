@@ -7,6 +7,7 @@
 
 mod between;
 mod body;
+mod cholesky;
 mod compliance;
 mod dome;
 mod element;
@@ -16,6 +17,7 @@ mod mesh;
 mod revolved;
 
 pub use between::{NodeParts, NodePlaces, Row};
+pub use cholesky::{Cholesky, Elimination, Factors};
 pub use compliance::Compliance;
 pub use dome::{ElasticDome, Extent, FactorError};
 pub use field::SurfaceField;

@@ -10,9 +10,6 @@ use serde::{Deserialize, Serialize};
 /// Gap between two intervals, as a share of the ray, that is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Hollows that one ray may meet ahead of its free part; no platform comes near it, and more count as material.
-const WAITING: usize = 64;
-
 /// By what a hollow's box is wider than it is, mm: a ray along its face still meets it.
 const WIDER_MM: f64 = 1e-6;
 
@@ -96,57 +93,30 @@ impl Cavities {
     }
 }
 
-/// Hollows that the rays of a box may meet.
+/// Hollows that the rays of a box may meet; those first that carried the last ray on, for rays beside it mostly meet the same.
 #[derive(Debug)]
 pub struct NearHollows<'a>(Vec<&'a Hollow>);
 
 impl NearHollows<'_> {
-    /// The same, in the order in which a ray meets them: rays beside it mostly meet the same, and end before the others are asked.
-    pub fn sorted_along(mut self, from_mm: DVec3, to_mm: DVec3) -> Self {
-        self.0.sort_by_cached_key(|hollow| {
-            // What is entered earlier first; of numbers that are not negative the bits are in order.
-            hollow.interval(from_mm, to_mm).map_or(u64::MAX, |(enter, _)| enter.to_bits())
-        });
-        self
-    }
-
     /// [`Cavities::is_free`] for a ray inside the box.
-    pub fn is_free(&self, from_mm: DVec3, to_mm: DVec3) -> bool {
-        // Each hollow that the front lies in carries it on to its far side; when no hollow does, it is blocked.
-        // Hollows that lie further on wait for it.
-        let mut waiting = [(0.0_f64, 0.0_f64); WAITING];
-        let mut count = 0;
+    pub fn is_free(&mut self, from_mm: DVec3, to_mm: DVec3) -> bool {
+        // A hollow that the front lies in carries it on to its far side; where no other hollow does, it is blocked.
         let mut front = 0.0;
-        let (low, high) = (from_mm.min(to_mm), from_mm.max(to_mm));
-        for hollow in &self.0 {
-            if !(low.cmple(hollow.high_mm) & high.cmpge(hollow.low_mm)).all() {
-                continue;
-            }
-            let Some((enter, leave)) = hollow.interval(from_mm, to_mm) else { continue };
-            if enter <= front + ROUNDING {
-                front = leave.max(front);
-                if front >= 1.0 - ROUNDING {
-                    return true;
-                }
-            } else if count < WAITING {
-                waiting[count] = (enter, leave);
-                count += 1;
-            }
-        }
-        loop {
-            let before = front;
-            for &(enter, leave) in &waiting[..count] {
-                if enter <= front + ROUNDING {
-                    front = leave.max(front);
-                }
-            }
+        for carried in 0..self.0.len() {
+            let front_mm = from_mm.lerp(to_mm, front);
+            let next = self.0.iter().enumerate().skip(carried).find_map(|(k, hollow)| {
+                let (enter, leave) =
+                    hollow.box_holds(front_mm).then(|| hollow.interval(from_mm, to_mm)).flatten()?;
+                (enter <= front + ROUNDING && leave > front).then_some((k, leave))
+            });
+            let Some((k, leave)) = next else { return false };
+            front = leave;
+            self.0.swap(carried, k);
             if front >= 1.0 - ROUNDING {
                 return true;
             }
-            if front <= before {
-                return false;
-            }
         }
+        false
     }
 }
 
@@ -170,6 +140,11 @@ impl Hollow {
             (low_mm, high_mm) = (low_mm.min(corner), high_mm.max(corner));
         }
         Self { shape, own_from_part, low_mm: low_mm - WIDER_MM, high_mm: high_mm + WIDER_MM }
+    }
+
+    /// Whether a point lies in the box around it.
+    fn box_holds(&self, at_mm: DVec3) -> bool {
+        (at_mm.cmple(self.high_mm) & at_mm.cmpge(self.low_mm)).all()
     }
 
     /// The part of the ray from `from` (0) to `to` (1) that lies inside.

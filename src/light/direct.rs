@@ -66,12 +66,12 @@ pub struct EmitterRule {
 }
 
 /// A diagonal between two sides of the emitter's unit square: `u = v + shift` for `v` in a range.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Diagonal {
     shift: f64,
-    from: f64,
-    to: f64,
     weight: f64,
+    /// Where along it is looked first, its ends among them, evenly spaced: `v`, and the weights of the rule's places there.
+    looks: Vec<(f64, Vec<f64>)>,
 }
 
 impl Default for EmitterRule {
@@ -91,15 +91,25 @@ impl EmitterRule {
             others.map(|(_, (v, _))| 4.0 * (nodes[i].0 - v)).product()
         };
         let weights = (0..nodes.len()).map(|i| 1.0 / product(i)).collect();
+        let mut made = Self { rule, weights, diagonals: Vec::new() };
         let pair = |&(begin, weight): &(f64, f64)| {
             let turn = 1.0 - begin;
-            [
-                Diagonal { shift: begin, from: 0.0, to: turn, weight },
-                Diagonal { shift: begin - 1.0, from: turn, to: 1.0, weight },
-            ]
+            [(begin, 0.0, turn, weight), (begin - 1.0, turn, 1.0, weight)]
         };
-        let diagonals = nodes.iter().flat_map(pair).collect();
-        Self { rule, weights, diagonals }
+        let diagonal = |(shift, from, to, weight): (f64, f64, f64, f64)| {
+            let count = ((to - from) * LOOKS).ceil().max(1.0);
+            let look = |k: usize| {
+                let v = if k as f64 == count { to } else { from + (to - from) * k as f64 / count };
+                let mut lines = [Vec::new(), Vec::new()];
+                made.weigh(v + shift, &mut lines[0]);
+                made.weigh(v, &mut lines[1]);
+                let [across, along] = &lines;
+                (v, across.iter().flat_map(|across| along.iter().map(move |along| across * along)).collect())
+            };
+            Diagonal { shift, weight, looks: (0..=count as usize).map(look).collect() }
+        };
+        made.diagonals = made.nodes().iter().flat_map(pair).map(diagonal).collect();
+        made
     }
 
     fn nodes(&self) -> &[(f64, f64)] {
@@ -144,14 +154,8 @@ impl Shares<'_> {
         let [across, along] = &mut self.weights;
         self.rule.weigh(u, across);
         self.rule.weigh(v, along);
-        let mut sums = [DVec3::ZERO; N];
-        for (line, across) in self.all.chunks_exact(along.len()).zip(across) {
-            for (share, along) in line.iter().zip(along.iter()) {
-                let weight = *across * along;
-                sums.iter_mut().zip(of(share)).for_each(|(sum, part)| *sum += part * weight);
-            }
-        }
-        sums
+        let weights = across.iter().flat_map(|across| along.iter().map(move |along| across * along));
+        weighted(&self.all, weights, of)
     }
 
     /// The flux of the whole square.
@@ -164,17 +168,17 @@ impl Shares<'_> {
     /// The flux of what is in sight; `is_free` is given a place of the square, its way and where its ray crosses the sheet's top.
     fn in_sight(&mut self, mut is_free: impl FnMut(f64, f64, [DVec3; 2]) -> bool) -> DVec3 {
         let rule = self.rule;
-        let mut pieces = Vec::new();
+        let ways = |share: &Share| [share.way_mm, share.top_mm];
+        let (mut pieces, mut looked) = (Vec::new(), Vec::new());
         let mut is_whole = true;
         for diagonal in &rule.diagonals {
-            let free = |v: f64| {
-                let u = v + diagonal.shift;
-                is_free(u, v, self.at(u, v, |share| [share.way_mm, share.top_mm]))
-            };
-            let first = pieces.len();
-            pieces_in_sight(diagonal.from, diagonal.to, free, |low, high| pieces.push((diagonal, low, high)));
-            is_whole &=
-                matches!(pieces[first..], [(_, low, high)] if low == diagonal.from && high == diagonal.to);
+            looked.clear();
+            looked.extend(diagonal.looks.iter().map(|(v, weights)| {
+                (*v, is_free(v + diagonal.shift, *v, weighted(&self.all, weights.iter().copied(), ways)))
+            }));
+            is_whole &= looked.iter().all(|(_, free)| *free);
+            let free = |v: f64| is_free(v + diagonal.shift, v, self.at(v + diagonal.shift, v, ways));
+            pieces_in_sight(&looked, free, |low, high| pieces.push((diagonal, low, high)));
         }
         if is_whole {
             return self.whole();
@@ -188,6 +192,19 @@ impl Shares<'_> {
         }
         sum
     }
+}
+
+/// What shares have, weighted.
+fn weighted<const N: usize>(
+    shares: &[Share],
+    weights: impl Iterator<Item = f64>,
+    of: impl Fn(&Share) -> [DVec3; N],
+) -> [DVec3; N] {
+    let mut sums = [DVec3::ZERO; N];
+    for (share, weight) in shares.iter().zip(weights) {
+        sums.iter_mut().zip(of(share)).for_each(|(sum, part)| *sum += part * weight);
+    }
+    sums
 }
 
 impl DirectLight<'_> {
@@ -216,12 +233,10 @@ impl DirectLight<'_> {
                 }
             }
         }
-        let source = pose.translation;
-        let end = source + all.iter().map(|share| share.way_mm).sum::<DVec3>() / all.len().max(1) as f64;
         let open = if self.cavities.is_some() { self.through_platform } else { 1.0 };
         let mut shares = Shares { rule, all, weights: Default::default() };
         let mut sum = DVec3::ZERO;
-        let mut gather = |part: f64, is_free: &dyn Fn(DVec3, DVec3) -> bool| {
+        let mut gather = |part: f64, is_free: &mut dyn FnMut(DVec3, DVec3) -> bool| {
             sum += part
                 * shares.in_sight(|u, v, [way_mm, top_mm]| {
                     let source = place(u, v);
@@ -230,13 +245,13 @@ impl DirectLight<'_> {
                 });
         };
         if open > 0.0 {
-            gather(open, &|_, _| true);
+            gather(open, &mut |_, _| true);
         }
         if let Some(cavities) = self.cavities.filter(|_| open < 1.0) {
             // The emitter's corners lie a little beyond the rule's places.
             let beyond = DVec3::splat(emitter.half_side_mm);
-            let hollows = cavities.near(low - beyond, high + beyond).sorted_along(source, end);
-            gather(1.0 - open, &|source, end| hollows.is_free(source, end));
+            let mut hollows = cavities.near(low - beyond, high + beyond);
+            gather(1.0 - open, &mut |source, end| hollows.is_free(source, end));
         }
         sum * emitter.flux_mw
     }
@@ -282,14 +297,15 @@ impl DirectLight<'_> {
     }
 }
 
-/// The pieces of a range that are in sight: looked for at evenly spaced places, their ends by halving.
-fn pieces_in_sight(from: f64, to: f64, mut free: impl FnMut(f64) -> bool, mut found: impl FnMut(f64, f64)) {
-    let looks = ((to - from) * LOOKS).ceil().max(1.0);
-    let mut before = (from, free(from));
-    let mut begun = before.1.then_some(from);
-    for k in 1..=looks as usize {
-        let place = if k as f64 == looks { to } else { from + (to - from) * k as f64 / looks };
-        let here = (place, free(place));
+/// The pieces of a range that are in sight, from looks in order at places of it, their ends found by halving.
+fn pieces_in_sight(
+    looks: &[(f64, bool)],
+    mut free: impl FnMut(f64) -> bool,
+    mut found: impl FnMut(f64, f64),
+) {
+    let mut begun = looks.first().filter(|(_, free)| *free).map(|(from, _)| *from);
+    for two in looks.windows(2) {
+        let (before, here) = (two[0], two[1]);
         if here.1 != before.1 {
             let (mut low, mut high) = (before.0, here.0);
             for _ in 0..HALVINGS {
@@ -302,9 +318,8 @@ fn pieces_in_sight(from: f64, to: f64, mut free: impl FnMut(f64) -> bool, mut fo
                 None => begun = Some(edge),
             }
         }
-        before = here;
     }
-    if let Some(start) = begun {
-        found(start, to);
+    if let (Some(start), Some((to, _))) = (begun, looks.last()) {
+        found(start, *to);
     }
 }

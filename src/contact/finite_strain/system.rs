@@ -1,21 +1,12 @@
 //! The body's forces and its sparse tangent, factored.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
-use faer::perm::PermRef;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::element::{Element, Material, NODES};
 use super::mesh::Mesh;
 use crate::error::ContactError;
-use domecast_elastic::FactorError;
+use domecast_elastic::{Cholesky, Elimination, FactorError, Factors};
 
 /// A meshed body with the pattern of its matrix.
 #[derive(Debug)]
@@ -23,20 +14,14 @@ pub(crate) struct Body {
     pub mesh: Mesh,
     pub material: Material,
     elements: Vec<Element>,
-    columns: Vec<usize>,
-    rows: Vec<usize>,
     /// By node: the nodes from itself on that it shares an element with.
     neighbours: Vec<Vec<u32>>,
-    symbolic: SymbolicCholesky<usize>,
+    cholesky: Cholesky,
 }
 
 /// The lower triangle of a symmetric matrix of the body's pattern.
 #[derive(Debug, Clone)]
 pub(crate) struct Tangent(Vec<f64>);
-
-/// Factors of a tangent.
-#[derive(Debug, Clone)]
-pub(crate) struct Factors(Vec<f64>);
 
 impl Body {
     /// Of a mesh.
@@ -69,21 +54,9 @@ impl Body {
                 columns.push(rows.len());
             }
         }
-        let n = 3 * mesh.nodes_mm.len();
-        let view = SymbolicSparseColMatRef::new_checked(n, n, &columns, None, &rows);
-        // The mesh has numbered its nodes already; a lower triangle that is taken for ordered is not turned over.
-        let same: Vec<usize> = (0..n).collect();
-        let symbolic = factorize_symbolic_cholesky(
-            view,
-            Side::Lower,
-            SymmetricOrdering::Custom(PermRef::new_checked(&same, &same, n)),
-            CholeskySymbolicParams {
-                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-                ..CholeskySymbolicParams::default()
-            },
-        )
-        .map_err(|error| fault(format!("{error:?}")))?;
-        Ok(Self { mesh, material, elements, columns, rows, neighbours, symbolic })
+        // The mesh has numbered its nodes already.
+        let cholesky = Cholesky::new(columns, rows, Elimination::AsNumbered)?;
+        Ok(Self { mesh, material, elements, neighbours, cholesky })
     }
 
     /// Unknowns, those on the base among them.
@@ -93,7 +66,7 @@ impl Body {
 
     /// Multiplications of one factorisation, about.
     pub fn factor_work(&self) -> f64 {
-        let filled = self.symbolic.len_val() as f64;
+        let filled = self.cholesky.filled() as f64;
         filled * filled / self.unknowns() as f64
     }
 
@@ -104,7 +77,7 @@ impl Body {
 
     /// Inner forces and their tangent.
     pub fn linearised(&self, displaced_mm: &[DVec3]) -> Option<(Vec<DVec3>, Tangent)> {
-        let mut tangent = Tangent(vec![0.0; self.rows.len()]);
+        let mut tangent = Tangent(vec![0.0; self.cholesky.rows().len()]);
         let forces = self.add_up(displaced_mm, Some(&mut tangent))?;
         Some((forces, tangent))
     }
@@ -144,7 +117,7 @@ impl Body {
         let (row, column, block) = if a >= b { (a, b, *block) } else { (b, a, block.transpose()) };
         let Ok(rank) = self.neighbours[column as usize].binary_search(&row) else { return };
         for d in 0..3 {
-            let start = self.columns[3 * column as usize + d];
+            let start = self.cholesky.columns()[3 * column as usize + d];
             let values = block.col(d).to_array();
             if rank == 0 {
                 tangent.0[start..start + 3 - d].iter_mut().zip(&values[d..]).for_each(|(to, v)| *to += v);
@@ -159,8 +132,8 @@ impl Body {
     pub fn hold_base(&self, tangent: &mut Tangent) {
         for column in 0..self.unknowns() {
             let held = self.mesh.is_base[column / 3];
-            for at in self.columns[column]..self.columns[column + 1] {
-                let row = self.rows[at];
+            for at in self.cholesky.columns()[column]..self.cholesky.columns()[column + 1] {
+                let row = self.cholesky.rows()[at];
                 if held || self.mesh.is_base[row / 3] {
                     tangent.0[at] = if row == column {
                         self.material.shear_mpa * self.mesh.grading.radius_mm
@@ -174,46 +147,22 @@ impl Body {
 
     /// Factors a tangent; `None` where it is not positive definite.
     pub fn factor(&self, tangent: &Tangent) -> Option<Factors> {
-        let n = self.unknowns();
-        let view = SymbolicSparseColMatRef::new_checked(n, n, &self.columns, None, &self.rows);
-        let mut values = vec![0.0; self.symbolic.len_val()];
-        let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, faer::Spec::default());
-        let mut memory = MemBuffer::try_new(scratch).ok()?;
-        self.symbolic
-            .factorize_numeric_llt(
-                &mut values,
-                SparseColMatRef::new(view, &tangent.0),
-                Side::Lower,
-                LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                faer::Spec::default(),
-            )
-            .ok()?;
-        Some(Factors(values))
+        self.cholesky.factor(&tangent.0).ok()
     }
 
     /// Solves in place.
     pub fn solve(&self, factors: &Factors, rhs: &mut [f64]) {
-        let scratch = self.symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
-        let Ok(mut memory) = MemBuffer::try_new(scratch) else { return rhs.fill(f64::NAN) };
-        let n = self.unknowns();
-        LltRef::new(&self.symbolic, &factors.0).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(rhs, n, 1),
-            Par::Seq,
-            MemStack::new(&mut memory),
-        );
+        self.cholesky.solve(factors, rhs);
     }
 
     /// The tangent times a vector.
     pub fn times(&self, tangent: &Tangent, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];
         for column in 0..x.len() {
-            let range = self.columns[column]..self.columns[column + 1];
+            let range = self.cholesky.columns()[column]..self.cholesky.columns()[column + 1];
             let own = x[column];
             let mut sum = 0.0;
-            for (row, value) in self.rows[range.clone()].iter().zip(&tangent.0[range]) {
+            for (row, value) in self.cholesky.rows()[range.clone()].iter().zip(&tangent.0[range]) {
                 y[*row] += value * own;
                 if *row != column {
                     sum += value * x[*row];

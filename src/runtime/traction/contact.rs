@@ -67,7 +67,7 @@ impl ForceDistribution {
         Some(ContactEstimate {
             area_mm2,
             point_mm,
-            point_noise_sd_mm: (0.5 * (variances[0] + variances[1])).sqrt(),
+            point_sd_mm: (0.5 * (variances[0] + variances[1])).sqrt(),
             normal,
             force_n,
             force_sd_n: springs_sd_n.unwrap_or(DVec3::splat(own_sd_n)),

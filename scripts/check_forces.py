@@ -101,7 +101,7 @@ def judge(design, tracked, truth, out, has_springs):
                                np.linalg.norm([dot["surface_mm"] for dot in dots], axis=-1)[:, None]).sum(-1)
         zs.extend(((pressure(found) - pressure(expected)) / sd)[touched & ~np.isnan(expected[:, 0])])
         peak = np.nanmax(np.load(out / f"frame_{number:04}.pressure.npy"))
-        rows.append((load, off / load, aside, contact["point_noise_sd_mm"], turned, contact["area_mm2"] / true["contact"]["area_mm2"],
+        rows.append((load, off / load, aside, contact["point_sd_mm"], turned, contact["area_mm2"] / true["contact"]["area_mm2"],
                      np.linalg.norm(found, axis=-1).max() / peak))
     return np.array(zs), np.array(rows)
 

@@ -187,23 +187,31 @@ impl Deviations {
             }
         }
         for _ in 0..WALKS {
-            self.walk(w, |cell| if readings[cell].is_read { 0.0 } else { 1.0 }, is_dome);
+            if !self.walk(w, |cell| if readings[cell].is_read { 0.0 } else { 1.0 }, is_dome) {
+                break;
+            }
         }
     }
 
-    /// Costs of the way by two passes over the neighbours (G. Borgefors, Computer Vision 27, 1984).
-    fn walk(&mut self, w: usize, cost: impl Fn(usize) -> f32, is_dome: impl Fn(usize) -> bool) {
-        let n = self.away.len();
+    /// Costs of the way by two passes over the neighbours (G. Borgefors, Computer Vision 27, 1984). Whether any has become less.
+    fn walk(&mut self, w: usize, cost: impl Fn(usize) -> f32, is_dome: impl Fn(usize) -> bool) -> bool {
+        let (n, mut is_new) = (self.away.len(), false);
         let near = |away: &[f32], i: usize, next: [Option<usize>; 2]| {
             let of = |next: Option<usize>| next.and_then(|k| away.get(k)).copied().unwrap_or(f32::INFINITY);
             away[i].min(of(next[0]).min(of(next[1])) + cost(i))
         };
+        let mut set = |away: &mut [f32], i: usize, next| {
+            let found = near(away, i, next);
+            is_new |= found < away[i];
+            away[i] = found;
+        };
         for i in (0..n).filter(|i| is_dome(*i)) {
-            self.away[i] = near(&self.away, i, [i.checked_sub(1), i.checked_sub(w)]);
+            set(&mut self.away, i, [i.checked_sub(1), i.checked_sub(w)]);
         }
         for i in (0..n).rev().filter(|i| is_dome(*i)) {
-            self.away[i] = near(&self.away, i, [Some(i + 1), Some(i + w)]);
+            set(&mut self.away, i, [Some(i + 1), Some(i + w)]);
         }
+        is_new
     }
 
     /// Cells without readings on the way from the rim to each cell.

@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+/// Passes forwards and backwards on the coarsest grid.
+const COARSEST_PASSES: usize = 8;
+
 /// One grid: what each cell weighs, and its coupling with the next to the right and below.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Grid {
@@ -25,30 +28,26 @@ impl Grid {
         rows.map(|(row, span)| row * self.width + span.start..row * self.width + span.end)
     }
 
-    /// The matrix times a vector, and the product of both.
-    pub fn times(&self, vector: &[f64], out: &mut [f64]) -> f64 {
+    /// The matrix times a vector.
+    pub fn times(&self, vector: &[f64], out: &mut [f64]) {
         let (w, n) = (self.width, self.own.len());
-        let mut sum = 0.0;
-        for (row, span) in self.spans.iter().enumerate() {
-            for i in row * w + span.start..row * w + span.end {
-                let mut value = f64::from(self.own[i]) * vector[i];
-                if i + 1 < n {
-                    value += f64::from(self.right[i]) * vector[i + 1];
-                }
-                if i > 0 {
-                    value += f64::from(self.right[i - 1]) * vector[i - 1];
-                }
-                if i + w < n {
-                    value += f64::from(self.below[i]) * vector[i + w];
-                }
-                if i >= w {
-                    value += f64::from(self.below[i - w]) * vector[i - w];
-                }
-                out[i] = value;
-                sum += value * vector[i];
+        for (row, span) in self.spans.iter().enumerate().filter(|(_, span)| !span.is_empty()) {
+            let (from, to) = (row * w + span.start, row * w + span.end);
+            let line = &mut out[from..to];
+            for ((out, own), v) in line.iter_mut().zip(&self.own[from..to]).zip(&vector[from..to]) {
+                *out = f64::from(*own) * v;
+            }
+            // Cells beyond the span have no equations with those within.
+            let inner = line.len() - 1;
+            add(&mut line[..inner], &self.right[from..to - 1], &vector[from + 1..to]);
+            add(&mut line[1..], &self.right[from..to - 1], &vector[from..to - 1]);
+            if to + w <= n {
+                add(line, &self.below[from..to], &vector[from + w..to + w]);
+            }
+            if from >= w {
+                add(line, &self.below[from - w..to - w], &vector[from - w..to - w]);
             }
         }
-        sum
     }
 
     /// The right side of a row less what the rows next to it take, into `left`: both, or the one above alone.
@@ -116,6 +115,43 @@ impl Grid {
             }
         }
     }
+
+    /// Sums of two by two cells go to the coarser grid as what it wants.
+    fn sum_into(&self, coarse: &mut Self) {
+        coarse.wanted.fill(0.0);
+        for (y, span) in self.spans.iter().enumerate() {
+            let left = &self.left[y * self.width + span.start..y * self.width + span.end];
+            let wanted = &mut coarse.wanted[y / 2 * coarse.width + span.start / 2..];
+            let pairs = left.chunks_exact(2);
+            // Spans begin at even columns.
+            if let (Some(last), Some(wanted)) = (pairs.remainder().first(), wanted.get_mut(left.len() / 2)) {
+                *wanted += last;
+            }
+            pairs.zip(wanted).for_each(|(pair, wanted)| *wanted += pair[0] + pair[1]);
+        }
+    }
+
+    /// Adds what the coarser grid found.
+    fn add_from(&mut self, coarse: &Self) {
+        for (y, span) in self.spans.iter().enumerate() {
+            let all = y * self.width + span.start..y * self.width + span.end;
+            let (own, found) = (&self.own[all.clone()], &mut self.found[all]);
+            let coarse = &coarse.found[y / 2 * coarse.width + span.start / 2..];
+            for ((found, own), coarse) in found.chunks_mut(2).zip(own.chunks(2)).zip(coarse) {
+                for (found, own) in found.iter_mut().zip(own) {
+                    *found += if *own > 0.0 { *coarse } else { 0.0 };
+                }
+            }
+        }
+    }
+}
+
+/// Adds the products of two lists to a third.
+#[inline]
+fn add(to: &mut [f64], parts: &[f32], values: &[f64]) {
+    for ((to, part), value) in to.iter_mut().zip(parts).zip(values) {
+        *to += f64::from(*part) * value;
+    }
 }
 
 /// Takes the products of two lists from a third.
@@ -126,43 +162,33 @@ fn take(from: &mut [f32], parts: &[f32], found: &[f32]) {
     }
 }
 
-/// One V-cycle for the residual, into the finest grid's `found`. Symmetric: what goes down forwards comes up backwards.
+/// One V-cycle for the residual, into the finest grid's `found`. Symmetric: what goes down forwards comes up backwards. A second visit
+/// of coarse grids (a W-cycle) is not positive: with their coupling halved, a cycle by itself may overshoot by more than twice.
 pub(super) fn precondition(grids: &mut [Grid], residual: &[f64]) {
     let Some(fine) = grids.first_mut() else { return };
     for (wanted, r) in fine.wanted.iter_mut().zip(residual) {
         *wanted = *r as f32;
     }
-    let last = grids.len() - 1;
-    for k in 0..last {
-        let (finer, coarser) = grids.split_at_mut(k + 1);
-        let (Some(fine), Some(coarse)) = (finer.last_mut(), coarser.first_mut()) else { return };
-        fine.relax(true, true);
-        fine.leave();
-        coarse.wanted.fill(0.0);
-        for (y, span) in fine.spans.iter().enumerate() {
-            for x in span.clone() {
-                coarse.wanted[y / 2 * coarse.width + x / 2] += fine.left[y * fine.width + x];
-            }
+    cycle(grids);
+}
+
+/// A cycle for what the first of these grids wants.
+fn cycle(grids: &mut [Grid]) {
+    let Some((fine, coarser)) = grids.split_first_mut() else { return };
+    let Some(coarse) = coarser.first_mut() else {
+        fine.found.fill(0.0);
+        for _ in 0..COARSEST_PASSES {
+            fine.relax(true, false);
+            fine.relax(false, false);
         }
+        return;
+    };
+    fine.relax(true, true);
+    fine.leave();
+    fine.sum_into(coarse);
+    cycle(coarser);
+    if let Some(coarse) = coarser.first() {
+        fine.add_from(coarse);
     }
-    if let Some(coarsest) = grids.last_mut() {
-        coarsest.found.fill(0.0);
-        for _ in 0..8 {
-            coarsest.relax(true, false);
-            coarsest.relax(false, false);
-        }
-    }
-    for k in (0..last).rev() {
-        let (finer, coarser) = grids.split_at_mut(k + 1);
-        let (Some(fine), Some(coarse)) = (finer.last_mut(), coarser.first()) else { return };
-        for (y, span) in fine.spans.iter().enumerate() {
-            for x in span.clone() {
-                let i = y * fine.width + x;
-                if fine.own[i] > 0.0 {
-                    fine.found[i] += coarse.found[y / 2 * coarse.width + x / 2];
-                }
-            }
-        }
-        fine.relax(false, false);
-    }
+    fine.relax(false, false);
 }

@@ -1,5 +1,7 @@
 //! The shape on the raw image's grid.
 
+use std::ops::Range;
+
 use glam::{Vec2, Vec3, Vec3A};
 
 use super::cells::{Cells, View};
@@ -63,7 +65,14 @@ pub struct ShapeMap {
     cell_sd_mm: Vec<f32>,
     /// Room for an outline while nothing is touched.
     outline_room: Vec<Vec2>,
+    /// The columns of cells between which each row of pixels has values.
+    drawn: Vec<Range<usize>>,
+    /// Room for a row of pixels, by cell.
+    mixed: Vec<Mixed>,
 }
+
+/// Values of a cell, or between one and the one below: height, its deviation and pressure; and the normal. NaN beside the dome.
+type Mixed = [Vec3A; 2];
 
 impl ShapeMap {
     pub(super) fn new(cells: &Cells, optics: &SensorOptics) -> Self {
@@ -88,6 +97,8 @@ impl ShapeMap {
             cell_pressure: vec![0.0; cells.count()],
             cell_sd_mm: vec![f32::NAN; cells.count()],
             outline_room: Vec::new(),
+            drawn: vec![0..0; height],
+            mixed: Vec::with_capacity(cells.width),
         }
     }
 
@@ -172,12 +183,17 @@ impl ShapeMap {
         self.height_sd_mm.fill(f32::NAN);
         self.normal.fill(Vec3::NAN);
         self.is_touched.fill(false);
+        self.drawn.fill(0..0);
+        self.forget_cells();
+        self.status = None;
+    }
+
+    fn forget_cells(&mut self) {
         self.cell_mm.fill(f32::NAN);
         if let Some(contact) = self.contact.take() {
             // The next outline is written over the last.
             self.outline_room = contact.outline_px;
         }
-        self.status = None;
     }
 
     /// Draws what the solve found; `sd_mm` is the deviation of a cell's height.
@@ -189,7 +205,7 @@ impl ShapeMap {
         chart: &mut Chart,
         status: SolveStatus,
     ) {
-        self.forget();
+        self.forget_cells();
         self.status = Some(status);
         let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * moved_mm[cell] as f32;
         let w = cells.width;
@@ -252,23 +268,55 @@ impl ShapeMap {
     /// Linear between the cells; a pixel whose own cell sees no dome has nothing.
     fn spread(&mut self, cells: &Cells, view: &View) {
         let (width, px) = (self.width, cells.px);
-        let Self { cell_mm, cell_normal, cell_pressure, cell_sd_mm, .. } = self;
-        let at = Drawn { width: cells.width, cell_mm, cell_normal, cell_pressure, cell_sd_mm };
+        let Self { cell_mm, cell_normal, cell_pressure, cell_sd_mm, mixed, drawn, .. } = self;
+        let of = |cell: usize| -> Mixed {
+            let height_mm = cell_mm[cell];
+            let is_known = !height_mm.is_nan();
+            let values = Vec3A::new(height_mm, cell_sd_mm[cell], cell_pressure[cell]);
+            if is_known { [values, cell_normal[cell]] } else { [Vec3A::NAN; 2] }
+        };
         let heights = self.height_mm.chunks_mut(width).zip(self.height_sd_mm.chunks_mut(width));
         let others = self.normal.chunks_mut(width).zip(self.is_touched.chunks_mut(width));
-        heights.zip(others).enumerate().for_each(|(y, ((heights, sds), (normals, touched)))| {
-            let Some(span) = view.spans.get(y / px) else { return };
+        let rows = heights.zip(others).zip(drawn).enumerate();
+        rows.for_each(|(y, (((heights, sds), (normals, touched)), drawn))| {
+            let span = view.spans.get(y / px).cloned().unwrap_or(0..0);
+            if *drawn != span {
+                heights.fill(f32::NAN);
+                sds.fill(f32::NAN);
+                normals.fill(Vec3::NAN);
+                touched.fill(false);
+                *drawn = span.clone();
+            }
+            let (row, down) = place(y, px, cells.height);
+            mixed.resize(cells.width, [Vec3A::NAN; 2]);
+            // Pixels lie between their own cell and the one on either side.
+            let beside = span.start.saturating_sub(1)..(span.end + 1).min(cells.width);
+            for (column, mixed) in beside.clone().zip(&mut mixed[beside]) {
+                let cell = row * cells.width + column;
+                *mixed = between([of(cell), of(cell + cells.width)], down);
+            }
             for x in span.start * px..span.end * px {
                 let own = y / px * cells.width + x / px;
-                if at.cell_mm[own].is_nan() {
-                    continue;
-                }
-                let ((i, part_x), (j, part_y)) = (place(x, px, cells.width), place(y, px, cells.height));
-                let (height_mm, sd_mm, normal, pressure) = at.between(own, (i, part_x), (j, part_y));
-                (heights[x], sds[x]) = (height_mm, sd_mm);
-                (normals[x], touched[x]) = (normal.normalize_or_zero().into(), pressure > 1.0);
+                let (column, right) = place(x, px, cells.width);
+                let [values, normal] = between([mixed[column], mixed[column + 1]], right);
+                let is_known = !cell_mm[own].is_nan();
+                (heights[x], sds[x]) = if is_known { (values.x, values.y) } else { (f32::NAN, f32::NAN) };
+                normals[x] = if is_known { normal.normalize_or_zero().into() } else { Vec3::NAN };
+                touched[x] = is_known && values.z > 1.0;
             }
         });
+    }
+}
+
+/// Linear between two cells; one of them where the other is beside the dome.
+#[inline]
+fn between([first, second]: [Mixed; 2], part: f32) -> Mixed {
+    if first[0].x.is_nan() {
+        second
+    } else if second[0].x.is_nan() {
+        first
+    } else {
+        [0, 1].map(|k| first[k] + (second[k] - first[k]) * part)
     }
 }
 
@@ -279,34 +327,4 @@ fn place(v: usize, px: usize, n: usize) -> (usize, f32) {
     // A cast cuts off towards 0, as a floor does of what is not negative.
     let first = (at.max(0.0) as usize).min(n.saturating_sub(2));
     (first, at - first as f32)
-}
-
-/// The cells' values.
-struct Drawn<'a> {
-    width: usize,
-    cell_mm: &'a [f32],
-    cell_normal: &'a [Vec3A],
-    cell_pressure: &'a [f32],
-    cell_sd_mm: &'a [f32],
-}
-
-impl Drawn<'_> {
-    /// Height, its deviation, normal and pressure between four cells; one beside the dome counts as `own`.
-    #[inline]
-    fn between(&self, own: usize, (i, px): (usize, f32), (j, py): (usize, f32)) -> (f32, f32, Vec3A, f32) {
-        let corner = |i: usize, j: usize| {
-            let cell = j * self.width + i;
-            if self.cell_mm[cell].is_nan() { own } else { cell }
-        };
-        let corners = [corner(i, j), corner(i + 1, j), corner(i, j + 1), corner(i + 1, j + 1)];
-        let parts = [(1.0 - px) * (1.0 - py), px * (1.0 - py), (1.0 - px) * py, px * py];
-        let (mut height, mut normal, mut sd, mut pressure) = (0.0, Vec3A::ZERO, 0.0, 0.0);
-        for (cell, part) in corners.into_iter().zip(parts) {
-            sd += self.cell_sd_mm[cell] * part;
-            pressure += self.cell_pressure[cell] * part;
-            height += self.cell_mm[cell] * part;
-            normal += self.cell_normal[cell] * part;
-        }
-        (height, sd, normal, pressure)
-    }
 }

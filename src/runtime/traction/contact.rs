@@ -64,10 +64,12 @@ impl ForceDistribution {
             nodes.iter().enumerate().map(|(k, node)| (k, node.at_mm, node.area_mm2)).map(weight)
         };
         let variances = [first, second].map(|axis| self.posterior.sd_of(along(axis)).unwrap_or(0.0).powi(2));
+        let point_noise_sd_mm = (0.5 * (variances[0] + variances[1])).sqrt();
         Some(ContactEstimate {
             area_mm2,
             point_mm,
-            point_noise_sd_mm: (0.5 * (variances[0] + variances[1])).sqrt(),
+            point_noise_sd_mm,
+            point_sd_mm: point_noise_sd_mm,
             normal,
             force_n,
             force_sd_n: springs_sd_n.unwrap_or(DVec3::splat(own_sd_n)),

@@ -23,6 +23,12 @@ const MIN_WRENCH_SD_N: f64 = 0.001;
 const SHEAR_RATIO: f64 = 0.09;
 /// The softness is looked for where the force is so many of its deviations.
 const SOFTNESS_OVER_SD: f64 = 20.0;
+/// What the contact point of a height map is off beside noise, as a part of the touch's radius, and for each part of the load that is
+/// shear: the skin's own pressure is that of a load without shear.
+const POINT_PART: f64 = 0.02;
+const POINT_BY_SHEAR: f64 = 0.12;
+/// What it is off where dots alone are known, as a part of their distance: what moves along a ray is not seen.
+const POINT_OF_DOTS: f64 = 0.45;
 /// Bounds of the dome's softness against the constants.
 const SOFTNESS: std::ops::RangeInclusive<f64> = 0.4..=2.5;
 /// The forces on the skin of one sensor, from frame to frame.
@@ -125,11 +131,18 @@ impl ForceDistribution {
     /// is. `map` is the same frame's ([`ShapeFromColor`](crate::shape::ShapeFromColor)).
     pub fn update(&mut self, tracked: &Tracked, map: Option<&ShapeMap>) -> &LocalForces {
         self.find(tracked, map);
-        let seen = map.and_then(|map| map.contact.as_ref());
-        if let (Some(contact), Some(seen)) = (&mut self.result.contact, seen) {
+        let Some(contact) = &mut self.result.contact else { return &self.result };
+        let model_sd_mm = if let Some(seen) = map.and_then(|map| map.contact.as_ref()) {
             // Finer than the nodes, and as `draw_pressure` shares the force out.
             contact.point_mm = seen.point_mm;
-        }
+            let radius_mm = (seen.area_mm2 / std::f64::consts::PI).sqrt();
+            let normal_n = contact.force_n.dot(contact.normal);
+            let shear_n = (contact.force_n - contact.normal * normal_n).length();
+            radius_mm * POINT_PART.hypot(POINT_BY_SHEAR * (shear_n / normal_n.abs()).min(1.0))
+        } else {
+            POINT_OF_DOTS * self.model.correlation_mm
+        };
+        contact.point_sd_mm = contact.point_sd_mm.hypot(model_sd_mm);
         &self.result
     }
 

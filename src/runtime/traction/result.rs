@@ -55,6 +55,9 @@ pub struct ContactEstimate {
     pub point_mm: DVec3,
     /// Its standard deviation along the skin by the noise of the dots, on each of two axes, mm.
     pub point_noise_sd_mm: f64,
+    /// The same with all that is known to be unsure, mm: noise of the dots, and what the skin's shape or, without it, dots
+    /// that do not show motion along their rays leave open.
+    pub point_sd_mm: f64,
     /// Mean outward normal by pressure, sensor frame.
     pub normal: DVec3,
     /// Sum of the tractions: the force on the dome, sensor frame, N.

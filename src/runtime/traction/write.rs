@@ -44,9 +44,9 @@ pub fn write_json_forces(
             let (force, force_sd) = (three(contact.force_n), three(contact.force_sd_n));
             write!(
                 out,
-                "{{\"area_mm2\":{:.4},\"point_mm\":{point},\"point_noise_sd_mm\":{:.6},\"normal\":{normal},\"force_n\":{force},\
+                "{{\"area_mm2\":{:.4},\"point_mm\":{point},\"point_noise_sd_mm\":{:.6},\"point_sd_mm\":{:.6},\"normal\":{normal},\"force_n\":{force},\
                  \"force_sd_n\":{force_sd},\"slip_share\":{:.4}}}",
-                contact.area_mm2, contact.point_noise_sd_mm, contact.slip_share
+                contact.area_mm2, contact.point_noise_sd_mm, contact.point_sd_mm, contact.slip_share
             )?;
         }
     }

@@ -119,7 +119,8 @@ impl BondedBody {
             .factor(&self.matrix(m))
             .map_err(|FactorError(why)| FactorError(format!("harmonic {m}: {why}")))?;
         self.cholesky.solve(&factors, rhs);
-        Ok(())
+        let is_finite = rhs.iter().all(|value| value.is_finite());
+        is_finite.then_some(()).ok_or_else(|| FactorError(format!("harmonic {m}: too little memory")))
     }
 
     /// The unknowns of surface node `p` in the direction r, z or phi (0, 1, 2), with weights.

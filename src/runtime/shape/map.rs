@@ -96,7 +96,8 @@ impl ShapeMap {
             cell_point: vec![Vec3A::NAN; cells.count()],
             cell_pressure: vec![0.0; cells.count()],
             cell_sd_mm: vec![f32::NAN; cells.count()],
-            outline_room: Vec::new(),
+            // Around all cells.
+            outline_room: Vec::with_capacity(2 * (cells.width + cells.height)),
             drawn: vec![0..0; height],
             mixed: Vec::with_capacity(cells.width),
         }

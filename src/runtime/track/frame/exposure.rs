@@ -16,12 +16,14 @@ const MIN_CONTRAST: u8 = 10;
 /// Mean brightness of a frame over that of the last, or the other way round, from which on it jumped: lamps that flicker,
 /// and cameras that follow the light in steps, do less.
 const MIN_JUMP: f64 = 1.2;
-/// A frame that differs from the last by less than this part of what two frames differed by at least so far is the last one
-/// again, coded anew; below so many levels a camera has no noise to tell.
+/// A frame that differs from the last by less than this part of what two frames have differed by is the last one again, coded
+/// anew; below so many levels a camera has no noise to tell.
 const SAME_PART: f64 = 0.5;
 const MIN_CHANGE: f64 = 0.2;
-/// The least change so far is given up by this part a frame, up or down: light and gain change.
-const FORGOTTEN: f64 = 0.02;
+/// What two frames differ by is the second smallest of so many changes: the smallest may be a frame that came again. Changes
+/// of the light do not count, nor those that are too large for noise, levels.
+const REMEMBERED: usize = 8;
+const MAX_NOISE: f64 = 8.0;
 /// How two frames differ is the mean over this part of the samples, those that differ least: what moves through a picture
 /// says nothing of its noise.
 const QUIET_PART: f64 = 0.75;
@@ -31,8 +33,9 @@ const QUIET_PART: f64 = 0.75;
 pub(crate) struct ExposureMeter {
     samples: Vec<u8>,
     before: Vec<u8>,
-    /// The least that the samples of two frames differed by so far, levels in the mean.
-    min_change: Option<f64>,
+    /// What the samples of the last pairs of frames differed by, levels in the mean; how many pairs there were.
+    changes: [f64; REMEMBERED],
+    pairs: usize,
 }
 
 /// Exposure statistics of one frame, inside of the mask.
@@ -93,12 +96,13 @@ impl ExposureMeter {
         let sum = |samples: &[u8]| samples.iter().map(|v| u64::from(*v)).sum::<u64>() as f64;
         let brighter = sum(&self.samples).max(1.0) / sum(&self.before).max(1.0);
         let has_before = !self.samples.is_empty() && self.samples.len() == self.before.len();
+        let has_jumped = has_before && !(1.0 / MIN_JUMP..MIN_JUMP).contains(&brighter);
         Exposure {
             low: level(0.02),
             high: level(0.98),
             saturated: if total > 0.0 { f64::from(bright) / total } else { 0.0 },
-            is_repeated: has_before && self.is_same(),
-            has_jumped: has_before && !(1.0 / MIN_JUMP..MIN_JUMP).contains(&brighter),
+            is_repeated: has_before && !has_jumped && self.is_same(),
+            has_jumped,
         }
     }
 
@@ -119,10 +123,17 @@ impl ExposureMeter {
             left -= taken;
         }
         let change = sum as f64 / quiet as f64;
-        let so_far = self.min_change.unwrap_or(change);
-        let is_same = so_far > MIN_CHANGE && change < SAME_PART * so_far;
-        self.min_change =
-            Some(if is_same { so_far * (1.0 - FORGOTTEN) } else { change.min(so_far * (1.0 + FORGOTTEN)) });
+        let known = self.changes.get(..self.pairs.min(REMEMBERED)).unwrap_or_default();
+        // The two smallest.
+        let smallest = known.iter().fold([f64::INFINITY; 2], |[first, second], change| {
+            if *change < first { [*change, first] } else { [first, second.min(*change)] }
+        });
+        let usual = if known.len() > 1 { smallest[1] } else { 0.0 };
+        let is_same = usual > MIN_CHANGE && change < SAME_PART * usual;
+        if change < MAX_NOISE {
+            self.changes[self.pairs % REMEMBERED] = change;
+            self.pairs += 1;
+        }
         is_same
     }
 

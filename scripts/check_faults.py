@@ -7,13 +7,14 @@ Frames are drawn by scripts/draw_frames.py and spoilt here by NumPy and OpenCV a
 spoilt ones with the build's constants. Each frame is held to the truth:
 
 - no dot called `ok` is both more than 1 px and more than 5 of its `sd_px` from where it was drawn, and none is another's, but in
-  frames that are named as a whole: `frozen`, `torn`, `interlaced`, `blurred`;
+  frames that show another moment and are named so: `frozen`, `torn`;
 - no frame called `ok` has a wrench that is both 0.1 N (1 N mm) and 5 `wrench_sd` from that of the same frame unspoilt;
 - what the scenario says must be named is named, on the marks or the frames that are spoilt;
 - no more dots are withheld than the scenario allows, and where it says so the frames are `ok` and as exact as clean ones.
 
 What is beside the white markers is drawn and judged by scripts/check_surroundings.py.
 """
+import functools
 import sys
 
 import cv2
@@ -23,10 +24,8 @@ import check_surroundings
 from check_identities import Build, dent
 
 failed = 0
-# A mark that is not as it should be, and why.
-FAULTY = {"dirty", "smeared", "glare", "partly_hidden"}
-# What says that nothing of the frame is of its moment.
-NAMED_WHOLE = {"frozen", "torn", "interlaced", "blurred"}
+# What says that a frame, or a part of it, is of another moment.
+OTHER_MOMENT = {"frozen", "torn"}
 OFF_PX, OFF_SDS = 1.0, 5.0
 OFF_N, OFF_NMM = 0.1, 1.0
 
@@ -105,21 +104,18 @@ def jpeg(frame, quality):
 
 
 class Case:
-    """Frames, clean ones of the same moments, where the dots were drawn, which dots or markers are spoilt, and which dots
-    lie beside what spoils them."""
+    """Frames, what `track` says of clean ones of the same moments, where the dots were drawn, which dots are spoilt, and
+    which lie beside what spoils them."""
 
-    def __init__(self, build):
-        self.build = build
-        self.frames, self.clean, self.truths = [], [], []
-        self.spoilt_dots, self.spoilt_markers, self.beside = [], [], []
+    def __init__(self, build, clean):
+        self.build, self.clean = build, clean
+        self.frames, self.truths, self.spoilt_dots, self.beside = [], [], [], []
 
-    def add(self, frame, clean, truth, dots=(), markers=(), beside=()):
+    def add(self, frame, truth, dots=(), beside=()):
         self.frames.append(frame)
-        self.clean.append(clean)
         self.truths.append(truth)
         self.spoilt_dots.append(set(dots))
-        self.beside.append(set(beside) - set(dots))
-        self.spoilt_markers.append(set(markers))
+        self.beside.append(set(beside))
 
 
 def moved(i):
@@ -133,16 +129,11 @@ def judge(case, name, must=None, allowed=None, dots_named=0.0, may_lack=0.02, mu
     global failed
     build = case.build
     lines, _ = build.track(case.frames)
-    # most scenarios begin with the same frames
-    moments = tuple(map(id, case.clean))
-    if moments not in build.tracked:
-        build.tracked[moments] = case.clean, build.track(case.clean)[0]
-    clean = build.tracked[moments][1]
     why = []
     wrong, worst, swapped, lacking, squares, named, off_wrench = 0, 0.0, 0, 0, [], 0, 0
     worst_wrench = 0.0
     states = {}
-    for i, (line, still, truth) in enumerate(zip(lines, clean, case.truths)):
+    for i, (line, still, truth) in enumerate(zip(lines, case.clean, case.truths)):
         lacks = 0
         for index, dot in enumerate(line["black_dots"]):
             if dot["state"] != "ok":
@@ -151,7 +142,7 @@ def judge(case, name, must=None, allowed=None, dots_named=0.0, may_lack=0.02, mu
                 named += index in case.spoilt_dots[i]
                 continue
             off = np.hypot(*(np.array(dot["centroid_px"]) - truth[index]))
-            wrong += off > OFF_PX and off > OFF_SDS * dot["sd_px"] and not NAMED_WHOLE & set(line["problems"])
+            wrong += off > OFF_PX and off > OFF_SDS * dot["sd_px"] and not OTHER_MOMENT & set(line["problems"])
             swapped += off > 0.4 * build.spacing[index]
             worst = max(worst, off)
             squares.append(off**2)
@@ -203,14 +194,15 @@ def scenarios(build, count):
     dot_px = 0.5 * np.median(sensor.diameters) * np.linalg.norm(build.rest[near[0]] - build.rest[near[1]]) / np.linalg.norm(
         sensor.dots[near[0]] - sensor.dots[near[1]])
 
-    usual_frames = {}
+    length = max(8, count)
+    usual_way = (lambda i: {}) if build.is_rigid else moved
 
-    def still(i, **drawing):
-        if drawing:
-            return sensor.draw(seed=i, **{**({} if build.is_rigid else moved(i)), **drawing})
-        if i not in usual_frames:
-            usual_frames[i] = sensor.draw(seed=i, **({} if build.is_rigid else moved(i)))
-        return usual_frames[i]
+    # Scenarios one after the other mostly share their frames.
+    @functools.lru_cache(maxsize=3)
+    def drawn(way):
+        """Clean frames along a way (what to draw in a moment), where their dots are, and what `track` says of them."""
+        frames, truths = zip(*(sensor.draw(seed=i, **way(i)) for i in range(length)))
+        return frames, truths, build.track(frames)[0]
 
     def changed(frame, spoilt, truth):
         """Dots within their diameter of something that was painted."""
@@ -219,17 +211,15 @@ def scenarios(build, count):
         at = np.clip(np.round(truth).astype(int), 0, np.array(near.shape[::-1]) - 1)
         return np.flatnonzero(near[at[:, 1], at[:, 0]])
 
-    def spoil(name, effect, n=count, drawing=None, **what):
-        """`effect(frame, truth, i)` gives the frame and which dots and markers it spoilt."""
+    def spoil(name, effect, n=count, way=usual_way, **what):
+        """`effect(frame, truth, i)` gives the frame, or the frame and which dots it spoilt."""
         def run():
-            case = Case(build)
-            for i in range(n):
-                frame, truth = still(i, **(drawing or {}))
+            frames, truths, clean = drawn(way)
+            case = Case(build, clean)
+            for i, frame, truth in zip(range(n), frames, truths):
                 spoilt = effect(frame, truth, i)
-                if not isinstance(spoilt, tuple):
-                    spoilt = spoilt, (), ()
-                dots = spoilt[1]
-                case.add(spoilt[0], frame, truth, *spoilt[1:], beside=changed(frame, spoilt[0], truth) if len(dots) else ())
+                spoilt, dots = spoilt if isinstance(spoilt, tuple) else (spoilt, ())
+                case.add(spoilt, truth, dots, changed(frame, spoilt, truth) if len(dots) else ())
             judge(case, name, **what)
         return name, run
 
@@ -250,7 +240,7 @@ def scenarios(build, count):
     yield spoil("a lens a little soft", lambda f, t, i: clip(cv2.GaussianBlur(f, (0, 0), 0.6)), allowed=ok, exact=0.035)
     for polar in (0, 35):
         touch = dent(sensor, build.at(polar), 0.1 * sensor.radius, 0.25 * sensor.radius)
-        yield spoil(f"a touch of 1 mm in 10 at {polar} deg", lambda f, t, i: f, drawing={"skin": touch}, allowed=ok, exact=0.04)
+        yield spoil(f"a touch of 1 mm in 10 at {polar} deg", lambda f, t, i: f, way=lambda i, touch=touch: {**usual_way(i), "skin": touch}, allowed=ok, exact=0.04)
 
     # --- dots
     def specks(radius, far):
@@ -319,16 +309,13 @@ def scenarios(build, count):
         yield spoil(f"motion blur {way} of one frame", lambda f, t, i, way=way: cv2.blur(f, way) if i == 3 else f,
                     n=max(6, count), must="blurred", must_frames=[3], may_lack=1)
 
-    length = max(8, count)
-
     def sequence(name, make, step, **what):
         """`make(frames)` changes a sequence that moves by `step` (shift mm, turn rad) a frame."""
         def run():
-            drawn = [sensor.draw(seed=i, **step(i)) for i in range(length)]
-            frames, truths = [f for f, _ in drawn], [t for _, t in drawn]
-            case = Case(build)
-            for frame, clean, truth in zip(make(list(frames)), frames, truths):
-                case.add(frame, clean, truth)
+            frames, truths, clean = drawn(step)
+            case = Case(build, clean)
+            for frame, truth in zip(make(list(frames)), truths):
+                case.add(frame, truth)
             judge(case, name, **what)
         return name, run
 
@@ -340,6 +327,7 @@ def scenarios(build, count):
     up = (lambda i: {}) if build.is_rigid else (lambda i: {"shift": (0.0, 0.06 * back(i), 0)})
     # Where the way turns nothing says that it should go on.
     every = lambda first: range(first, length, 14)
+    wherever = range(5, length, 15)
 
     def woven(frames):
         spoilt = [f.copy() for f in frames]
@@ -376,8 +364,8 @@ def scenarios(build, count):
         yield sequence("torn in the middle", torn(height // 2), step, must="torn", must_frames=every(4), may_lack=1)
         yield sequence("torn above", torn(height // 3), step, must="torn", also=["frozen"], must_frames=every(4), may_lack=1)
         yield sequence("torn, moving along columns", torn(height // 2), up, must="torn", must_frames=every(4), may_lack=1)
-        yield sequence("a frame again", again(0, range(5, length, 15)), step, must="frozen", must_frames=range(5, length, 15))
-        yield sequence("a frame again, with a little noise", again(0.4, range(5, length, 15)), step, must="frozen", must_frames=range(5, length, 15))
+        yield sequence("a frame again", again(0, wherever), step, must="frozen", must_frames=wherever)
+        yield sequence("a frame again, with a little noise", again(0.4, wherever), step, must="frozen", must_frames=wherever)
         yield sequence("a frame again, with as much noise", again(1.0, every(5)), step, must="frozen", must_frames=every(5))
         yield sequence("moving", lambda f: f, step, allowed=ok, exact=0.035)
         yield sequence("starting and stopping", lambda f: f, lambda i: {"shift": (0.05 * min(max(i % 14 - 2, 0), 3), 0, 0)}, allowed=["ok", "frozen"], exact=0.03)
@@ -392,7 +380,7 @@ def scenarios(build, count):
     marker_px = 0.5 * sensor.marker_diameters[0] * np.linalg.norm(sensor.project(sensor.markers[0] + [0.1, 0, 0]) - sensor.project(sensor.markers[0])) / 0.1
 
     def on_marker(effect):
-        return lambda f, t, i: (effect(f, marker_at(i, i // 3 % 4), i), (), [i // 3 % 4])
+        return lambda f, t, i: effect(f, marker_at(i, i // 3 % 4), i)
     marked = ["ok", "three_markers"]
     yield spoil("glare beside a marker", on_marker(lambda f, at, i: bright_blob(f, at + marker_px * np.array([1.0, 0.4]), 0.8 * marker_px)), allowed=marked)
     yield spoil("broad glare on a marker", on_marker(lambda f, at, i: bright_blob(f, at + marker_px * np.array([0.9, -0.5]), 1.2 * marker_px, 235, 2.5)), allowed=marked)
@@ -415,7 +403,6 @@ def main(program, *arguments):
     for folder in arguments:
         print(folder)
         build = Build(program, folder)
-        build.tracked = {}
         listed = list(scenarios(build, count))
         for name, run in listed:
             if only is None or only in name:

@@ -114,13 +114,9 @@ impl BondedBody {
 
     /// Solves one harmonic in place, for right sides one after the other.
     pub(crate) fn solve(&self, m: usize, rhs: &mut [f64]) -> Result<(), FactorError> {
-        let factors = self
-            .cholesky
-            .factor(&self.matrix(m))
-            .map_err(|FactorError(why)| FactorError(format!("harmonic {m}: {why}")))?;
-        self.cholesky.solve(&factors, rhs);
-        let is_finite = rhs.iter().all(|value| value.is_finite());
-        is_finite.then_some(()).ok_or_else(|| FactorError(format!("harmonic {m}: too little memory")))
+        let solved = self.cholesky.factor(&self.matrix(m));
+        let solved = solved.and_then(|factors| self.cholesky.solve(&factors, rhs));
+        solved.map_err(|FactorError(why)| FactorError(format!("harmonic {m}: {why}")))
     }
 
     /// The unknowns of surface node `p` in the direction r, z or phi (0, 1, 2), with weights.

@@ -100,17 +100,21 @@ impl Cholesky {
         Ok(Factors(factors))
     }
 
-    /// Solves in place for right sides one after the other; not a number where memory is short.
-    pub fn solve(&self, factors: &Factors, rhs: &mut [f64]) {
+    /// Solves in place for right sides one after the other.
+    ///
+    /// # Errors
+    /// Too little memory.
+    pub fn solve(&self, factors: &Factors, rhs: &mut [f64]) -> Result<(), FactorError> {
         let n = self.unknowns();
         let count = rhs.len() / n.max(1);
         let scratch = self.symbolic.solve_in_place_scratch::<f64>(count, Par::Seq);
-        let Ok(mut memory) = MemBuffer::try_new(scratch) else { return rhs.fill(f64::NAN) };
+        let mut memory = MemBuffer::try_new(scratch).map_err(|error| FactorError(format!("{error:?}")))?;
         LltRef::new(&self.symbolic, &factors.0).solve_in_place_with_conj(
             Conj::No,
             MatMut::from_column_major_slice_mut(rhs, n, count),
             Par::Seq,
             MemStack::new(&mut memory),
         );
+        Ok(())
     }
 }

@@ -150,9 +150,11 @@ impl Body {
         self.cholesky.factor(&tangent.0).ok()
     }
 
-    /// Solves in place.
+    /// Solves in place; not a number where memory is short.
     pub fn solve(&self, factors: &Factors, rhs: &mut [f64]) {
-        self.cholesky.solve(factors, rhs);
+        if self.cholesky.solve(factors, rhs).is_err() {
+            rhs.fill(f64::NAN);
+        }
     }
 
     /// The tangent times a vector.

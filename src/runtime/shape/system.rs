@@ -152,8 +152,7 @@ impl System {
         while !status.is_converged && status.rounds < MAX_ROUNDS {
             precondition(grids, residual);
             let Some(fine) = grids.first() else { break };
-            let along: f64 =
-                fine.lines().map(|line| dot_of(&residual[line.clone()], &fine.found[line])).sum();
+            let along: f64 = fine.lines().map(|line| dot(&residual[line.clone()], &fine.found[line])).sum();
             let keep = along / *before;
             for line in fine.lines() {
                 let found = direction[line.clone()].iter_mut().zip(&fine.found[line]);
@@ -225,21 +224,12 @@ impl System {
 /// Sums run side by side: one after the other they wait for each other.
 const LANES: usize = 8;
 
-fn dot_of(a: &[f64], b: &[f32]) -> f64 {
+fn dot<T: Copy + Into<f64>>(a: &[f64], b: &[T]) -> f64 {
     let (mut sums, a_lanes, b_lanes) = ([0.0; LANES], a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest = a_lanes.remainder().iter().zip(b_lanes.remainder()).map(|(a, b)| a * f64::from(*b));
+    let rest = a_lanes.remainder().iter().zip(b_lanes.remainder()).map(|(a, b)| a * (*b).into());
     let rest: f64 = rest.sum();
     for (a, b) in a_lanes.zip(b_lanes) {
-        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * f64::from(*b));
-    }
-    sums.iter().sum::<f64>() + rest
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (mut sums, a_lanes, b_lanes) = ([0.0; LANES], a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest: f64 = a_lanes.remainder().iter().zip(b_lanes.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a_lanes.zip(b_lanes) {
-        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
+        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * (*b).into());
     }
     sums.iter().sum::<f64>() + rest
 }

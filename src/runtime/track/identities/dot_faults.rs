@@ -76,6 +76,11 @@ fn sides_of(spot: &DarkSpot, outline: &SpotOutline) -> [f64; 3] {
     [(spot.area_px / outline.area_px).ln(), elongation.x, elongation.y]
 }
 
+/// Radius of what a dot should be, px.
+fn radius_px(track: &DotTrack) -> f64 {
+    (track.outline.area_px / std::f64::consts::PI).sqrt()
+}
+
 /// What does not look like a dot: beside an ellipse, and beyond the window.
 fn misfit_of(spot: &DarkSpot) -> f64 {
     spot.shape.misfit() + spot.shape.one_sided
@@ -97,6 +102,7 @@ impl DotFaults {
         Self {
             sides: Vec::with_capacity(dots),
             unlike: Vec::with_capacity(dots),
+            is_gross: Vec::with_capacity(dots),
             values: Vec::with_capacity(dots),
             ..Self::default()
         }
@@ -124,7 +130,7 @@ impl DotFaults {
             let judged = tracks.iter_mut().zip(&self.unlike).zip(&mut self.is_gross);
             for ((track, unlike), is_gross) in judged {
                 let (Some(spot), Some(unlike)) = (&track.spot, unlike) else { continue };
-                let radius_px = (track.outline.area_px / std::f64::consts::PI).sqrt();
+                let radius_px = radius_px(track);
                 let over = unlike.sd_px(usual, radius_px) / f64::max(MAX_SD_PX, MAX_SD_RADII * radius_px);
                 if over > 1.0 {
                     track.fault = Some(reason(spot, *unlike));
@@ -136,8 +142,8 @@ impl DotFaults {
             }
         }
         for (track, unlike) in tracks.iter_mut().zip(&self.unlike) {
+            let radius_px = radius_px(track);
             let (Some(spot), Some(unlike)) = (&mut track.spot, unlike) else { continue };
-            let radius_px = (track.outline.area_px / std::f64::consts::PI).sqrt();
             spot.sd_px = spot.sd_px.hypot(unlike.sd_px(usual, radius_px));
         }
     }

@@ -58,7 +58,7 @@ impl Tracker {
             pose: PoseFinder::new(&model, options.max_residual_px),
             dots: DotIdentities::new(&model, size, &options),
             displacements: DotDisplacements::new(&model.optics, &model.dots),
-            report: Reporter::new(&model, &options),
+            report: Reporter::new(constants, &model, &options),
             wrench,
             time_s: None,
             model,

@@ -31,9 +31,11 @@ pub(in crate::track) struct SensorModel {
     /// Finds a pose from nothing; `None` of a rigid mount: its platform has one pose, at rest.
     pub solver: Option<PoseSolver>,
     pub mask: Mask,
-    /// How far the dots of a place of the skin, on the mean, are at most from where the constants have them untouched, px;
-    /// `None` where the dots were not measured.
+    /// How far the dots of a place of the untouched skin, on the mean, are at most from where they were measured, px; `None`
+    /// where the constants do not say it.
     pub max_still_px: Option<f64>,
+    /// Whether the constants' dots were measured, at rest.
+    pub are_dots_measured: bool,
 }
 
 impl SensorModel {
@@ -70,9 +72,10 @@ impl SensorModel {
         let max_press_mm = press_mm.unwrap_or(DEFAULT_MAX_PRESS_MM).clamp(0.0, 100.0);
         let markers = MarkerModels::new(constants, &optics, at_mm, max_press_mm)?;
         let mask = Mask::new(optics.lens(), camera, mask);
-        let measured = constants.optics_uncertainty.as_ref().and(constants.tolerances);
-        let max_still_px = measured.map(|t| t.black_centroid_px).filter(|px| px.is_finite() && *px > 0.0);
-        Ok(Self { optics, dots, key, markers, max_press_mm, solver, mask, max_still_px })
+        let max_still_px =
+            constants.tolerances.map(|t| t.black_centroid_px).filter(|px| px.is_finite() && *px > 0.0);
+        let are_dots_measured = constants.optics_uncertainty.is_some();
+        Ok(Self { optics, dots, key, markers, max_press_mm, solver, mask, max_still_px, are_dots_measured })
     }
 }
 

@@ -2,7 +2,6 @@
 //!
 //! In: [`FrameFindings`], what all stages found. Out: [`Tracked`], its JSON and CSV lines.
 
-mod affine;
 mod checks;
 mod drift;
 mod fields;
@@ -12,7 +11,9 @@ mod record;
 mod reference;
 mod reporter;
 mod result;
+mod smooth_motion;
 mod tear;
+mod touch;
 mod write;
 
 pub use fields::Field;

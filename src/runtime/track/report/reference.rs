@@ -33,11 +33,13 @@ impl ReferenceMean {
         self.displacement.fill((DVec3::ZERO, 0));
     }
 
-    /// Takes in a frame while the reference is not full, and takes the mean off it; `good`: nothing is wrong with it.
-    pub fn apply(&mut self, result: &mut Tracked, errors: Option<&WrenchErrors>, good: bool) {
-        if self.frames < self.wanted {
+    /// Takes in a frame while the reference is not full, and takes the mean off it; `good`: nothing is wrong with it. Whether it
+    /// is one of the reference.
+    pub fn apply(&mut self, result: &mut Tracked, errors: Option<&WrenchErrors>, good: bool) -> bool {
+        let is_taken = self.frames < self.wanted;
+        if is_taken {
             if !good {
-                return;
+                return false;
             }
             self.frames += 1;
             if let Some(wrench) = result.wrench {
@@ -54,7 +56,7 @@ impl ReferenceMean {
             }
         }
         if self.frames == 0 {
-            return;
+            return false;
         }
         if let Some(wrench) = &mut result.wrench {
             let frames = f64::from(self.frames);
@@ -69,6 +71,7 @@ impl ReferenceMean {
                 *displacement -= *sum / f64::from(*count);
             }
         }
+        is_taken
     }
 }
 

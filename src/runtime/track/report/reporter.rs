@@ -9,6 +9,7 @@ use super::problem::{Problem, Problems};
 use super::reference::ReferenceMean;
 use super::result::{DotResult, MarkerResult, Tracked};
 use super::tear::TearCheck;
+use crate::constants::Constants;
 use crate::track::frame::Exposure;
 use crate::track::identities::{DotsFound, MAX_FALSE_DOTS, Orientation};
 use crate::track::marks::{FittedDisc, MarkState};
@@ -58,7 +59,7 @@ pub(in crate::track) struct Reporter {
 
 impl Reporter {
     /// For a sensor.
-    pub fn new(model: &SensorModel, options: &TrackOptions) -> Self {
+    pub fn new(constants: &Constants, model: &SensorModel, options: &TrackOptions) -> Self {
         let wanted = match options.reference {
             Reference::Constants => 0,
             Reference::Frames(wanted) => wanted,
@@ -75,7 +76,7 @@ impl Reporter {
             last_number: None,
             pace: Pace::default(),
             checks: DotChecks::new(model.dots.len()),
-            drift: DriftCheck::new(model.max_still_px),
+            drift: DriftCheck::new(constants, model),
             tear: TearCheck::new(model.dots.len()),
             reference: ReferenceMean::new(wanted, model.dots.len()),
             max_misplaced: options.max_misplaced,
@@ -286,7 +287,9 @@ impl Reporter {
         self.problem_if(findings.pose.refined.is_none() && nothing, Problem::NoMarks);
         self.orientation(findings.dots.orientation);
         let good = known && self.result.problems.iter().all(|p| p >= Problem::Frozen);
-        self.reference.apply(&mut self.result, findings.errors, good);
+        if self.reference.apply(&mut self.result, findings.errors, good) {
+            self.drift.add_rest(tracks);
+        }
         let load = self.result.wrench.zip(self.result.wrench_sd);
         let is_drift = self.drift.is_drift(load, tracks, &model.dots, middle_px);
         self.problem_if(is_drift, Problem::Drift);

@@ -1,9 +1,8 @@
 //! Whether a frame is torn: the dots above a row moved, those below it did not, or otherwise.
 
 use glam::DVec2;
-use nalgebra::Vector3;
 
-use super::affine::{AffineSums, row_of};
+use super::smooth_motion::{MotionSums, Terms, affine_terms};
 use crate::track::identities::DotTrack;
 
 /// Rows at which a tear is looked for.
@@ -22,7 +21,7 @@ const MIN_SHARE: f64 = 0.6;
 pub(super) struct TearCheck {
     whole_px: Vec<Option<DVec2>>,
     /// Place, and motion beside the affine one.
-    moved: Vec<(Vector3<f64>, DVec2)>,
+    moved: Vec<(Terms, DVec2)>,
 }
 
 impl TearCheck {
@@ -50,17 +49,14 @@ impl TearCheck {
     /// The step across the row that explains most of what no affine motion does.
     fn find(&mut self, tracks: &[DotTrack], middle_px: DVec2) -> Option<DVec2> {
         self.moved.clear();
-        let mut sums = AffineSums::default();
+        let mut sums = MotionSums::affine();
         for (track, whole) in tracks.iter().zip(&self.whole_px) {
             let (Some(now), Some(whole), None) = (track.now_px(), whole, track.fault) else { continue };
-            let (place, motion) = (row_of(now, middle_px), now - *whole);
+            let (place, motion) = (affine_terms(now, middle_px), now - *whole);
             sums.add(&place, motion);
             self.moved.push((place, motion));
         }
-        if self.moved.len() < MIN_DOTS {
-            return None;
-        }
-        let affine = sums.solve()?;
+        let affine = sums.solve(MIN_DOTS)?;
         let mut left = 0.0;
         for (place, motion) in &mut self.moved {
             *motion -= affine.at(place);
@@ -72,8 +68,8 @@ impl TearCheck {
         let mut best: Option<(f64, DVec2)> = None;
         for row in 1..ROWS {
             let at = 2.0 * row as f64 / ROWS as f64 - 1.0;
-            let (mut below, mut sum, mut moment) = (0, Vector3::zeros(), DVec2::ZERO);
-            for (place, rest) in self.moved.iter().filter(|(place, _)| place.z > at) {
+            let (mut below, mut sum, mut moment) = (0, Terms::zeros(), DVec2::ZERO);
+            for (place, rest) in self.moved.iter().filter(|(place, _)| place[2] > at) {
                 below += 1;
                 sum += place;
                 moment += *rest;

@@ -3,7 +3,8 @@
 use std::io;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::thread;
+
+use rayon::ThreadPoolBuilder;
 
 use crate::reading::LiveReading;
 use domecast_runtime::shape::ShapeFromColor;
@@ -24,7 +25,10 @@ impl HeightReader {
     pub fn start(mut skin: ShapeFromColor) -> io::Result<Self> {
         let (wanted, of_thread) = channel::<LiveReading>();
         let (found, measured) = channel();
-        thread::Builder::new().name("heights".into()).spawn(move || {
+        // A pool of one: rows are not shared out, for the other cores are the readings'.
+        let pool = ThreadPoolBuilder::new().num_threads(1).thread_name(|_| "heights".into());
+        let pool = pool.panic_handler(|_| ()).build().map_err(io::Error::other)?;
+        pool.spawn(move || {
             for mut reading in of_thread {
                 reading.skin = reading.picture.as_deref().and_then(|picture| {
                     let frame =
@@ -36,7 +40,7 @@ impl HeightReader {
                     return;
                 }
             }
-        })?;
+        });
         Ok(Self { wanted: Some(wanted), measured, is_busy: false })
     }
 

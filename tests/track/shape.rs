@@ -1,12 +1,12 @@
-//! The shape of the skin from colour beside the forces on it: that nothing is allocated once they run.
+//! The shape of the skin from colour beside the forces on it: that nothing is allocated once they run, and that threads change nothing.
 
 use std::ops::Range;
 
-use domecast::shape::{ShapeFromColor, ShapeOptions};
+use domecast::shape::{ShapeFromColor, ShapeMap, ShapeOptions};
 use domecast::sim::scene::SceneFile;
 use domecast::sim::{Around, Drawn, Plan, Renderer, Scene, Scratch};
 use domecast::track::{CameraFrame, TrackOptions};
-use domecast::traction::{ForceDistribution, PressureMap};
+use domecast::traction::{ForceDistribution, LocalForces, PressureMap};
 use serde_json::json;
 
 use super::simulated::scenes;
@@ -40,8 +40,37 @@ fn pressed() -> Vec<Drawn> {
     (0..scene.frame_count()).map(&mut frame).collect()
 }
 
+/// What the frames say, by a sensor that runs with so many threads, again and again from a rest; asserts that nothing is allocated once
+/// each picture was seen.
+fn measured(frames: &[CameraFrame<'_>]) -> Vec<(ShapeMap, LocalForces, Vec<f32>)> {
+    let mut tracker = tracker(TrackOptions::default());
+    let mut shape = ShapeFromColor::new(&SENSOR.constants, &tracker, ShapeOptions::default()).expect("light");
+    let mut forces = ForceDistribution::new(&SENSOR.constants, None).expect("an elastomer");
+    let mut pressure = PressureMap::default();
+    shape.set_rest(&frames[0], tracker.track(0, &frames[0])).expect("a frame at rest");
+    let mut run = |numbers: Range<u64>, see: &mut dyn FnMut(&ShapeMap, &LocalForces, &PressureMap)| {
+        for number in numbers {
+            let frame = &frames[number as usize % frames.len()];
+            let tracked = tracker.track(number, frame);
+            let map = shape.measure(frame, tracked).expect("a map");
+            forces.update(tracked, Some(map));
+            forces.draw_pressure(map, &mut pressure);
+            assert_eq!(map.contact.is_some(), matches!(number % 4, 1 | 2), "frame {number}");
+            see(map, forces.result(), &pressure);
+        }
+    };
+    // Each picture once: room grows with what was seen.
+    let mut all = Vec::new();
+    run(1..5, &mut |map, forces, pressure| {
+        all.push((map.clone(), forces.clone(), pressure.pressure_n_mm2.clone()));
+    });
+    let counted = allocation_counter::measure(|| run(5..13, &mut |_, _, _| ()));
+    assert_eq!(counted.count_total, 0);
+    all
+}
+
 #[test]
-fn shape_and_forces_allocate_nothing_once_they_run() {
+fn shape_and_forces_allocate_nothing_and_are_the_same_for_any_number_of_threads() {
     let drawn = pressed();
     let frames: Vec<CameraFrame<'_>> = drawn
         .iter()
@@ -50,23 +79,24 @@ fn shape_and_forces_allocate_nothing_once_they_run() {
             CameraFrame::new(image.width, image.height, image.channels, &image.bytes).expect("a frame")
         })
         .collect();
-    let mut tracker = tracker(TrackOptions::default());
-    let mut shape = ShapeFromColor::new(&SENSOR.constants, &tracker, ShapeOptions::default()).expect("light");
-    let mut forces = ForceDistribution::new(&SENSOR.constants, None).expect("an elastomer");
-    let mut pressure = PressureMap::default();
-    shape.set_rest(&frames[0], tracker.track(0, &frames[0])).expect("a frame at rest");
-    let mut run = |numbers: Range<u64>| {
-        for number in numbers {
-            let frame = &frames[number as usize % frames.len()];
-            let tracked = tracker.track(number, frame);
-            let map = shape.measure(frame, tracked).expect("a map");
-            forces.update(tracked, Some(map));
-            forces.draw_pressure(map, &mut pressure);
-            assert_eq!(map.contact.is_some(), matches!(number % 4, 1 | 2), "frame {number}");
-        }
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| measured(&frames))
     };
-    // Each picture once: room grows with what was seen.
-    run(1..5);
-    let counted = allocation_counter::measure(|| run(5..13));
-    assert_eq!(counted.count_total, 0);
+    let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
+    let alone = with(1);
+    for threads in [2, 5] {
+        for ((map, forces, pressure), (other, other_forces, other_pressure)) in
+            alone.iter().zip(with(threads))
+        {
+            assert_eq!(bits(&map.height_mm), bits(&other.height_mm), "{threads} threads");
+            assert_eq!(bits(&map.height_sd_mm), bits(&other.height_sd_mm));
+            assert_eq!(bits(pressure), bits(&other_pressure));
+            assert_eq!(
+                (&map.is_touched, &map.contact, &map.status),
+                (&other.is_touched, &other.contact, &other.status)
+            );
+            assert_eq!(*forces, other_forces);
+        }
+    }
 }

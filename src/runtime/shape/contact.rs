@@ -7,10 +7,12 @@
 
 use glam::{DMat2, DVec2, DVec3, Vec2, Vec3A};
 use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
 
 use super::cells::{Cells, View};
 use super::fill::{Pyramid, Weighted};
 use super::fourier::Fourier;
+use super::rows::{MIN_ROWS, share};
 use domecast_optics::DomeShape;
 
 /// Places along each side of the chart.
@@ -43,7 +45,7 @@ pub struct SkinContact {
     pub point_mm: DVec3,
     /// Mean outward normal by pressure.
     pub normal: DVec3,
-    /// The deepest place of the skin, mm.
+    /// The deepest touched place of the skin, mm.
     pub deepest_mm: DVec3,
     /// How deep it lies under its shape at rest, mm.
     pub depth_mm: f64,
@@ -67,26 +69,24 @@ pub(super) struct Chart {
     center_mm: Vec3A,
     pressure: Vec<f32>,
     threshold: f32,
+    /// Where each cell lies in the chart, in steps; NaN beside the dome.
+    places: Vec<Vec2>,
     values: Vec<Weighted>,
     pyramid: Pyramid,
     fourier: Fourier,
 }
 
 impl Chart {
-    /// Finds the pressure of a touch; false where nothing is pressed in. `depths` are signed distances, NaN beside the dome.
+    /// Finds the pressure of a touch with a deep cell. `depths` are signed distances, NaN beside the dome.
     pub fn take(
         &mut self,
         cells: &Cells,
         view: &View,
         points: &[Vec3A],
         depths: &[f32],
-        sd_mm: f32,
+        deepest: usize,
         dome: &DomeShape,
-    ) -> bool {
-        let Some(deepest) = deepest(depths) else { return false };
-        if depths[deepest] > -MIN_DEPTH_MM.max(MIN_DEPTH_SDS * sd_mm) {
-            return false;
-        }
+    ) {
         self.center_mm = dome.center_mm().as_vec3a();
         self.radius_mm = dome.radius_mm() as f32;
         let out = |cell: usize| (points[cell] - self.center_mm).normalize_or(Vec3A::Z);
@@ -100,9 +100,9 @@ impl Chart {
         let near = (points[deepest] - points[(deepest + 1).min(points.len() - 1)]).length();
         let reach = (REACH * far).max(16.0 * near.min(0.1 * self.radius_mm)).min(1.5 * self.radius_mm);
         self.step_mm = 2.0 * reach / SIDE as f32;
-        self.lay_out(cells, view, points, depths);
+        self.find_places(cells, view, points);
+        self.lay_out(cells, view, depths);
         self.find_pressure(near.min(reach));
-        true
     }
 
     /// Stereographic coordinates of a point of the skin, mm.
@@ -118,36 +118,47 @@ impl Chart {
         self.flat(point_mm) / self.step_mm + Vec2::splat(0.5 * SIDE as f32)
     }
 
+    /// Finds each cell's place in the chart.
+    fn find_places(&mut self, cells: &Cells, view: &View, points: &[Vec3A]) {
+        let mut places = std::mem::take(&mut self.places);
+        places.resize(cells.count(), Vec2::NAN);
+        let rows = places.par_chunks_mut(cells.width).zip(points.par_chunks(cells.width)).enumerate();
+        rows.with_min_len(share(MIN_ROWS)).for_each(|(row, (places, points))| {
+            let is_dome = &view.is_dome[row * cells.width..];
+            for ((place, point), is_dome) in places.iter_mut().zip(points).zip(is_dome) {
+                *place = if *is_dome { self.place(*point) } else { Vec2::NAN };
+            }
+        });
+        self.places = places;
+    }
+
     /// Puts the depths at the chart's places.
-    fn lay_out(&mut self, cells: &Cells, view: &View, points: &[Vec3A], depths: &[f32]) {
+    fn lay_out(&mut self, cells: &Cells, view: &View, depths: &[f32]) {
         let mut values = std::mem::take(&mut self.values);
         values.clear();
-        values.resize(SIDE * SIDE, (Vec3A::ZERO, 0.0));
+        values.resize(SIDE * SIDE, Weighted::default());
         for cell in (0..cells.count()).filter(|cell| view.is_dome[*cell]) {
-            let at = self.place(points[cell]);
+            let at = self.places[cell];
             let low = at.floor();
             let part = at - low;
             for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
                 let (x, y) = (low.x + dx, low.y + dy);
                 if x >= 0.0 && y >= 0.0 && x < SIDE as f32 && y < SIDE as f32 {
                     let weight = (1.0 - (part.x - dx).abs()) * (1.0 - (part.y - dy).abs());
-                    let place = &mut values[y as usize * SIDE + x as usize];
-                    place.0.x += weight * depths[cell];
-                    place.1 += weight;
+                    values[y as usize * SIDE + x as usize].add(Vec3A::X * depths[cell], weight);
                 }
             }
         }
-        for place in &mut values {
-            *place = if place.1 > 0.0 { (place.0 / place.1, place.1.min(1.0)) } else { (Vec3A::ZERO, 0.0) };
-        }
+        values.iter_mut().for_each(|place| *place = place.mean());
         self.pyramid.fill(SIDE, &mut values);
         // The square goes on periodically: its margin leads to zero.
         let fade = |i: usize| {
             let to_edge = i.min(SIDE - 1 - i) as f32 / (0.15 * SIDE as f32);
             if to_edge < 1.0 { 0.5 - 0.5 * (std::f32::consts::PI * to_edge).cos() } else { 1.0 }
         };
+        let fade: [f32; SIDE] = std::array::from_fn(fade);
         self.pressure.clear();
-        let faded = values.iter().enumerate().map(|(i, (v, _))| v.x * fade(i % SIDE) * fade(i / SIDE));
+        let faded = values.iter().enumerate().map(|(i, v)| v.value().x * fade[i % SIDE] * fade[i / SIDE]);
         self.pressure.extend(faded);
         self.values = values;
     }
@@ -156,9 +167,11 @@ impl Chart {
     fn find_pressure(&mut self, cell_mm: f32) {
         let per_mm = std::f32::consts::TAU / (SIDE as f32 * self.step_mm);
         let smooth = SMOOTHING_STEPS * std::f32::consts::TAU / SIDE as f32;
+        let smoothed: [f32; SIDE / 2 + 1] =
+            std::array::from_fn(|wave| (-0.5 * (wave as f32 * smooth).powi(2)).exp());
         self.fourier.filter(&mut self.pressure, SIDE, |x, y| {
-            let wave = (x * x + y * y).sqrt();
-            -wave * per_mm * (-0.5 * (wave * smooth).powi(2)).exp()
+            let [part_x, part_y] = [x, y].map(|wave| smoothed[wave.abs() as usize]);
+            -(x * x + y * y).sqrt() * per_mm * part_x * part_y
         });
         let largest = self.pressure.iter().fold(0.0_f32, |max, p| max.max(*p));
         self.threshold = FIRST_PART * largest;
@@ -168,10 +181,10 @@ impl Chart {
         self.threshold = part.clamp(PARTS[0], PARTS[1]) * largest;
     }
 
-    /// Pressure at a point of the skin, over that at the edge of the touch.
+    /// Pressure at a cell, over that at the edge of the touch.
     #[inline]
-    pub fn at(&self, point_mm: Vec3A) -> f32 {
-        let at = self.place(point_mm);
+    pub fn at(&self, cell: usize) -> f32 {
+        let at = self.places[cell];
         let low = at.floor();
         let last = SIDE as f32 - 1.0;
         if !(low.x >= 0.0 && low.y >= 0.0 && low.x < last && low.y < last) {
@@ -195,15 +208,16 @@ impl Chart {
         areas.sum()
     }
 
-    /// What the touch is as a whole; `pressures` are [`Chart::at`] of the cells.
+    /// What the touch is as a whole, and its deepest cell; `pressures` are [`Chart::at`] of the cells.
     pub fn contact(
         &self,
         points: &[Vec3A],
         normals: &[Vec3A],
         depths: &[f32],
         pressures: &[f32],
-    ) -> Option<SkinContact> {
-        let deepest = deepest(depths)?;
+    ) -> Option<(SkinContact, usize)> {
+        let touched = (0..depths.len()).filter(|cell| pressures[*cell] > 1.0 && depths[*cell].is_finite());
+        let deepest = touched.min_by(|a, b| depths[*a].total_cmp(&depths[*b]))?;
         let (mut sum, mut point, mut normal) = (0.0, DVec3::ZERO, DVec3::ZERO);
         for (cell, pressure) in pressures.iter().enumerate().filter(|(_, p)| **p > 1.0) {
             let load = f64::from(*pressure);
@@ -212,7 +226,7 @@ impl Chart {
             normal += load * normals[cell].as_dvec3();
         }
         let area_mm2 = self.area_mm2();
-        (sum > 0.0).then(|| SkinContact {
+        let contact = SkinContact {
             area_mm2,
             point_mm: point / sum,
             normal: normal.normalize_or_zero(),
@@ -221,13 +235,14 @@ impl Chart {
             depth_sd_mm: f64::NAN,
             outline_px: Vec::new(),
             curvatures_per_mm: curvatures(points, normals, pressures, deepest, area_mm2),
-        })
+        };
+        Some((contact, deepest))
     }
 }
 
-fn deepest(depths: &[f32]) -> Option<usize> {
-    let known = depths.iter().enumerate().filter(|(_, depth)| depth.is_finite());
-    known.min_by(|a, b| a.1.total_cmp(b.1)).map(|(cell, _)| cell)
+/// Whether a depth is that of a touch.
+pub(super) fn is_pressed(depth_mm: f32, sd_mm: f32) -> bool {
+    depth_mm < -MIN_DEPTH_MM.max(MIN_DEPTH_SDS * sd_mm)
 }
 
 /// Fewest cells that curvatures are fitted to.

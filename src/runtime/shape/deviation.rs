@@ -10,14 +10,17 @@
 //! JPEG makes of blocks have no direction of their own and give both alike. The middle one of all blocks counts: touches are few.
 
 use glam::Vec3A;
+use rayon::prelude::*;
 
 use super::cells::{Cells, View};
 use super::normals::CellReading;
+use super::rows::share;
 
 /// Cells along the side of the smallest blocks, those of a camera's JPEG, how often these are doubled, and for how many of the
 /// doublings what is left over is looked at: there are few larger ones.
 const BLOCK: usize = 4;
 const LEVELS: usize = 5;
+const MIN_STRIPS: usize = 6;
 const SEEN_LEVELS: usize = 2;
 
 /// Octaves from a cell to the smallest block.
@@ -58,6 +61,8 @@ struct Block {
     /// Variances of the steps across and down, where they are read, mm^2, and what is left between the cells, mm.
     variances_mm2: [f32; 2],
     left_mm: [f32; 2],
+    /// Variance of a cell's step, mm^2, once all are added.
+    variance_mm2: f32,
 }
 
 /// Blocks of a size.
@@ -90,8 +95,8 @@ impl Deviations {
         cells: &Cells,
         view: &View,
         readings: &[CellReading],
-        tilt: impl Fn(usize) -> Vec3A,
-        left_mm: impl Fn(usize, usize) -> f32,
+        tilt: impl Fn(usize) -> Vec3A + Sync,
+        left_mm: impl Fn(usize, usize) -> f32 + Sync,
     ) {
         let w = cells.width;
         let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
@@ -99,14 +104,17 @@ impl Deviations {
         self.hole_mm.clear();
         self.hole_mm.resize(cells.count(), 0.0);
         let Size { columns, blocks } = &mut self.sizes[0];
-        for (row, span) in view.spans.iter().enumerate() {
-            for column in span.clone() {
-                let cell = row * w + column;
+        let strips = blocks.par_chunks_mut(*columns).zip(self.hole_mm.par_chunks_mut(BLOCK * w));
+        let strips = strips.zip(view.spans.par_chunks(BLOCK)).enumerate().with_min_len(share(MIN_STRIPS));
+        strips.for_each(|(strip, ((blocks, hole_mm), spans))| {
+            let rows = spans.iter().enumerate();
+            for (row, column) in rows.flat_map(|(row, span)| span.clone().map(move |column| (row, column))) {
+                let cell = (strip * BLOCK + row) * w + column;
                 let [right, below] = [cell + 1, cell + w];
                 if !(is_dome(cell) && is_dome(right) && is_dome(below)) {
                     continue;
                 }
-                let block = &mut blocks[row / BLOCK * *columns + column / BLOCK];
+                let block = &mut blocks[column / BLOCK];
                 let mut variances_mm2 = [0.0; 2];
                 for (k, next) in [right, below].into_iter().enumerate() {
                     let square = view.surface_mm[next].distance_squared(view.surface_mm[cell]);
@@ -124,10 +132,10 @@ impl Deviations {
                     }
                 } else {
                     let size_mm = view.surface_mm[right].distance(view.surface_mm[cell]);
-                    self.hole_mm[cell] = (HOLE_PART * tilt(cell).length() * size_mm).max(1e-6);
+                    hole_mm[row * w + column] = (HOLE_PART * tilt(cell).length() * size_mm).max(1e-6);
                 }
             }
-        }
+        });
         self.add_up(cells.height.div_ceil(BLOCK));
         self.add_noise();
         self.walk_from_rim(cells, view, readings);
@@ -147,6 +155,7 @@ impl Deviations {
                     size.blocks[to].add(block);
                 }
             }
+            size.blocks.iter_mut().for_each(Block::find_variance);
             if k < SEEN_LEVELS {
                 before =
                     size.factor(((BLOCK << k) * (BLOCK << k)) as f32, &mut self.ratios).unwrap_or(before);
@@ -169,7 +178,7 @@ impl Deviations {
                 } else {
                     std::f32::consts::LN_2
                 };
-                sum += octaves * factor * block.variance_mm2();
+                sum += octaves * factor * block.variance_mm2;
             }
             self.noise_mm2.push(sum / std::f32::consts::TAU);
         }
@@ -186,30 +195,38 @@ impl Deviations {
                 self.away[cell] = 0.0;
             }
         }
+        let cost = |cell: usize| if readings[cell].is_read { 0.0 } else { 1.0 };
         for _ in 0..WALKS {
-            if !self.walk(w, |cell| if readings[cell].is_read { 0.0 } else { 1.0 }, is_dome) {
+            let is_down_new = self.walk(cells, view, true, cost);
+            if !(self.walk(cells, view, false, cost) || is_down_new) {
                 break;
             }
         }
     }
 
-    /// Costs of the way by two passes over the neighbours (G. Borgefors, Computer Vision 27, 1984). Whether any has become less.
-    fn walk(&mut self, w: usize, cost: impl Fn(usize) -> f32, is_dome: impl Fn(usize) -> bool) -> bool {
-        let (n, mut is_new) = (self.away.len(), false);
-        let near = |away: &[f32], i: usize, next: [Option<usize>; 2]| {
-            let of = |next: Option<usize>| next.and_then(|k| away.get(k)).copied().unwrap_or(f32::INFINITY);
-            away[i].min(of(next[0]).min(of(next[1])) + cost(i))
-        };
-        let mut set = |away: &mut [f32], i: usize, next| {
-            let found = near(away, i, next);
-            is_new |= found < away[i];
-            away[i] = found;
-        };
-        for i in (0..n).filter(|i| is_dome(*i)) {
-            set(&mut self.away, i, [i.checked_sub(1), i.checked_sub(w)]);
-        }
-        for i in (0..n).rev().filter(|i| is_dome(*i)) {
-            set(&mut self.away, i, [Some(i + 1), Some(i + w)]);
+    /// Costs of the way by two passes over the neighbours (G. Borgefors, Computer Vision 27, 1984), of which this is one, down or up.
+    /// Whether any has become less.
+    fn walk(&mut self, cells: &Cells, view: &View, is_down: bool, cost: impl Fn(usize) -> f32) -> bool {
+        let (w, rows, mut is_new) = (cells.width, cells.height, false);
+        for k in 0..rows {
+            let row = if is_down { k } else { rows - 1 - k };
+            let (start, span) = (row * w, view.spans[row].clone());
+            let mut beside = f32::INFINITY;
+            for k in 0..span.len() {
+                let cell = start + if is_down { span.start + k } else { span.end - 1 - k };
+                let own = self.away[cell];
+                // The rim, and what is reached without cost, comes no nearer.
+                if own > 0.0 && view.is_dome[cell] {
+                    let along = if is_down { cell.checked_sub(w) } else { Some(cell + w) };
+                    let along = along.and_then(|cell| self.away.get(cell)).copied().unwrap_or(f32::INFINITY);
+                    let found = own.min(along.min(beside) + cost(cell));
+                    is_new |= found < own;
+                    self.away[cell] = found;
+                    beside = found;
+                } else {
+                    beside = own;
+                }
+            }
         }
         is_new
     }
@@ -255,11 +272,11 @@ impl Size {
 }
 
 impl Block {
-    /// Variance of a cell's step. Holes are filled from what is read around them, and err as that does.
-    fn variance_mm2(&self) -> f32 {
+    /// Finds the variance of a cell's step. Holes are filled from what is read around them, and err as that does.
+    fn find_variance(&mut self) {
         let (logs, cells) =
             if self.read > 0.0 { (self.logs, self.read) } else { (self.all_logs, self.cells) };
-        if cells > 0.0 { (logs / cells).exp() } else { 0.0 }
+        self.variance_mm2 = if cells > 0.0 { (logs / cells).exp() } else { 0.0 };
     }
 
     fn add(&mut self, other: &Self) {

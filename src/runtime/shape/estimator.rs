@@ -1,6 +1,7 @@
 //! The stages in their order, frame by frame.
 
 use glam::Vec3A;
+use rayon::prelude::*;
 
 use super::cells::{Cells, View};
 use super::contact::Chart;
@@ -13,8 +14,9 @@ use super::light::ShapeLight;
 use super::map::{ShapeMap, Skin};
 use super::marks::Marks;
 use super::normals::{self, CellReading};
-use super::rest::{RestMap, Seen, seen};
-use super::system::{END_MM, SolveStatus, System};
+use super::rest::RestMap;
+use super::rows::{self, MIN_ROWS, share};
+use super::system::{END_MM, Joint, SolveStatus, System};
 use super::volume::Volume;
 use crate::constants::Constants;
 use crate::track::{CameraFrame, Tracked, Tracker};
@@ -33,10 +35,6 @@ const STILL_STEP_MM: f64 = 0.005;
 
 /// How closely the passes before the last are solved, mm.
 const PASS_END_MM: f64 = 3e-3;
-
-/// Every seventh cell is asked for the order of its colours; the part of their misfit that another order must leave to be taken for theirs.
-const COLOUR_STEP: usize = 7;
-const OTHER_ORDER: f32 = 0.5;
 
 /// Most by which the skin moves, part of its height over the sheet: it is bonded at the rim.
 const MAX_STRAIN: f32 = 0.5;
@@ -96,6 +94,8 @@ pub struct ShapeFromColor {
     chart: Chart,
     /// How far each cell's point has moved along its ray, mm.
     pub(super) moved_mm: Vec<f64>,
+    /// Where it is.
+    pub(super) points_mm: Vec<Vec3A>,
     last_mm: Vec<f64>,
     map: ShapeMap,
 }
@@ -132,7 +132,7 @@ impl ShapeFromColor {
             turn_per_mm: vec![Vec3A::ZERO; count],
             turns: Lattice::default(),
             shifts: Lattice::default(),
-            tilt: vec![(Vec3A::ZERO, 0.0); count],
+            tilt: vec![Weighted::default(); count],
             readings: vec![CellReading::default(); count],
             read_mm: vec![0.0; count],
             is_stale: vec![true; count],
@@ -141,6 +141,7 @@ impl ShapeFromColor {
             system: System::new(cells.width, cells.height),
             chart: Chart::default(),
             moved_mm: vec![0.0; count],
+            points_mm: vec![Vec3A::ZERO; count],
             last_mm: Vec::new(),
             map: ShapeMap::new(&cells, &optics),
             cells,
@@ -201,6 +202,11 @@ impl ShapeFromColor {
     /// # Errors
     /// A frame of another form than the constants'; no frame at rest before it.
     pub fn measure(&mut self, frame: &CameraFrame<'_>, tracked: &Tracked) -> Result<&ShapeMap, ShapeError> {
+        rows::run(|| self.measure_rows(frame, tracked))?;
+        Ok(&self.map)
+    }
+
+    fn measure_rows(&mut self, frame: &CameraFrame<'_>, tracked: &Tracked) -> Result<(), ShapeError> {
         let is_seen = self.see(frame, tracked)?;
         let Some(rest) = &self.rest else {
             return Err(ShapeError::new(
@@ -211,7 +217,7 @@ impl ShapeFromColor {
         };
         if !is_seen {
             self.map.forget();
-            return Ok(&self.map);
+            return Ok(());
         }
         let (shifts, gain) = (&mut self.shifts, &mut self.gain);
         rest.at_pose(&self.cells, &self.view, &self.rest_seen, shifts, self.is_rigid, gain);
@@ -219,49 +225,30 @@ impl ShapeFromColor {
         let mut status = SolveStatus::default();
         for pass in 0..self.options.max_passes {
             self.choose(pass == 0);
+            self.find_points();
             self.read_normals();
-            self.tilt.clear();
-            self.tilt.extend(self.readings.iter().map(|reading| reading.tilt));
-            self.pyramid.fill(self.cells.width, &mut self.tilt);
+            let spans = &self.view.spans;
+            self.pyramid.fill_within(self.cells.width, &mut self.tilt, |row| spans[row].clone());
             self.last_mm.clone_from(&self.moved_mm);
             status = self.integrate();
-            let steps = self.moved_mm.iter().zip(&self.last_mm).map(|(a, b)| (a - b).abs());
-            if steps.fold(0.0, f64::max) < STILL_MM {
+            let is_still = |(now, last): (&f64, &f64)| (now - last).abs() < STILL_MM;
+            if self.moved_mm.iter().zip(&self.last_mm).all(is_still) {
                 break;
             }
         }
         status = self.system.go_on(&mut self.moved_mm, status, END_MM);
         let width = self.cells.width;
+        self.find_points();
         self.measure_deviations();
-        self.volume.hold(&self.cells, &self.view, self.deviations.away(), &mut self.moved_mm);
+        if self.volume.hold(&self.cells, &self.view, self.deviations.away(), &mut self.moved_mm) {
+            self.find_points();
+        }
         let sd_mm = |cell: usize, height_mm: f32| {
             let ring_mm2 = self.volume.variance_mm2(self.deviations.away()[cell]);
             (self.deviations.variance_mm2(cell, width, height_mm) + ring_mm2).sqrt()
         };
-        let skin = Skin { view: &self.view, moved_mm: &self.moved_mm, dome: self.optics.dome() };
+        let skin = Skin { view: &self.view, points_mm: &self.points_mm, dome: self.optics.dome() };
         self.map.draw(&self.cells, &skin, sd_mm, &mut self.chart, status);
-        Ok(&self.map)
-    }
-
-    /// Refuses a frame whose colours are those at rest only in another order: a touch changes some of the skin, never all of it so.
-    fn check_colours(&self) -> Result<(), ShapeError> {
-        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
-        let mut off = [0.0_f32; 6];
-        for Seen { cell, expected, level: seen, .. } in
-            seen(&self.levels, &self.covered, &self.view, &self.light, COLOUR_STEP)
-        {
-            let at_rest = self.gain[cell] * expected;
-            for (off, order) in off.iter_mut().zip(ORDERS) {
-                let difference = (Vec3A::new(seen[order[0]], seen[order[1]], seen[order[2]]) - at_rest).abs();
-                *off += if difference.is_finite() { difference.element_sum() } else { 0.0 };
-            }
-        }
-        let smallest = off.into_iter().fold(f32::INFINITY, f32::min);
-        if smallest < OTHER_ORDER * off[0] {
-            let problem = "has its colours in another order than the frame at rest";
-            let cure = "give both in the same order: red, green, blue, or say which (--raw ..:rgb or :bgr; rgb=False)";
-            return Err(ShapeError::new("frame", problem, cure));
-        }
         Ok(())
     }
 
@@ -277,94 +264,104 @@ impl ShapeFromColor {
             let reading = normals::read(&deeper, irradiance, precision, out, out.any_orthonormal_vector())?;
             Some((out - reading.normal) / TURN_STEP_MM)
         });
-        for (row, span) in view.spans.iter().enumerate() {
+        let rows = self.turn_per_mm.par_chunks_mut(self.cells.width).zip(&view.spans).enumerate();
+        rows.with_min_len(share(MIN_ROWS)).for_each(|(row, (turns, span))| {
+            span.clone().for_each(|column| turns[column] = self.turns.at(column, row));
+        });
+    }
+
+    /// Finds where the cells' points are now; those beside the dome do not move.
+    fn find_points(&mut self) {
+        let (view, w) = (&self.view, self.cells.width);
+        let rows = self.points_mm.par_chunks_mut(w).zip(self.moved_mm.par_chunks_mut(w)).zip(&view.spans);
+        rows.enumerate().with_min_len(share(MIN_ROWS)).for_each(|(row, ((points, moved), span))| {
             for column in span.clone() {
-                self.turn_per_mm[row * self.cells.width + column] = self.turns.at(column, row);
+                let cell = row * w + column;
+                if !view.is_dome[cell] {
+                    moved[column] = 0.0;
+                }
+                points[column] = view.surface_mm[cell] + view.ray[cell] * moved[column] as f32;
             }
-        }
+        });
     }
 
     /// Chooses the cells that are to be read: all, or those whose skin has moved or turned since.
     fn choose(&mut self, is_first: bool) {
-        let width = self.cells.width;
-        for (row, span) in self.view.spans.iter().enumerate() {
-            for cell in row * width + span.start..row * width + span.end {
-                let since = |i: usize| self.moved_mm[i] - self.read_mm[i];
+        if is_first {
+            self.is_stale.fill(true);
+            return;
+        }
+        let (w, read_mm, moved_mm) = (self.cells.width, &self.read_mm, &self.moved_mm);
+        let since = |i: usize| moved_mm[i] - read_mm[i];
+        let rows = self.is_stale.par_chunks_mut(w).zip(&self.view.spans).enumerate();
+        rows.with_min_len(share(MIN_ROWS)).for_each(|(row, (is_stale, span))| {
+            for column in span.clone() {
+                let cell = row * w + column;
                 let own = since(cell);
                 let is_turned =
-                    |next: usize| next < self.read_mm.len() && (since(next) - own).abs() > STILL_STEP_MM;
-                let has_moved = own.abs() > STILL_MM;
-                self.is_stale[cell] = is_first || has_moved || is_turned(cell + 1) || is_turned(cell + width);
+                    |next: usize| next < read_mm.len() && (since(next) - own).abs() > STILL_STEP_MM;
+                is_stale[column] = own.abs() > STILL_MM || is_turned(cell + 1) || is_turned(cell + w);
             }
-        }
-        let cells = self.read_mm.iter_mut().zip(&self.moved_mm).zip(&self.is_stale);
-        cells.filter(|(_, is_stale)| **is_stale).for_each(|((read_mm, moved_mm), _)| *read_mm = *moved_mm);
+        });
     }
 
     /// Reads the normals of the chosen cells.
     fn read_normals(&mut self) {
-        let mut readings = std::mem::take(&mut self.readings);
-        let width = self.cells.width;
-        let rows = readings.chunks_mut(width).zip(&self.view.spans).enumerate();
-        rows.for_each(|(row, (line, span))| {
+        let (mut readings, mut tilt) = (std::mem::take(&mut self.readings), std::mem::take(&mut self.tilt));
+        let mut read_mm = std::mem::take(&mut self.read_mm);
+        let (w, view) = (self.cells.width, &self.view);
+        let lists = readings.par_chunks_mut(w).zip(tilt.par_chunks_mut(w)).zip(read_mm.par_chunks_mut(w));
+        let rows = lists.zip(&view.spans).enumerate().with_min_len(share(MIN_ROWS));
+        rows.for_each(|(row, (((readings, tilt), read_mm), span))| {
             for column in span.clone() {
-                if self.is_stale[row * width + column] {
-                    line[column] = self.read_cell(row * width + column);
+                let cell = row * w + column;
+                if self.is_stale[cell] {
+                    readings[column] = self.read_cell(cell);
+                    read_mm[column] = self.moved_mm[cell];
                 }
             }
+            tilt.iter_mut().zip(readings).for_each(|(tilt, reading)| *tilt = reading.tilt);
         });
-        self.readings = readings;
+        (self.readings, self.tilt, self.read_mm) = (readings, tilt, read_mm);
     }
 
     /// How far heights may be off, by what the normals leave over.
     fn measure_deviations(&mut self) {
-        let (view, moved_mm, tilt) = (&self.view, &self.moved_mm, &self.tilt);
-        let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * moved_mm[cell] as f32;
+        let (view, points_mm, tilt) = (&self.view, &self.points_mm, &self.tilt);
         let left_mm = |cell: usize, next: usize| {
-            let normal = |i: usize| view.normal[i] + tilt[i].0;
-            0.5 * (normal(cell) + normal(next)).dot(point(next) - point(cell))
+            let normal = |i: usize| view.normal[i] + tilt[i].value();
+            0.5 * (normal(cell) + normal(next)).dot(points_mm[next] - points_mm[cell])
         };
-        self.deviations.measure(&self.cells, view, &self.readings, |cell| tilt[cell].0, left_mm);
+        self.deviations.measure(&self.cells, view, &self.readings, |cell| tilt[cell].value(), left_mm);
     }
 
     /// Finds the skin that is perpendicular to the normals.
     fn integrate(&mut self) -> SolveStatus {
-        let view = &self.view;
-        self.system.clear(&view.spans);
-        let width = self.cells.width;
-        let normal_of = |i: usize| view.normal[i] + self.tilt[i].0;
+        let (view, tilt, points_mm, read_mm) = (&self.view, &self.tilt, &self.points_mm, &self.read_mm);
+        let (readings, turn_per_mm) = (&self.readings, &self.turn_per_mm);
         let is_dome = |i: usize| view.is_dome.get(i).copied().unwrap_or(false);
-        for (row, span) in view.spans.iter().enumerate() {
-            for cell in row * width + span.start..row * width + span.end {
-                if !is_dome(cell) {
-                    self.moved_mm[cell] = 0.0;
-                    continue;
-                }
-                let (own, ray, moved_mm) = (normal_of(cell), view.ray[cell], self.moved_mm[cell] as f32);
-                let held = 1.0 / (MAX_STRAIN * view.surface_mm[cell].z);
-                self.system.hold(cell, held * held);
-                let is_last = cell + 1 == row * width + span.end;
-                for (next, is_right) in [(cell + 1, true), (cell + width, false)] {
-                    if (is_right && is_last) || !is_dome(next) {
-                        continue;
-                    }
-                    let normal = 0.5 * (own + normal_of(next));
-                    let at_rest = view.surface_mm[next] - view.surface_mm[cell];
-                    let next_mm = self.moved_mm[next] as f32;
-                    let between = at_rest + view.ray[next] * next_mm - ray * moved_mm;
-                    let turns = [cell, next].map(|i| 0.5 * self.turn_per_mm[i].dot(between));
-                    let side = usize::from(!is_right);
-                    let variance =
-                        0.5 * (self.readings[cell].spread[side] + self.readings[next].spread[side]);
-                    let weight = 1.0 / (at_rest.length_squared() * variance).max(1e-12);
-                    let along = [normal.dot(ray) - turns[0], normal.dot(view.ray[next]) + turns[1]];
-                    // The normals are those of where they were read.
-                    let [read_mm, next_read_mm] = [cell, next].map(|i| self.read_mm[i] as f32);
-                    let offset = normal.dot(at_rest) - turns[0] * read_mm - turns[1] * next_read_mm;
-                    self.system.join(cell, is_right, weight, along, offset);
-                }
+        let normal_of = |i: usize| view.normal[i] + tilt[i].value();
+        let hold = |cell: usize| {
+            let held = 1.0 / (MAX_STRAIN * view.surface_mm[cell].z);
+            is_dome(cell).then_some(held * held)
+        };
+        let join = |cell: usize, next: usize, side: usize| {
+            if !(is_dome(cell) && is_dome(next)) {
+                return None;
             }
-        }
+            let normal = 0.5 * (normal_of(cell) + normal_of(next));
+            let at_rest = view.surface_mm[next] - view.surface_mm[cell];
+            let between = points_mm[next] - points_mm[cell];
+            let turns = [cell, next].map(|i| 0.5 * turn_per_mm[i].dot(between));
+            let variance = 0.5 * (readings[cell].spread[side] + readings[next].spread[side]);
+            let weight = 1.0 / (at_rest.length_squared() * variance).max(1e-12);
+            let along = [normal.dot(view.ray[cell]) - turns[0], normal.dot(view.ray[next]) + turns[1]];
+            // The normals are those of where they were read.
+            let offset =
+                normal.dot(at_rest) - turns[0] * read_mm[cell] as f32 - turns[1] * read_mm[next] as f32;
+            Some(Joint { weight, along, offset })
+        };
+        self.system.set(&view.spans, hold, join);
         self.system.solve(&mut self.moved_mm, PASS_END_MM)
     }
 }

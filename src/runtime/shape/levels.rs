@@ -1,8 +1,10 @@
 //! The picture as linear light of each cell.
 
 use glam::Vec3A;
+use rayon::prelude::*;
 
 use super::cells::{Cells, View};
+use super::rows::{MIN_ROWS, share};
 use crate::track::CameraFrame;
 
 /// From this code on a channel may have been cut off.
@@ -28,7 +30,8 @@ pub(super) fn read(
     out.resize(cells.count(), Level::default());
     let (width, bytes, px) = (frame.width(), frame.bytes(), cells.px);
     let light = |code: u8| linear.get(code as usize).copied().unwrap_or(1.0);
-    for ((row, line), span) in out.chunks_mut(cells.width).enumerate().zip(&view.spans) {
+    let rows = out.par_chunks_mut(cells.width).zip(&view.spans).enumerate();
+    rows.with_min_len(share(MIN_ROWS)).for_each(|(row, (line, span))| {
         for (column, level) in line.iter_mut().enumerate().take(span.end).skip(span.start) {
             let (mut sum, mut highest) = (Vec3A::ZERO, [0_u8; 3]);
             for y in 0..px {
@@ -43,7 +46,7 @@ pub(super) fn read(
             let known = highest.map(|code| if code < SATURATED { 1.0 } else { 0.0 });
             *level = Level { light: sum / (px * px) as f32, is_known: Vec3A::from_array(known) };
         }
-    }
+    });
 }
 
 /// Cells between those at which noise is looked for.

@@ -4,13 +4,18 @@
 //! these (Lagrange's), which is exact to some 1e-6 mm, and much faster. About the dome's outline every cell's own ray is followed.
 
 use glam::{DVec3, Vec3A};
+use rayon::prelude::*;
 
 use super::cells::{Cells, View};
+use super::rows::share;
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 
 /// Cells between two followed rays.
 const STEP: usize = 4;
+
+/// Rows of such that a thread takes at once, at least.
+const MIN_NODE_ROWS: usize = 6;
 
 /// Weights of four nodes in a row for the places of a step from the second on.
 const WEIGHTS: [[f32; 4]; STEP] = [
@@ -43,28 +48,32 @@ impl Cells {
         view.is_dome.clear();
         view.is_dome.resize(count, false);
         let (columns, rows) = (self.width.div_ceil(STEP), self.height.div_ceil(STEP));
-        view.nodes.clear();
-        view.nodes.extend((0..columns * rows).map(|i| {
-            let cell = i / columns * STEP * self.width + i % columns * STEP;
-            self.follow(optics, cell)
-        }));
-        for i in 0..columns * rows {
-            let (column, row) = (i % columns, i / columns);
-            match around(optics, &view.nodes, (column, row), (columns, rows)) {
-                Around::Nothing => {}
-                Around::Smooth(nodes) => self.lay_between(optics, &nodes, (column, row), view),
-                Around::Edge => {
-                    for y in row * STEP..((row + 1) * STEP).min(self.height) {
-                        for x in column * STEP..((column + 1) * STEP).min(self.width) {
-                            let cell = y * self.width + x;
-                            if let Some(seen) = self.follow(optics, cell) {
-                                view.put(optics, cell, seen);
+        view.nodes.resize(columns * rows, None);
+        let min_rows = share(MIN_NODE_ROWS);
+        view.nodes.par_chunks_mut(columns).enumerate().with_min_len(min_rows).for_each(|(row, nodes)| {
+            for (column, node) in nodes.iter_mut().enumerate() {
+                *node = self.follow(optics, row * STEP * self.width + column * STEP);
+            }
+        });
+        let (nodes, strips) = view.strips(STEP * self.width);
+        strips.enumerate().with_min_len(min_rows).for_each(|(row, mut strip)| {
+            for column in 0..columns {
+                match around(optics, nodes, (column, row), (columns, rows)) {
+                    Around::Nothing => {}
+                    Around::Smooth(nodes) => self.lay_between(optics, &nodes, column, &mut strip),
+                    Around::Edge => {
+                        for y in 0..strip.is_dome.len() / self.width {
+                            for x in column * STEP..((column + 1) * STEP).min(self.width) {
+                                let own = y * self.width + x;
+                                if let Some(seen) = self.follow(optics, row * STEP * self.width + own) {
+                                    strip.put(optics, own, seen);
+                                }
                             }
                         }
                     }
                 }
             }
-        }
+        });
         view.spans.clear();
         view.spans.extend(view.is_dome.chunks(self.width).map(|row| {
             let first = row.iter().position(|is_dome| *is_dome).unwrap_or(0);
@@ -84,8 +93,8 @@ impl Cells {
         &self,
         optics: &SensorOptics,
         nodes: &[[[Vec3A; 2]; 4]; 4],
-        (column, row): (usize, usize),
-        view: &mut View,
+        column: usize,
+        strip: &mut Strip<'_>,
     ) {
         let mix = |of: [[Vec3A; 2]; 4], by: [f32; 4]| {
             [0, 1].map(|k| (of[0][k] * by[0] + of[1][k] * by[1]) + (of[2][k] * by[2] + of[3][k] * by[3]))
@@ -93,14 +102,42 @@ impl Cells {
         for (y, down) in WEIGHTS.into_iter().enumerate() {
             let line = [0, 1, 2, 3].map(|x| mix([0, 1, 2, 3].map(|y| nodes[y][x]), down));
             for (x, across) in WEIGHTS.into_iter().enumerate() {
-                let cell = (row * STEP + y) * self.width + column * STEP + x;
-                view.put(optics, cell, mix(line, across));
+                strip.put(optics, y * self.width + column * STEP + x, mix(line, across));
             }
         }
     }
 }
 
+/// What is found in some rows of cells.
+struct Strip<'a> {
+    surface_mm: &'a mut [Vec3A],
+    ray: &'a mut [Vec3A],
+    normal: &'a mut [Vec3A],
+    place: &'a mut [Vec3A],
+    is_dome: &'a mut [bool],
+}
+
 impl View {
+    /// The nodes, and strips of so many cells.
+    fn strips(
+        &mut self,
+        cells: usize,
+    ) -> (&[Option<[Vec3A; 2]>], impl IndexedParallelIterator<Item = Strip<'_>>) {
+        let seen = self.surface_mm.par_chunks_mut(cells).zip(self.ray.par_chunks_mut(cells));
+        let faces = self.normal.par_chunks_mut(cells).zip(self.place.par_chunks_mut(cells));
+        let all = seen.zip(faces).zip(self.is_dome.par_chunks_mut(cells));
+        let strip = |(((surface_mm, ray), (normal, place)), is_dome)| Strip {
+            surface_mm,
+            ray,
+            normal,
+            place,
+            is_dome,
+        };
+        (&self.nodes, all.map(strip))
+    }
+}
+
+impl Strip<'_> {
     fn put(&mut self, optics: &SensorOptics, cell: usize, [point, inside]: [Vec3A; 2]) {
         let dome = optics.dome();
         let place = (point - dome.center_mm().as_vec3a()) / dome.radius_mm() as f32;

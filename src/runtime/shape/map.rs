@@ -3,18 +3,20 @@
 use std::ops::Range;
 
 use glam::{Vec2, Vec3, Vec3A};
+use rayon::prelude::*;
 
 use super::cells::{Cells, View};
-use super::contact::{Chart, SkinContact};
+use super::contact::{Chart, SkinContact, is_pressed};
 use super::outline::outline;
+use super::rows::{MIN_ROWS, share};
 use super::system::SolveStatus;
 use domecast_optics::{DomeShape, SensorOptics};
 
 /// What a solve found.
 pub(super) struct Skin<'a> {
     pub view: &'a View,
-    /// How far each cell's point has moved along its ray, mm.
-    pub moved_mm: &'a [f64],
+    /// Where each cell's point is, sensor frame, mm.
+    pub points_mm: &'a [Vec3A],
     pub dome: &'a DomeShape,
 }
 
@@ -67,12 +69,21 @@ pub struct ShapeMap {
     outline_room: Vec<Vec2>,
     /// The columns of cells between which each row of pixels has values.
     drawn: Vec<Range<usize>>,
-    /// Room for a row of pixels, by cell.
+    /// Room for a row of pixels of each band, by cell.
     mixed: Vec<Mixed>,
 }
 
 /// Values of a cell, or between one and the one below: height, its deviation and pressure; and the normal. NaN beside the dome.
 type Mixed = [Vec3A; 2];
+
+/// A row of pixels: heights, their deviations, normals, touch.
+type Row<'a> = (&'a mut [f32], &'a mut [f32], &'a mut [Vec3], &'a mut [bool]);
+
+/// Cells to each side of a place that a touch presses in with it.
+const AROUND: usize = 2;
+
+/// Rows of pixels that are drawn one after the other.
+const BAND: usize = 32;
 
 impl ShapeMap {
     pub(super) fn new(cells: &Cells, optics: &SensorOptics) -> Self {
@@ -99,7 +110,7 @@ impl ShapeMap {
             // Around all cells.
             outline_room: Vec::with_capacity(2 * (cells.width + cells.height)),
             drawn: vec![0..0; height],
-            mixed: Vec::with_capacity(cells.width),
+            mixed: vec![[Vec3A::NAN; 2]; cells.width * height.div_ceil(BAND)],
         }
     }
 
@@ -201,45 +212,46 @@ impl ShapeMap {
     pub(super) fn draw(
         &mut self,
         cells: &Cells,
-        Skin { view, moved_mm, dome }: &Skin<'_>,
-        sd_mm: impl Fn(usize, f32) -> f32,
+        Skin { view, points_mm, dome }: &Skin<'_>,
+        sd_mm: impl Fn(usize, f32) -> f32 + Sync,
         chart: &mut Chart,
         status: SolveStatus,
     ) {
         self.forget_cells();
         self.status = Some(status);
-        let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * moved_mm[cell] as f32;
         let w = cells.width;
         let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
-        for (row, span) in view.spans.iter().enumerate() {
-            for cell in row * w + span.start..row * w + span.end {
+        let heights = self.cell_mm.par_chunks_mut(w).zip(self.cell_sd_mm.par_chunks_mut(w));
+        let others = self.cell_point.par_chunks_mut(w).zip(self.cell_normal.par_chunks_mut(w));
+        let rows = heights.zip(others).zip(&view.spans).enumerate().with_min_len(share(MIN_ROWS));
+        rows.for_each(|(row, (((heights, sds), (points, normals)), span))| {
+            for column in span.clone() {
+                let cell = row * w + column;
                 if !is_dome(cell) {
                     continue;
                 }
-                let at = point(cell);
-                self.cell_point[cell] = at;
-                self.cell_mm[cell] = dome.distance_mm(at.as_dvec3()) as f32;
-                self.cell_sd_mm[cell] = sd_mm(cell, self.cell_mm[cell]);
-                let side = |next: usize| if is_dome(next) { point(next) } else { at };
+                let at = points_mm[cell];
+                points[column] = at;
+                heights[column] = dome.distance_mm(at.as_dvec3()) as f32;
+                sds[column] = sd_mm(cell, heights[column]);
+                let side = |next: usize| if is_dome(next) { points_mm[next] } else { at };
                 let along = side(cell + 1) - side(cell.wrapping_sub(1));
                 let down = side(cell + w) - side(cell.wrapping_sub(w));
                 let normal = along.cross(down).normalize_or(view.normal[cell]);
                 // The camera looks from inside.
-                self.cell_normal[cell] = if normal.dot(view.ray[cell]) < 0.0 { -normal } else { normal };
+                normals[column] = if normal.dot(view.ray[cell]) < 0.0 { -normal } else { normal };
             }
-        }
-        self.touch(cells, view, dome, chart);
+        });
+        let deepest = self.touch(cells, view, dome, chart);
         self.spread(cells, view);
-        self.draw_outline(cells);
+        if let Some(cell) = deepest {
+            self.draw_outline(cells, cell);
+        }
     }
 
     /// Finds the outline of the touch about its deepest place, or its middle, where an object's hole is deepest.
-    fn draw_outline(&mut self, cells: &Cells) {
+    fn draw_outline(&mut self, cells: &Cells, cell: usize) {
         let Some(contact) = &mut self.contact else { return };
-        let known = self.cell_mm.iter().enumerate().filter(|(_, depth)| depth.is_finite());
-        let touched = known.filter(|(cell, _)| self.cell_pressure[*cell] > 1.0);
-        let Some((cell, _)) = touched.min_by(|a, b| a.1.total_cmp(b.1)) else { return };
-        contact.depth_sd_mm = f64::from(self.cell_sd_mm[cell]);
         let (width, height) = (self.width as i64, self.height as i64);
         let is_in = |x: i64, y: i64| {
             let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
@@ -253,17 +265,37 @@ impl ShapeMap {
         contact.outline_px = room;
     }
 
-    fn touch(&mut self, cells: &Cells, view: &View, dome: &DomeShape, chart: &mut Chart) {
+    /// Finds the touch; its deepest cell.
+    fn touch(&mut self, cells: &Cells, view: &View, dome: &DomeShape, chart: &mut Chart) -> Option<usize> {
         self.cell_pressure.fill(0.0);
-        let deepest = self.cell_mm.iter().zip(&self.cell_sd_mm).filter(|(depth, _)| depth.is_finite());
-        let sd_mm = deepest.min_by(|a, b| a.0.total_cmp(b.0)).map_or(0.0, |(_, sd)| *sd);
-        if !chart.take(cells, view, &self.cell_point, &self.cell_mm, sd_mm, dome) {
-            return;
-        }
-        for cell in (0..cells.count()).filter(|cell| view.is_dome[*cell]) {
-            self.cell_pressure[cell] = chart.at(self.cell_point[cell]);
-        }
-        self.contact = chart.contact(&self.cell_point, &self.cell_normal, &self.cell_mm, &self.cell_pressure);
+        let deepest = self.deepest_place(cells)?;
+        chart.take(cells, view, &self.cell_point, &self.cell_mm, deepest, dome);
+        let shown = &*chart;
+        let pressures = self.cell_pressure.par_iter_mut().enumerate();
+        pressures.with_min_len(share(MIN_ROWS * cells.width)).for_each(|(cell, pressure)| {
+            *pressure = shown.at(cell);
+        });
+        let (mut contact, deepest) =
+            chart.contact(&self.cell_point, &self.cell_normal, &self.cell_mm, &self.cell_pressure)?;
+        contact.depth_sd_mm = f64::from(self.cell_sd_mm[deepest]);
+        self.contact = Some(contact);
+        Some(deepest)
+    }
+
+    /// The middle of the deepest place that a touch has pressed in, as its shallowest cell has it: a touch presses all of a place in. What
+    /// a few cells show that others beside them do not is noise, or an outline that is seen in part.
+    fn deepest_place(&self, cells: &Cells) -> Option<usize> {
+        let w = cells.width;
+        let shallowest_mm = |cell: usize| -> Option<f32> {
+            let (first, last) = (cell.checked_sub(AROUND * w + AROUND)?, cell + AROUND * w + AROUND);
+            let rows = self.cell_mm.get(first..=last)?.chunks(w).flat_map(|row| &row[..=2 * AROUND]);
+            let shallowest_mm = rows.copied().reduce(|a, b| if a.is_nan() || b <= a { a } else { b })?;
+            is_pressed(shallowest_mm, self.cell_sd_mm[cell]).then_some(shallowest_mm)
+        };
+        let pressed = |cell: &usize| is_pressed(self.cell_mm[*cell], self.cell_sd_mm[*cell]);
+        let places =
+            (0..self.cell_mm.len()).filter(pressed).filter_map(|cell| Some((cell, shallowest_mm(cell)?)));
+        places.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(cell, _)| cell)
     }
 
     /// Linear between the cells; a pixel whose own cell sees no dome has nothing.
@@ -276,10 +308,16 @@ impl ShapeMap {
             let values = Vec3A::new(height_mm, cell_sd_mm[cell], cell_pressure[cell]);
             if is_known { [values, cell_normal[cell]] } else { [Vec3A::NAN; 2] }
         };
-        let heights = self.height_mm.chunks_mut(width).zip(self.height_sd_mm.chunks_mut(width));
-        let others = self.normal.chunks_mut(width).zip(self.is_touched.chunks_mut(width));
-        let rows = heights.zip(others).zip(drawn).enumerate();
-        rows.for_each(|(y, (((heights, sds), (normals, touched)), drawn))| {
+        // Rows have a room together, which stays in the nearest cache.
+        let band = width * BAND;
+        let heights = self.height_mm.par_chunks_mut(band).zip(self.height_sd_mm.par_chunks_mut(band));
+        let others = self.normal.par_chunks_mut(band).zip(self.is_touched.par_chunks_mut(band));
+        let rooms = drawn.par_chunks_mut(BAND).zip(mixed.par_chunks_mut(cells.width));
+        let bands = heights.zip(others).zip(rooms).enumerate().with_min_len(share(1));
+        let draw_row = |y: usize,
+                        (heights, sds, normals, touched): Row<'_>,
+                        drawn: &mut Range<usize>,
+                        mixed: &mut [Mixed]| {
             let span = view.spans.get(y / px).cloned().unwrap_or(0..0);
             if *drawn != span {
                 heights.fill(f32::NAN);
@@ -289,7 +327,6 @@ impl ShapeMap {
                 *drawn = span.clone();
             }
             let (row, down) = place(y, px, cells.height);
-            mixed.resize(cells.width, [Vec3A::NAN; 2]);
             // Pixels lie between their own cell and the one on either side.
             let beside = span.start.saturating_sub(1)..(span.end + 1).min(cells.width);
             for (column, mixed) in beside.clone().zip(&mut mixed[beside]) {
@@ -304,6 +341,14 @@ impl ShapeMap {
                 (heights[x], sds[x]) = if is_known { (values.x, values.y) } else { (f32::NAN, f32::NAN) };
                 normals[x] = if is_known { normal.normalize_or_zero().into() } else { Vec3::NAN };
                 touched[x] = is_known && values.z > 1.0;
+            }
+        };
+        bands.for_each(|(band, (((heights, sds), (normals, touched)), (drawn, mixed)))| {
+            let heights = heights.chunks_mut(width).zip(sds.chunks_mut(width));
+            let others = normals.chunks_mut(width).zip(touched.chunks_mut(width));
+            let rows = heights.zip(others).zip(drawn).zip(band * BAND..);
+            for ((((heights, sds), (normals, touched)), drawn), y) in rows {
+                draw_row(y, (heights, sds, normals, touched), drawn, mixed);
             }
         });
     }

@@ -25,6 +25,10 @@
 //!     ─> how far each point moved along its refracted ray (system) ─> the light there, once more ─> map
 //! ```
 //!
+//! Rows of cells are shared out among rayon's threads (as many as cores, or `RAYON_NUM_THREADS`); what comes out has the same bytes for any
+//! number. While a frame is measured a second thread stays awake for it. Called on a thread of rayon's, or where there is one, nothing is
+//! allocated once each kind of frame was seen; from another thread rayon's own queue takes a block every 63 frames.
+//!
 //! After M. K. Johnson and E. H. Adelson, Retrographic sensing for the measurement of surface texture and shape (CVPR 2009);
 //! where they look colours up in a table, here stands the physics that the simulator draws with. The membrane is Lambertian, so
 //! the irradiance of a channel is `A + v . n`: `v` is the vector irradiance of the lights at the point, through sheet and
@@ -33,6 +37,7 @@
 //! `X = X0 + d w` along the refracted ray, which is linear in `d` and its slopes.
 
 mod cells;
+mod colours;
 mod contact;
 mod deviation;
 mod error;
@@ -50,6 +55,7 @@ mod normals;
 mod outline;
 mod reading;
 mod rest;
+pub(crate) mod rows;
 mod seen;
 mod system;
 mod volume;

@@ -36,7 +36,7 @@ pub(super) struct CellReading {
 
 impl Default for CellReading {
     fn default() -> Self {
-        Self { tilt: (Vec3A::ZERO, 0.0), spread: [FILLED_SD_RAD * FILLED_SD_RAD; 2], is_read: false }
+        Self { tilt: Weighted::default(), spread: [FILLED_SD_RAD * FILLED_SD_RAD; 2], is_read: false }
     }
 }
 

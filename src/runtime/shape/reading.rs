@@ -3,6 +3,7 @@
 use glam::Vec3A;
 
 use super::estimator::ShapeFromColor;
+use super::fill::Weighted;
 use super::normals::{self, CellReading, FILLED_SD_RAD};
 
 /// Variance of a reading's tilt, rad^2, from which on there is no light to read by: the skin is taken to be as
@@ -22,13 +23,13 @@ impl ShapeFromColor {
     #[inline]
     pub(super) fn read_cell(&self, cell: usize) -> CellReading {
         let nothing = CellReading::default();
-        let unlit = CellReading { tilt: (Vec3A::ZERO, 1.0), ..nothing };
+        let unlit = CellReading { tilt: Weighted::new(Vec3A::ZERO, 1.0), ..nothing };
         let (view, width) = (&self.view, self.cells.width);
         let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
         if !is_dome(cell) || self.covered[cell] {
             return nothing;
         }
-        let point = |cell: usize| view.surface_mm[cell] + view.ray[cell] * self.moved_mm[cell] as f32;
+        let point = |cell: usize| self.points_mm[cell];
         let at = point(cell);
         let between = |before: usize, after: usize| match (is_dome(before), is_dome(after)) {
             (true, true) => Some(point(after) - point(before)),
@@ -61,7 +62,7 @@ impl ShapeFromColor {
         let filled = FILLED_SD_RAD * FILLED_SD_RAD;
         let weight = good * filled / (good * filled + 0.5 * (xx + yy));
         CellReading {
-            tilt: (reading.normal - out, weight),
+            tilt: Weighted::new(reading.normal - out, weight),
             spread: [xx, along].map(|v| v * filled / (v + good * filled)),
             is_read: true,
         }

@@ -1,6 +1,7 @@
 //! The sensor at rest: by how much what the camera sees there differs from the constants' light.
 
 use glam::{DVec2, Vec3A};
+use rayon::prelude::*;
 
 use super::cells::{Cells, View};
 use super::error::ShapeError;
@@ -8,6 +9,7 @@ use super::fill::{Pyramid, Weighted};
 use super::lattice::Lattice;
 use super::levels::Level;
 use super::light::ShapeLight;
+use super::rows::{MIN_ROWS, share};
 use domecast_optics::SensorOptics;
 
 /// Passes of a mean over three by three cells that smooth the ratio: noise goes, spots of the membrane stay.
@@ -25,8 +27,8 @@ const MAX_FALLOFF: f64 = 10.0;
 pub(super) struct RestMap {
     /// By place of the dome, without the lens's falloff.
     gain: Vec<Vec3A>,
-    /// Exponent n of the lens's falloff, cos^n of the field angle: it stays with the pixel where the platform moves.
-    falloff: f32,
+    /// The lens's falloff, a power of the cosine of the field angle: it stays with the pixel where the platform moves.
+    falloff: Vec<f32>,
 }
 
 /// What a level says of one place.
@@ -37,16 +39,16 @@ pub(super) struct Seen {
     pub level: Vec3A,
 }
 
-/// Ratio of picture and light at the cells that see the bare membrane, of each `step` one.
+/// Ratio of picture and light at those of these cells that see the bare membrane.
 pub(super) fn seen<'a>(
     levels: &'a [Level],
     covered: &'a [bool],
     view: &'a View,
     light: &'a ShapeLight,
-    step: usize,
+    cells: impl Iterator<Item = usize> + 'a,
 ) -> impl Iterator<Item = Seen> + 'a {
-    let cells = levels.iter().zip(covered).enumerate().step_by(step);
-    cells.filter(|(i, (_, is_covered))| view.is_dome[*i] && !**is_covered).filter_map(|(cell, (level, _))| {
+    cells.filter(|cell| view.is_dome[*cell] && !covered[*cell]).filter_map(|cell| {
+        let level = &levels[cell];
         let expected = light.passed(view.ray[cell].z) * light.still(view.place[cell]);
         let level_there = level.light - Vec3A::splat(light.stray);
         let is_known = level.is_known.min_element() > 0.0 && expected.min_element() > 0.0;
@@ -108,7 +110,7 @@ impl RestMap {
         light: &ShapeLight,
         noise: Vec3A,
     ) -> Result<Self, ShapeError> {
-        let seen: Vec<Seen> = seen(levels, covered, view, light, 1).collect();
+        let seen: Vec<Seen> = seen(levels, covered, view, light, 0..cells.count()).collect();
         let medians = medians(&seen);
         check(&seen, medians)?;
         let falloff = falloff(&seen, cells);
@@ -125,13 +127,14 @@ impl RestMap {
         }
         let [products, squares] = &sums;
         let prior = (noise / (medians * RATIO_SD)).powf(2.0);
-        let mut values: Vec<Weighted> = vec![(Vec3A::ZERO, 0.0); cells.count()];
+        let mut values: Vec<Weighted> = vec![Weighted::default(); cells.count()];
         for one in &seen {
             let (product, square) = (products[one.cell], squares[one.cell]);
-            values[one.cell] = ((product + prior * medians) / (square + prior), 1.0);
+            values[one.cell] = Weighted::new((product + prior * medians) / (square + prior), 1.0);
         }
         Pyramid::default().fill(cells.width, &mut values);
-        let gain = values.into_iter().map(|(ratio, _)| ratio.max(medians * 0.02)).collect();
+        let gain = values.into_iter().map(|value| value.value().max(medians * 0.02)).collect();
+        let falloff = (0..cells.count()).map(|cell| cells.cosine(cell).powf(falloff)).collect();
         Ok(Self { gain, falloff })
     }
 
@@ -153,7 +156,9 @@ impl RestMap {
                 Some((cells.of_pixel(pixel) - own).extend(0.0).as_vec3a())
             });
         }
-        for (row, span) in view.spans.iter().enumerate() {
+        let shifts = &*shifts;
+        let rows = out.par_chunks_mut(cells.width).zip(&view.spans).enumerate();
+        rows.with_min_len(share(MIN_ROWS)).for_each(|(row, (out, span))| {
             for column in span.clone() {
                 let cell = row * cells.width + column;
                 let gain = if is_rigid {
@@ -162,9 +167,9 @@ impl RestMap {
                     let shift = shifts.at(column, row);
                     self.between(cells, column as f32 + shift.x, row as f32 + shift.y)
                 };
-                out[cell] = gain * cells.cosine(cell).powf(self.falloff);
+                out[column] = gain * self.falloff[cell];
             }
-        }
+        });
     }
 
     /// Linear between the cells.

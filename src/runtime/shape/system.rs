@@ -7,7 +7,10 @@
 
 use std::ops::Range;
 
-use super::grid::{Grid, precondition};
+use rayon::prelude::*;
+
+use super::grid::{GROUP, Grid, precondition};
+use super::rows::{MIN_ROWS, share};
 
 /// Bound on the rounds.
 pub(super) const MAX_ROUNDS: usize = 60;
@@ -34,13 +37,25 @@ pub struct SolveStatus {
     pub is_converged: bool,
 }
 
+/// The equation `offset + q d_q - p d_p = 0` between two cells, with `along` p and q.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Joint {
+    pub weight: f32,
+    pub along: [f32; 2],
+    pub offset: f32,
+}
+
 /// The system, kept between frames.
 #[derive(Debug, Clone, Default)]
 pub(super) struct System {
     grids: Vec<Grid>,
-    residual: Vec<f64>,
-    direction: Vec<f64>,
-    product: Vec<f64>,
+    asked: Vec<f64>,
+    /// What a row's equations bring the next row: weight, and what is asked.
+    passed: Vec<[f32; 2]>,
+    direction: Vec<f32>,
+    product: Vec<f32>,
+    /// By group of rows: sums, and largest sizes.
+    sums: Vec<(f64, f32)>,
     /// Size of the right side, and the last round's product of residual and step.
     size: f64,
     along: f64,
@@ -51,138 +66,190 @@ impl System {
         let mut grids = Vec::new();
         let (mut w, mut h) = (width, height);
         loop {
-            let zeros = vec![0.0; w * h];
-            grids.push(Grid {
-                width: w,
-                own: zeros.clone(),
-                per_own: zeros.clone(),
-                right: zeros.clone(),
-                below: zeros.clone(),
-                wanted: zeros.clone(),
-                found: zeros.clone(),
-                left: zeros,
-                spans: Vec::new(),
-            });
+            grids.push(Grid::new(w, h));
             if w * h <= COARSEST {
                 break;
             }
             (w, h) = (w.div_ceil(2), h.div_ceil(2));
         }
-        let zeros = vec![0.0; width * height];
+        let groups = height.div_ceil(GROUP);
+        let zeros = vec![0.0; width * GROUP * groups];
         Self {
             grids,
-            residual: zeros.clone(),
+            asked: vec![0.0; width * height],
+            passed: vec![[0.0; 2]; width * height],
             direction: zeros.clone(),
             product: zeros,
+            sums: vec![(0.0, 0.0); groups],
             size: 0.0,
             along: 0.0,
         }
     }
 
-    /// Empties the equations; those that come lie within these columns of each row.
-    pub fn clear(&mut self, spans: &[Range<usize>]) {
+    /// Takes the equations, which lie within these columns of each row: `hold` says with what weight a cell is held at 0, `join` what binds
+    /// it to the next one across (side 0) or down (1).
+    pub fn set(
+        &mut self,
+        spans: &[Range<usize>],
+        hold: impl Fn(usize) -> Option<f32> + Sync,
+        join: impl Fn(usize, usize, usize) -> Option<Joint> + Sync,
+    ) {
         for (k, grid) in self.grids.iter_mut().enumerate() {
-            for list in [&mut grid.own, &mut grid.right, &mut grid.below] {
-                list.fill(0.0);
+            grid.clear(spans, k);
+        }
+        let Some(Grid { width: w, own, right, below, .. }) = self.grids.first_mut() else { return };
+        let w = *w;
+        let weights = own.par_chunks_mut(w).zip(right.par_chunks_mut(w)).zip(below.par_chunks_mut(w));
+        let lists = weights.zip(self.asked.par_chunks_mut(w)).zip(self.passed.par_chunks_mut(w));
+        let rows = lists.zip(spans).enumerate().with_min_len(share(MIN_ROWS));
+        rows.for_each(|(row, (((((own, right), below), asked), passed), span))| {
+            [&mut *own, right, below].into_iter().for_each(|list| list.fill(0.0));
+            asked.fill(0.0);
+            passed.fill([0.0; 2]);
+            for x in span.clone() {
+                let cell = row * w + x;
+                own[x] += hold(cell).unwrap_or(0.0);
+                if x + 1 < span.end
+                    && let Some(Joint { weight, along: [p, q], offset }) = join(cell, cell + 1, 0)
+                {
+                    own[x] += weight * p * p;
+                    own[x + 1] += weight * q * q;
+                    right[x] = -weight * p * q;
+                    asked[x] += f64::from(weight * p * offset);
+                    asked[x + 1] -= f64::from(weight * q * offset);
+                }
+                if let Some(Joint { weight, along: [p, q], offset }) = join(cell, cell + w, 1) {
+                    own[x] += weight * p * p;
+                    below[x] = -weight * p * q;
+                    asked[x] += f64::from(weight * p * offset);
+                    passed[x] = [weight * q * q, weight * q * offset];
+                }
             }
-            // Rows of the grid hold 2^k of the finest's.
-            let widest = |rows: &[Range<usize>]| {
-                let filled = || rows.iter().filter(|span| !span.is_empty());
-                // At even columns, so that pairs of cells are one of the coarser grid.
-                let start = (filled().map(|span| span.start).min().unwrap_or(0) >> k) & !1;
-                start..filled().map(|span| span.end).max().unwrap_or(0).div_ceil(1 << k).max(start)
-            };
-            grid.spans.clear();
-            grid.spans.extend(spans.chunks(1 << k).map(widest));
-        }
-        self.residual.fill(0.0);
-    }
-
-    /// Holds a cell at 0 with this weight.
-    #[inline]
-    pub fn hold(&mut self, cell: usize, weight: f32) {
-        if let Some(own) = self.grids.first_mut().and_then(|grid| grid.own.get_mut(cell)) {
-            *own += weight;
-        }
-    }
-
-    /// Adds the equation `offset + q d_q - p d_p = 0` between a cell and the one to its right, or below it.
-    #[inline]
-    pub fn join(&mut self, cell: usize, is_right: bool, weight: f32, [p, q]: [f32; 2], offset: f32) {
-        let Some(grid) = self.grids.first_mut() else { return };
-        let next = if is_right { cell + 1 } else { cell + grid.width };
-        if next >= grid.own.len() {
-            return;
-        }
-        grid.own[cell] += weight * p * p;
-        grid.own[next] += weight * q * q;
-        let coupling = if is_right { &mut grid.right } else { &mut grid.below };
-        coupling[cell] -= weight * p * q;
-        self.residual[cell] += f64::from(weight * p * offset);
-        self.residual[next] -= f64::from(weight * q * offset);
+        });
+        // What the rows above bring.
+        let above = self.passed.par_chunks(w).zip(spans);
+        let rows = own[w..].par_chunks_mut(w).zip(self.asked[w..].par_chunks_mut(w)).zip(above);
+        rows.with_min_len(share(MIN_ROWS)).for_each(|((own, asked), (passed, span))| {
+            for x in span.clone() {
+                own[x] += passed[x][0];
+                asked[x] -= f64::from(passed[x][1]);
+            }
+        });
     }
 
     /// Solves from a first guess in `moved` until a round moves no cell by more than `end_mm`; cells without equations stay 0.
     pub fn solve(&mut self, moved: &mut [f64], end_mm: f64) -> SolveStatus {
         self.coarsen();
-        let Self { grids, residual, direction, product, size, .. } = self;
-        *size = dot(residual, residual).sqrt();
-        if !(*size > 0.0 && size.is_finite()) {
+        let mut sums = [0.0; LANES];
+        for lane in self.asked.chunks(LANES) {
+            sums.iter_mut().zip(lane).for_each(|(sum, v)| *sum += v * v);
+        }
+        self.size = sums.iter().sum::<f64>().sqrt();
+        if !(self.size > 0.0 && self.size.is_finite()) {
             moved.fill(0.0);
-            return SolveStatus { is_converged: *size == 0.0, ..SolveStatus::default() };
+            return SolveStatus { is_converged: self.size == 0.0, ..SolveStatus::default() };
         }
-        let Some(fine) = grids.first() else { return SolveStatus::default() };
-        fine.times(moved, product);
-        for (r, p) in residual.iter_mut().zip(&*product) {
-            *r -= p;
-        }
-        direction.fill(0.0);
+        let Some(fine) = self.grids.first_mut() else { return SolveStatus::default() };
+        fine.leave_of(&self.asked, moved);
+        self.direction.fill(0.0);
         self.along = f64::INFINITY;
         self.go_on(moved, SolveStatus::default(), end_mm)
     }
 
     /// Goes on where [`System::solve`] ended, to a closer end.
     pub fn go_on(&mut self, moved: &mut [f64], so_far: SolveStatus, end_mm: f64) -> SolveStatus {
-        let Self { grids, residual, direction, product, size, along: before, .. } = self;
         let mut status = so_far;
-        if !(*size > 0.0 && size.is_finite()) {
+        if !(self.size > 0.0 && self.size.is_finite()) {
             return status;
         }
         status.is_converged = status.rounds > 0 && status.last_step_mm <= end_mm;
         while !status.is_converged && status.rounds < MAX_ROUNDS {
-            precondition(grids, residual);
-            let Some(fine) = grids.first() else { break };
-            let along: f64 = fine.lines().map(|line| dot(&residual[line.clone()], &fine.found[line])).sum();
-            let keep = along / *before;
-            for line in fine.lines() {
-                let found = direction[line.clone()].iter_mut().zip(&fine.found[line]);
-                found.for_each(|(direction, found)| *direction = f64::from(*found) + keep * *direction);
-            }
-            *before = along;
-            fine.times(direction, product);
-            let (mut curvature, mut longest) = (0.0, 0.0_f64);
-            for line in fine.lines() {
-                curvature += dot(&direction[line.clone()], &product[line.clone()]);
-                longest = longest.max(largest(&direction[line]));
-            }
+            precondition(&mut self.grids);
+            let along = self.turn();
+            let (curvature, longest) = self.look_ahead();
             if !(along > 0.0 && curvature > 0.0) {
                 // Nothing is left, or rounding is all that is.
                 status.is_converged = along == 0.0;
                 break;
             }
             let step = along / curvature;
-            for line in fine.lines() {
-                let along = moved[line.clone()].iter_mut().zip(&direction[line.clone()]);
-                along.for_each(|(moved, direction)| *moved += step * direction);
-                let left = residual[line.clone()].iter_mut().zip(&product[line]);
-                left.for_each(|(residual, product)| *residual -= step * product);
-            }
+            self.step(moved, step);
             status.rounds += 1;
-            status.last_step_mm = step * longest;
+            status.last_step_mm = step * f64::from(longest);
             status.is_converged = status.last_step_mm <= end_mm;
         }
-        status.residual = dot(residual, residual).sqrt() / *size;
+        if let Some(fine) = self.grids.first() {
+            let rows = fine.wanted.chunks(fine.width);
+            status.residual = rows.map(|row| dot(row, row)).sum::<f64>().sqrt() / self.size;
+        }
         status
+    }
+
+    /// Turns to the direction that the cycle found. The product of it and the residual.
+    fn turn(&mut self) -> f64 {
+        let Self { grids, direction, sums, .. } = self;
+        let Some(fine) = grids.first() else { return 0.0 };
+        let (w, min_rows) = (fine.width, fine.share());
+        sums.par_iter_mut().zip(&fine.spans).enumerate().with_min_len(min_rows).for_each(
+            |(group, (sum, span))| {
+                let rows = group * GROUP..(group + 1) * GROUP;
+                sum.0 = rows
+                    .map(|row| dot(&fine.wanted[row * w..][span.clone()], &fine.found(row)[span.clone()]))
+                    .sum();
+            },
+        );
+        let along: f64 = sums.iter().map(|sum| sum.0).sum();
+        let keep = (along / self.along) as f32;
+        self.along = along;
+        let groups = direction.par_chunks_mut(GROUP * w).zip(&fine.spans).enumerate().with_min_len(min_rows);
+        groups.for_each(|(group, (direction, span))| {
+            for (line, row) in direction.chunks_mut(w).zip(group * GROUP..) {
+                let found = &fine.found(row)[span.clone()];
+                line[span.clone()]
+                    .iter_mut()
+                    .zip(found)
+                    .for_each(|(direction, found)| *direction = found + keep * *direction);
+            }
+        });
+        along
+    }
+
+    /// What a step in the direction changes: the curvature along it, and its largest part.
+    fn look_ahead(&mut self) -> (f64, f32) {
+        let Self { grids, direction, product, sums, .. } = self;
+        let Some(fine) = grids.first() else { return (0.0, 0.0) };
+        let (w, min_rows, direction) = (fine.width, fine.share(), &*direction);
+        let groups = product.par_chunks_mut(GROUP * w).zip(&mut *sums).zip(&fine.spans).enumerate();
+        groups.with_min_len(min_rows).for_each(|(group, ((product, sum), span))| {
+            fine.times(group, direction, product);
+            *sum = (0.0, 0.0);
+            for (product, row) in product.chunks(w).zip(group * GROUP..) {
+                let direction = &direction[row * w..][span.clone()];
+                sum.0 += dot(direction, &product[span.clone()]);
+                sum.1 = sum.1.max(largest(direction));
+            }
+        });
+        sums.iter().fold((0.0, 0.0), |(sum, high), own| (sum + own.0, high.max(own.1)))
+    }
+
+    /// Goes a step in the direction.
+    fn step(&mut self, moved: &mut [f64], step: f64) {
+        let Self { grids, direction, product, .. } = self;
+        let Some(fine) = grids.first_mut() else { return };
+        let (w, min_rows) = (fine.width, fine.share());
+        let lists = fine.wanted.par_chunks_mut(GROUP * w).zip(moved.par_chunks_mut(GROUP * w));
+        let groups = lists.zip(&fine.spans).enumerate().with_min_len(min_rows);
+        let (direction, product) = (&*direction, &*product);
+        groups.for_each(|(group, ((residual, moved), span))| {
+            let rows = residual.chunks_mut(w).zip(moved.chunks_mut(w)).zip(group * GROUP..);
+            for ((residual, moved), row) in rows {
+                let all = row * w + span.start..row * w + span.end;
+                let along = moved[span.clone()].iter_mut().zip(&direction[all.clone()]);
+                along.for_each(|(moved, direction)| *moved += step * f64::from(*direction));
+                let left = residual[span.clone()].iter_mut().zip(&product[all]);
+                left.for_each(|(residual, product)| *residual -= step as f32 * product);
+            }
+        });
     }
 
     fn coarsen(&mut self) {
@@ -198,25 +265,29 @@ impl System {
         for k in 1..self.grids.len() {
             let (finer, coarser) = self.grids.split_at_mut(k);
             let (Some(fine), Some(coarse)) = (finer.last(), coarser.first_mut()) else { return };
-            for list in [&mut coarse.own, &mut coarse.right, &mut coarse.below] {
-                list.fill(0.0);
-            }
-            for (y, span) in fine.spans.iter().enumerate() {
+            let (w, own) = (coarse.width, coarse.own.par_chunks_mut(coarse.width));
+            let rows =
+                own.zip(coarse.right.par_chunks_mut(w)).zip(coarse.below.par_chunks_mut(w)).enumerate();
+            let min_rows = fine.share().saturating_mul(GROUP / 2);
+            rows.with_min_len(min_rows).for_each(|(row, ((own, right), below))| {
+                [&mut *own, right, below].into_iter().for_each(|list| list.fill(0.0));
+                let Some(span) = fine.spans.get(2 * row / GROUP) else { return };
                 for x in span.clone() {
-                    let (i, to) = (y * fine.width + x, y / 2 * coarse.width + x / 2);
-                    coarse.own[to] += fine.own[i];
-                    let (right, below) = (fine.right[i], fine.below[i]);
+                    let (to, upper) = (x / 2, 2 * row * fine.width + x);
+                    let lower = upper + fine.width;
+                    own[to] += fine.own[upper] + fine.own[lower] + 2.0 * fine.below[upper];
+                    let across = fine.right[upper] + fine.right[lower];
                     if x % 2 == 0 {
-                        coarse.own[to] += 2.0 * right
+                        own[to] += 2.0 * across
                     } else {
-                        coarse.right[to] += right
+                        right[to] += across
                     }
-                    if y % 2 == 0 { coarse.own[to] += 2.0 * below } else { coarse.below[to] += below }
+                    below[to] += fine.below[lower];
                 }
-            }
-            for list in [&mut coarse.own, &mut coarse.right, &mut coarse.below] {
-                list.iter_mut().for_each(|v| *v *= COARSE_COUPLING);
-            }
+                for list in [own, right, below] {
+                    list.iter_mut().for_each(|v| *v *= COARSE_COUPLING);
+                }
+            });
         }
     }
 }
@@ -224,20 +295,20 @@ impl System {
 /// Sums run side by side: one after the other they wait for each other.
 const LANES: usize = 8;
 
-fn dot<T: Copy + Into<f64>>(a: &[f64], b: &[T]) -> f64 {
-    let (mut sums, a_lanes, b_lanes) = ([0.0; LANES], a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let rest = a_lanes.remainder().iter().zip(b_lanes.remainder()).map(|(a, b)| a * (*b).into());
-    let rest: f64 = rest.sum();
+/// The product of two rows.
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    let (mut sums, a_lanes, b_lanes) = ([0.0_f32; LANES], a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest: f32 = a_lanes.remainder().iter().zip(b_lanes.remainder()).map(|(a, b)| a * b).sum();
     for (a, b) in a_lanes.zip(b_lanes) {
-        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * (*b).into());
+        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
     }
-    sums.iter().sum::<f64>() + rest
+    f64::from(sums.iter().sum::<f32>() + rest)
 }
 
-/// The largest size of a list's numbers.
-fn largest(list: &[f64]) -> f64 {
-    let (mut high, lanes) = ([0.0_f64; LANES], list.chunks_exact(LANES));
-    let rest = lanes.remainder().iter().fold(0.0_f64, |high, v| high.max(v.abs()));
+/// The largest size of a row's numbers.
+fn largest(list: &[f32]) -> f32 {
+    let (mut high, lanes) = ([0.0_f32; LANES], list.chunks_exact(LANES));
+    let rest = lanes.remainder().iter().fold(0.0_f32, |high, v| high.max(v.abs()));
     for lane in lanes {
         high.iter_mut().zip(lane).for_each(|(high, v)| *high = if v.abs() > *high { v.abs() } else { *high });
     }
@@ -255,22 +326,18 @@ mod tests {
         let spans: Vec<Range<usize>> = (0..height).map(|_| 0..width).collect();
         let mut system = System::new(width, height);
         let mut moved = vec![0.0; width * height];
+        let at = |cell: usize| truth(cell % width, cell / width);
+        let join = |cell: usize, next: usize, side: usize| {
+            let joint = |next| Joint {
+                weight: [2.0, 1.0][side],
+                along: [1.0; 2],
+                offset: (at(cell) - at(next)) as f32,
+            };
+            (next < width * height).then(|| joint(next))
+        };
         for _ in 0..2 {
-            system.clear(&spans);
-            for y in 0..height {
-                for x in 0..width {
-                    let cell = y * width + x;
-                    let step = |x2: usize, y2: usize| (truth(x, y) - truth(x2, y2)) as f32;
-                    if x + 1 < width {
-                        system.join(cell, true, 2.0, [1.0, 1.0], step(x + 1, y));
-                    }
-                    if y + 1 < height {
-                        system.join(cell, false, 1.0, [1.0, 1.0], step(x, y + 1));
-                    }
-                }
-            }
             // The truth is 0 at (0, 0) alone.
-            system.hold(0, 1e4);
+            system.set(&spans, |cell| (cell == 0).then_some(1e4), join);
             let status = system.solve(&mut moved, END_MM);
             assert!(status.is_converged && status.residual < 1e-2, "{status:?}");
         }
@@ -285,7 +352,7 @@ mod tests {
     #[test]
     fn nothing_asked_is_nothing_moved() {
         let mut system = System::new(20, 20);
-        system.clear(&vec![3..17; 20]);
+        system.set(&vec![3..17; 20], |_| None, |_, _, _| None);
         let mut moved = vec![1.0; 400];
         let status = system.solve(&mut moved, END_MM);
         assert!(status.is_converged && moved.iter().all(|v| *v == 0.0));

@@ -83,14 +83,14 @@ impl Volume {
     }
 
     /// Gives the skin behind a dark ring the step that the volume asks for; `away` are the cells without readings on the way
-    /// from the rim.
-    pub fn hold(&mut self, cells: &Cells, view: &View, away: &[f32], moved_mm: &mut [f64]) {
+    /// from the rim. Whether it has one.
+    pub fn hold(&mut self, cells: &Cells, view: &View, away: &[f32], moved_mm: &mut [f64]) -> bool {
         let sums = Sums::of(cells, view, away, moved_mm);
         let all_mm2 = self.dome.area_mm2();
         (self.step_sd_mm, self.ring) = (0.0, sums.away / sums.area_mm2);
         let is_ring = self.ring >= MIN_RING && self.ring.is_finite();
         if !is_ring {
-            return;
+            return false;
         }
         // Kalman's gain of one unknown. A touch raises the skin around by its volume over the dome's area, and the ring hides no more.
         let bulge_mm = -sums.pressed_mm3 / all_mm2;
@@ -106,6 +106,7 @@ impl Volume {
                 moved_mm[cell] += step_mm * self.part(away[cell]);
             }
         }
+        true
     }
 
     /// Part of the step at a place with so many cells without readings on the way from the rim.

@@ -21,7 +21,7 @@ const MAX_STEPS: u32 = 60;
 
 /// The rows of a frame: columns by axis and node, each of `rows` values, already over their deviations.
 pub(super) struct Rows<'a> {
-    pub columns: &'a [f64],
+    pub columns: &'a mut [f64],
     pub wanted: &'a [f64],
     /// Nodes.
     pub nodes: usize,
@@ -71,7 +71,7 @@ pub(super) enum Ended {
 }
 
 /// The nodes that bear a pressure, and their tractions; warm from frame to frame.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct ActiveSet {
     /// The nodes, by slot.
     pub active: Vec<usize>,
@@ -112,8 +112,8 @@ impl ActiveSet {
         self.tractions.fill(0.0);
     }
 
-    /// Solves a frame from the nodes of the last one.
-    pub fn solve(&mut self, rows: &Rows<'_>) -> Ended {
+    /// Solves a frame from the nodes of the last one; `shear` fills a node's columns of shear, which nodes without pressure do not have.
+    pub fn solve(&mut self, rows: &mut Rows<'_>, shear: impl Fn(usize, &mut [f64])) -> Ended {
         for (went, is_allowed) in self.went.iter_mut().zip(&self.allowed) {
             *went = !is_allowed;
         }
@@ -128,6 +128,7 @@ impl ActiveSet {
             *per_sd = 1.0 / (rows.product((0, node), (0, node)) + rows.prior(0, node, node)).sqrt();
         }
         for slot in 0..self.active.len() {
+            shear(self.active[slot], rows.columns);
             self.enter(rows, slot);
         }
         let mut ended = self.solve_active(rows);
@@ -141,6 +142,7 @@ impl ActiveSet {
                     return Ended::Bound;
                 }
                 self.active.push(node);
+                shear(node, rows.columns);
                 self.enter(rows, self.active.len() - 1);
             }
             ended = self.solve_active(rows);
@@ -282,9 +284,15 @@ mod tests {
         for _ in 0..20 {
             let columns: Vec<f64> = (0..AXES * nodes * count).map(|_| random.normal()).collect();
             let wanted: Vec<f64> = (0..count).map(|_| 3.0 * random.normal()).collect();
-            let rows =
-                Rows { columns: &columns, wanted: &wanted, nodes, precision: &precision, shear_ratio: 0.09 };
-            assert_eq!(set.solve(&rows), Ended::Solved);
+            let mut of_rows = columns.clone();
+            let mut rows = Rows {
+                columns: &mut of_rows,
+                wanted: &wanted,
+                nodes,
+                precision: &precision,
+                shear_ratio: 0.09,
+            };
+            assert_eq!(set.solve(&mut rows, |_, _| ()), Ended::Solved);
             let mut left = wanted.clone();
             for k in 0..AXES * nodes {
                 let column = &columns[k * count..(k + 1) * count];

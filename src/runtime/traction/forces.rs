@@ -7,8 +7,9 @@ use super::model::{AXES, Dot, ElasticModel};
 use super::posterior::Posterior;
 use super::pressure_room::PressureRoom;
 use super::result::{DotTraction, LocalForces, TractionStatus};
+use super::wrench_rows::WrenchRows;
 use crate::constants::Constants;
-use crate::shape::ShapeMap;
+use crate::shape::{ShapeMap, rows};
 use crate::track::TrackError;
 use crate::track::Tracked;
 use domecast_optics::SensorOptics;
@@ -16,13 +17,14 @@ use domecast_optics::numeric::Rigid;
 
 /// Turns of the forces with the skin, and of the rays with its motion, in a frame: each leaves a few hundredths.
 const TURNS: u32 = 3;
-/// How closely the forces must add to the wrench beside its own noise: a part of the force, and least, N; moments by the dome's radius.
-const WRENCH_PART: f64 = 0.002;
-const MIN_WRENCH_SD_N: f64 = 0.001;
+/// How closely at least the forces must add to the wrench beside its own noise, N.
+pub(super) const MIN_WRENCH_SD_N: f64 = 0.001;
 /// Variance of shear over that of pressure: friction of a half or so, slipping seldom.
-const SHEAR_RATIO: f64 = 0.09;
+pub(super) const SHEAR_RATIO: f64 = 0.09;
 /// The softness is looked for where the force is so many of its deviations.
 const SOFTNESS_OVER_SD: f64 = 20.0;
+/// A force bears on the sensor where it is so many of its deviations.
+const PRESSED_OVER_SD: f64 = 3.0;
 /// What the contact point of a height map is off beside noise, as a part of the touch's radius, and for each part of the load that is
 /// shear: the skin's own pressure is that of a load without shear.
 const POINT_PART: f64 = 0.02;
@@ -43,10 +45,14 @@ pub struct ForceDistribution {
     pub(super) posterior: Posterior,
     pub(super) dots: Vec<Dot>,
     pub(super) optics: SensorOptics,
-    reference_mm: Option<DVec3>,
+    pub(super) reference_mm: Option<DVec3>,
     pub(super) radius_mm: f64,
     /// By axis, node and dot: what a traction moves the dot's image by at rest, px.
-    dot_columns: Vec<f64>,
+    pub(super) dot_columns: Vec<f64>,
+    /// The same of the height of each node, mm.
+    pub(super) height_columns: Vec<f64>,
+    /// The wrench's rows of this turn.
+    pub(super) wrench: Option<WrenchRows>,
     pub(super) columns: Vec<f64>,
     pub(super) wanted: Vec<f64>,
     /// Motion of dots and nodes by the forces so far, mm; the nodes' axes turned with the skin, and its stretch.
@@ -62,7 +68,7 @@ pub struct ForceDistribution {
     /// The nodes whose columns a frame needs: those that may bear a pressure, and those beside them for its deviation.
     pub(super) needed: Vec<bool>,
     pub(super) room: PressureRoom,
-    softness: f64,
+    pub(super) softness: f64,
     /// Whether the dots have moved by more than noise.
     pub(super) is_moved: bool,
     result: LocalForces,
@@ -84,7 +90,7 @@ impl ForceDistribution {
                 [0, 1].map(|i| DVec3::new(by[(i, 0)], by[(i, 1)], by[(i, 2)]))
             });
             let (seen_px, linear_px) = (DVec2::ZERO, DVec2::ZERO);
-            Dot { surface_mm: *surface_mm, by_point, seen_px, linear_px, per_sd: 0.0 }
+            Dot { surface_mm: *surface_mm, by_point, rest_px: None, seen_px, linear_px, per_sd: 0.0 }
         };
         let dots: Vec<Dot> = places.iter().map(dot_of).collect();
         let (n, max_rows) = (model.nodes.len(), 2 * dots.len() + 6 + model.nodes.len());
@@ -102,6 +108,8 @@ impl ForceDistribution {
             reference_mm: springs.map(|springs| DVec3::from_array(springs.at_mm)),
             radius_mm: constants.optics.dome_radius_mm,
             dot_columns,
+            height_columns: model.heights_by(),
+            wrench: None,
             columns: vec![0.0; AXES * n * max_rows],
             wanted: Vec::with_capacity(max_rows),
             dots_moved_mm: vec![DVec3::ZERO; dots.len()],
@@ -130,7 +138,11 @@ impl ForceDistribution {
     /// The forces in a frame, from its dots and wrench; where its skin is measured they press where that is touched, and as deep as it
     /// is. `map` is the same frame's ([`ShapeFromColor`](crate::shape::ShapeFromColor)).
     pub fn update(&mut self, tracked: &Tracked, map: Option<&ShapeMap>) -> &LocalForces {
-        self.find(tracked, map);
+        if map.is_some() {
+            rows::run(|| self.find(tracked, map));
+        } else {
+            self.find(tracked, map);
+        }
         let Some(contact) = &mut self.result.contact else { return &self.result };
         let model_sd_mm = if let Some(seen) = map.and_then(|map| map.contact.as_ref()) {
             // Finer than the nodes, and as `draw_pressure` shares the force out.
@@ -146,7 +158,7 @@ impl ForceDistribution {
         &self.result
     }
 
-    fn find(&mut self, tracked: &Tracked, map: Option<&ShapeMap>) -> &LocalForces {
+    fn find(&mut self, tracked: &Tracked, map: Option<&ShapeMap>) {
         self.result.dots.clear();
         self.result.contact = None;
         (self.result.rms_px, self.result.compliance_factor) = (0.0, 1.0);
@@ -154,35 +166,32 @@ impl ForceDistribution {
         let Some(pose) = pose.filter(|pose| self.optics.move_to(pose).is_ok() && self.see(tracked)) else {
             self.set.clear();
             self.result.status = TractionStatus::NoMotion;
-            return &self.result;
+            return;
         };
         if !self.is_ours(tracked) {
             self.set.clear();
             self.result.status = TractionStatus::ForeignReading;
-            return &self.result;
+            return;
+        }
+        for dot in &mut self.dots {
+            dot.rest_px = self.optics.project_deformed(dot.surface_mm).ok();
         }
         let mut ended = Ended::Solved;
         self.softness = 1.0;
         self.move_skin();
         self.allow(map);
         self.need();
-        self.take_heights(map);
-        let is_touched = self.is_moved || !self.measured.is_empty();
+        // Of an untouched sensor nothing is to be found: all nodes would be asked in vain.
+        let is_touched =
+            self.is_moved || map.is_some_and(|map| map.contact.is_some()) || self.is_pressed(tracked);
         if !is_touched {
             self.set.clear();
             self.move_skin();
         }
         for _ in 0..if is_touched { TURNS } else { 0 } {
             self.take_heights(map);
-            self.fill(tracked, &pose);
-            let rows = Rows {
-                columns: &self.columns,
-                wanted: &self.wanted,
-                nodes: self.model.nodes.len(),
-                precision: &self.model.precision,
-                shear_ratio: SHEAR_RATIO,
-            };
-            ended = self.set.solve(&rows);
+            self.want(tracked, &pose);
+            ended = self.solve_turn();
             self.soften(tracked);
             self.move_skin();
         }
@@ -191,79 +200,19 @@ impl ForceDistribution {
             Ended::Bound => TractionStatus::NotConverged,
         };
         self.report(tracked);
-        &self.result
-    }
-
-    /// The rows of a turn: dots, wrench, heights.
-    fn fill(&mut self, tracked: &Tracked, pose: &Rigid) {
-        let (n, d) = (self.model.nodes.len(), self.dots.len());
-        let wrench = self.reference_mm.zip(tracked.wrench);
-        let first_height = 2 * d + if wrench.is_some() { 6 } else { 0 };
-        let rows = first_height + self.measured.len();
-        self.wanted.clear();
-        self.wanted.resize(rows, 0.0);
-        for k in 0..d {
-            let px = (self.dots[k].seen_px - self.nonlinear_px(k)) * self.dots[k].per_sd;
-            (self.wanted[2 * k], self.wanted[2 * k + 1]) = (px.x, px.y);
-        }
-        for axis in 0..AXES {
-            for node in (0..n).filter(|node| self.needed[*node]) {
-                let at = axis * n + node;
-                let Some(column) = self.columns.get_mut(at * rows..(at + 1) * rows) else { continue };
-                let base = self.dot_columns[2 * at * d..2 * (at + 1) * d].chunks_exact(2);
-                for ((dot, px), to) in self.dots.iter().zip(base).zip(column.chunks_exact_mut(2)) {
-                    let per = dot.per_sd * self.softness;
-                    (to[0], to[1]) = (px[0] * per, px[1] * per);
-                }
-                for (row, &other) in self.measured.iter().enumerate() {
-                    let outward = -self.model.nodes[other].axes.x_axis;
-                    let u = self.model.nodes_mm[at * n + other];
-                    column[first_height + row] = outward.dot(u) * self.heights[other].1 * self.softness;
-                }
-            }
-        }
-        for (row, &node) in self.measured.iter().enumerate() {
-            let (height_mm, per_sd) = self.heights[node];
-            self.wanted[first_height + row] = height_mm * per_sd;
-        }
-        let Some((reference_mm, wrench)) = wrench else { return };
-        // In the platform's frame, about where the reference point is in it.
-        let platform_from_rest = pose.inverse();
-        let about_mm = platform_from_rest.point(reference_mm);
-        let force = platform_from_rest.vector(wrench.force_n);
-        let moment = platform_from_rest.vector(wrench.moment_nmm);
-        let noise = tracked.wrench_sd_random.unwrap_or_default();
-        let (part_n, arm_mm) = (WRENCH_PART * force.length() + MIN_WRENCH_SD_N, self.radius_mm);
-        let sd = |own: f64, unit: f64| 1.0 / own.hypot(part_n * unit);
-        let per: [f64; 6] = {
-            let [f, m] = [noise.force_n, noise.moment_nmm];
-            [sd(f.x, 1.0), sd(f.y, 1.0), sd(f.z, 1.0), sd(m.x, arm_mm), sd(m.y, arm_mm), sd(m.z, arm_mm)]
-        };
-        let six = |f: DVec3, m: DVec3| [f.x, f.y, f.z, m.x, m.y, m.z];
-        for (to, (value, per)) in self.wanted[2 * d..].iter_mut().zip(six(force, moment).iter().zip(&per)) {
-            *to = value * per;
-        }
-        for (node, own) in self.model.nodes.iter().enumerate().filter(|(node, _)| self.needed[*node]) {
-            let arm = own.at_mm + self.nodes_moved_mm[node] - about_mm;
-            for axis in 0..AXES {
-                let f = self.turned[node].col(axis) * own.area_mm2;
-                let at = (axis * n + node) * rows + 2 * d;
-                let values = six(f, arm.cross(f));
-                for (to, (value, per)) in self.columns[at..].iter_mut().zip(values.iter().zip(&per)) {
-                    *to = value * per;
-                }
-            }
-        }
     }
 
     /// What the projection of the moved dot is beyond its linear part, px.
-    fn nonlinear_px(&self, k: usize) -> DVec2 {
+    pub(super) fn nonlinear_px(&self, k: usize) -> DVec2 {
         let (dot, moved_mm) = (&self.dots[k], self.dots_moved_mm[k]);
         let now = self.optics.project_deformed(dot.surface_mm + moved_mm);
-        match (now, self.optics.project_deformed(dot.surface_mm)) {
-            (Ok(now), Ok(rest)) => now - rest - dot.linear_px,
-            _ => DVec2::ZERO,
-        }
+        now.ok().zip(dot.rest_px).map_or(DVec2::ZERO, |(now, rest)| now - rest - dot.linear_px)
+    }
+
+    /// Whether a force of more than what the wrench is off bears on the sensor, where it says.
+    fn is_pressed(&self, tracked: &Tracked) -> bool {
+        let wrench = self.reference_mm.and(tracked.wrench).zip(tracked.wrench_sd);
+        wrench.is_some_and(|(wrench, sd)| wrench.force_n.length() > PRESSED_OVER_SD * sd.force_n.length())
     }
 
     /// How much softer the dome is than the constants say: the factor that fits the dots best, where the wrench says the force.
@@ -329,7 +278,7 @@ impl ForceDistribution {
     fn report(&mut self, tracked: &Tracked) {
         let n = self.model.nodes.len();
         let rows = Rows {
-            columns: &self.columns,
+            columns: &mut self.columns,
             wanted: &self.wanted,
             nodes: n,
             precision: &self.model.precision,

@@ -1,16 +1,20 @@
 //! Heights of the skin as rows of the least squares.
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::forces::ForceDistribution;
 use super::model::Node;
 use crate::shape::ShapeMap;
+use crate::shape::rows::share;
 
 /// Least deviation of a height, mm.
 const MIN_HEIGHT_SD_MM: f64 = 0.002;
 
 /// What the elastic model may be off, as a part of a height: coarse elements and small strain.
 const HEIGHT_MODEL_PART: f64 = 0.03;
+/// Nodes that a thread takes at once, at least.
+const MIN_NODES: usize = 16;
 /// Part of a node's surroundings that must be touched for it to bear a pressure.
 const MIN_TOUCHED: f64 = 0.04;
 /// Places in each direction about a node at which is looked whether the skin is touched, and their distance over the nodes'.
@@ -41,12 +45,14 @@ impl ForceDistribution {
         let Some(map) = map.filter(|map| map.contact.is_some()) else { return self.set.allowed.fill(true) };
         let step_mm = LOOK_STEP * self.model.compliance.grid.spacing_mm();
         let touched_px = touched_px(map);
-        for node in 0..self.model.nodes.len() {
+        let mut allowed = std::mem::take(&mut self.set.allowed);
+        let nodes = allowed.par_iter_mut().enumerate().with_min_len(share(MIN_NODES));
+        nodes.for_each(|(node, is_allowed)| {
             let own = &self.model.nodes[node];
             let at_mm = own.at_mm + self.nodes_moved_mm[node];
+            *is_allowed = false;
             if self.is_far(&touched_px, at_mm, own, f64::from(LOOKS) * step_mm) {
-                self.set.allowed[node] = false;
-                continue;
+                return;
             }
             let (mut touched, mut all) = (0.0, 0.0);
             for i in -LOOKS..=LOOKS {
@@ -62,8 +68,9 @@ impl ForceDistribution {
                     touched += if map.is_touched[pixel] { hat[0] * hat[1] } else { 0.0 };
                 }
             }
-            self.set.allowed[node] = touched > MIN_TOUCHED * all;
-        }
+            *is_allowed = touched > MIN_TOUCHED * all;
+        });
+        self.set.allowed = allowed;
         // A touch smaller than the nodes' distance bears on those about it.
         if let Some(contact) = &map.contact {
             for (node, _) in self.model.about(contact.deepest_mm) {
@@ -95,22 +102,28 @@ impl ForceDistribution {
     }
 
     fn take_map(&mut self, map: &ShapeMap) {
-        for node in 0..self.model.nodes.len() {
-            let moved_mm = self.nodes_moved_mm[node];
-            let own = &self.model.nodes[node];
-            let Some(pixel) = self.pixel(map, own.at_mm + moved_mm) else { continue };
-            let height_mm = f64::from(map.height_mm[pixel]);
-            let sd_mm = f64::from(map.height_sd_mm[pixel]).hypot(HEIGHT_MODEL_PART * height_mm);
-            if !sd_mm.is_finite() {
-                continue;
-            }
-            // A place that went aside on the sphere is higher than its motion along the normal says.
-            let inward = own.axes.x_axis;
-            let aside_mm = moved_mm - inward * moved_mm.dot(inward);
-            let higher_mm = 0.5 * aside_mm.length_squared() / self.radius_mm;
-            self.heights[node] = (height_mm - higher_mm, 1.0 / sd_mm.max(MIN_HEIGHT_SD_MM));
-            self.measured.push(node);
+        let mut heights = std::mem::take(&mut self.heights);
+        let nodes = heights.par_iter_mut().enumerate().with_min_len(share(MIN_NODES));
+        nodes.for_each(|(node, height)| *height = self.height_of(map, node).unwrap_or_default());
+        self.heights = heights;
+        self.measured.extend((0..self.heights.len()).filter(|node| self.heights[*node].1 > 0.0));
+    }
+
+    /// Height of a node where it is now, and one over its deviation.
+    fn height_of(&self, map: &ShapeMap, node: usize) -> Option<(f64, f64)> {
+        let moved_mm = self.nodes_moved_mm[node];
+        let own = &self.model.nodes[node];
+        let pixel = self.pixel(map, own.at_mm + moved_mm)?;
+        let height_mm = f64::from(map.height_mm[pixel]);
+        let sd_mm = f64::from(map.height_sd_mm[pixel]).hypot(HEIGHT_MODEL_PART * height_mm);
+        if !sd_mm.is_finite() {
+            return None;
         }
+        // A place that went aside on the sphere is higher than its motion along the normal says.
+        let inward = own.axes.x_axis;
+        let aside_mm = moved_mm - inward * moved_mm.dot(inward);
+        let higher_mm = 0.5 * aside_mm.length_squared() / self.radius_mm;
+        Some((height_mm - higher_mm, 1.0 / sd_mm.max(MIN_HEIGHT_SD_MM)))
     }
 }
 

@@ -23,7 +23,8 @@
 //! |---|---|
 //! | `model` | what a traction on each node moves, and which pressures are likely |
 //! | `active_set` | least squares with pressures that are not negative |
-//! | `forces` | rows of a frame: dots, wrench, heights; the turns that make it consistent with the moved skin |
+//! | `columns` | rows of a turn: dots, wrench, heights |
+//! | `forces` | the turns that make a frame consistent with the moved skin |
 //! | `heights` | a height map as heights of nodes, and which of them are touched |
 //! | `pressure` | pressures on a height map's grid |
 //! | `posterior` | what is left open |
@@ -31,6 +32,7 @@
 
 mod active_set;
 mod cholesky;
+mod columns;
 mod contact;
 mod forces;
 mod heights;
@@ -40,6 +42,7 @@ mod pressure;
 mod pressure_room;
 mod result;
 mod seen_dots;
+mod wrench_rows;
 mod write;
 
 /// Over how far pressures are taken to be alike where the skin's heights are measured, mm: those tell pressures apart that dots do not.

@@ -37,6 +37,8 @@ pub(super) struct Node {
 pub(super) struct Dot {
     pub surface_mm: DVec3,
     pub by_point: [DVec3; 2],
+    /// Its image on the untouched dome where the platform is now, px.
+    pub rest_px: Option<DVec2>,
     /// Its motion in the image by the forces so far, px, what is seen of it, and one over the deviation; 0 where it is not seen.
     pub seen_px: DVec2,
     pub linear_px: DVec2,
@@ -114,6 +116,14 @@ impl ElasticModel {
             compliance,
         };
         Ok(model)
+    }
+
+    /// By how much each node stands out for a traction of 1 N/mm2 on a node along an axis, by axis, node, node, mm.
+    pub fn heights_by(&self) -> Vec<f64> {
+        let by_one = self.nodes_mm.chunks_exact(self.nodes.len().max(1));
+        by_one
+            .flat_map(|moved| self.nodes.iter().zip(moved).map(|(node, u)| -node.axes.x_axis.dot(*u)))
+            .collect()
     }
 
     /// Variance of the pressure within half a node's distance of a node, (N/mm2)^2: half of what it differs by from the nodes beside it.

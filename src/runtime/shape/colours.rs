@@ -1,0 +1,46 @@
+//! Whether a frame's colours come in the order of the frame at rest.
+
+use glam::Vec3A;
+use rayon::prelude::*;
+
+use super::error::ShapeError;
+use super::estimator::ShapeFromColor;
+use super::rest::{Seen, seen};
+use super::rows::share;
+
+/// Every seventh cell is asked, in as many parts.
+const STEP: usize = 7;
+const PARTS: usize = 4;
+
+/// The part of their misfit that another order must leave to be taken for theirs.
+const OTHER_ORDER: f32 = 0.5;
+
+impl ShapeFromColor {
+    /// Refuses a frame whose colours are those at rest only in another order: a touch changes some of the skin, never all of it so.
+    pub(super) fn check_colours(&self) -> Result<(), ShapeError> {
+        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+        // Parts of the picture, so that their sums are the same for any number of threads.
+        let mut parts = [[0.0_f32; 6]; PARTS];
+        let count = self.cells.count();
+        parts.par_iter_mut().enumerate().with_min_len(share(1)).for_each(|(part, off)| {
+            let cells = (0..count).skip(STEP * part).step_by(STEP * PARTS);
+            for Seen { cell, expected, level, .. } in
+                seen(&self.levels, &self.covered, &self.view, &self.light, cells)
+            {
+                let at_rest = self.gain[cell] * expected;
+                for (off, [r, g, b]) in off.iter_mut().zip(ORDERS) {
+                    let difference = (Vec3A::new(level[r], level[g], level[b]) - at_rest).abs();
+                    *off += if difference.is_finite() { difference.element_sum() } else { 0.0 };
+                }
+            }
+        });
+        let off: [f32; 6] = std::array::from_fn(|k| parts.iter().map(|part| part[k]).sum());
+        let smallest = off.into_iter().fold(f32::INFINITY, f32::min);
+        if smallest < OTHER_ORDER * off[0] {
+            let problem = "has its colours in another order than the frame at rest";
+            let cure = "give both in the same order: red, green, blue, or say which (--raw ..:rgb or :bgr; rgb=False)";
+            return Err(ShapeError::new("frame", problem, cure));
+        }
+        Ok(())
+    }
+}

@@ -10,9 +10,10 @@ pub struct Estimate {
     pub displacement_mm: f64,
     /// The force at a held pose is within this part of the reference's.
     pub force_part: f64,
-    /// Multiplications per frame.
+    /// Of one solve, in units of about a nanosecond of one core; by the linear level of a whole balance with springs, whose
+    /// solves begin at each other's end.
     pub work: f64,
-    /// Multiplications once per dome.
+    /// Once per dome, in the same units.
     pub setup_work: f64,
     /// Whether the level covers such objects; a closed form has none for a mesh, and says at a frame's solve
     /// where an edge touches.
@@ -34,18 +35,20 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
     // Nodes that touch a plane, which touches most of all that is not hollow (Hertz: a^2 = R d), and half as many beside.
     let nodes = |h: f64| 4.0 + 1.5 * std::f64::consts::PI * radius * depth / (h * h);
     let large = 0.8 * deep * depth;
+    // A mesh's distance is that of its faces near by.
+    let local_work = if indenter.solid.is_mesh() { 2e7 } else { 1e5 };
     match level {
         Level::Geometric => Estimate {
             displacement_mm: (0.55 + sharp + 3.0 * deep) * depth,
             force_part: 0.3 + sharp + 2.0 * deep,
-            work: 3e5,
+            work: local_work,
             setup_work: 0.0,
             applies: true,
         },
         Level::ClosedForm => Estimate {
             displacement_mm: (0.2 + 3.5 * deep) * depth,
             force_part: 0.15 + 2.0 * deep,
-            work: 5e4,
+            work: if indenter.solid.is_ball() { 5e3 } else { local_work },
             setup_work: 0.0,
             applies: !indenter.solid.is_mesh(),
         },
@@ -63,10 +66,10 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
             Estimate {
                 displacement_mm: (0.1 + sharp) * h.min(4.0 * depth) + large,
                 force_part: 0.1 + 0.1 * h / radius.min(h + depth) + 2.0 * deep,
-                // Some 300 sweeps over 3 n forces in all trials of a balance with friction.
-                work: 2500.0 * n * n + 2e4 * elements,
-                // Harmonics, times unknowns and their fill, times right-hand sides.
-                setup_work: 4.0 * elements * 55.0 * elements * 120.0 * 3.0 * elements,
+                // Some 300 sweeps over 3 n forces in all trials of a balance with friction, a dozen products a unit.
+                work: 800.0 * n * n + 2e4 * elements,
+                // Harmonics, times unknowns and their fill, times right-hand sides, some at once.
+                setup_work: 22_000.0 * elements.powi(3),
                 applies: true,
             }
         }

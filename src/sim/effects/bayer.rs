@@ -3,7 +3,6 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
-use crate::effects::light_bound;
 use crate::electronics::bayer::{DEMOSAIC_UNITS, Demosaic, FILTER_UNITS, Filter};
 use crate::{Pipeline, Scene, SimError};
 
@@ -20,14 +19,12 @@ impl Effect for Bayer {
         Some(format!("one colour a pixel, {pattern:?}"))
     }
 
-    fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        // At an edge a pixel may get its neighbours' value, the whole contrast away; a colour that is sampled at every
-        // other pixel places a dot to within that spacing.
-        Ok(Bound { px: 1.0, grey: light_bound::contrast_grey(scene)? })
+    fn bound(&self, _scene: &Scene) -> Result<Bound, SimError> {
+        // A colour that is sampled at every other pixel places a dot to within that spacing.
+        Ok(Bound::px(1.0))
     }
 
-    fn grey_has_shift(&self) -> bool {
-        // A mean of other pixels is off by the whole contrast at most, wherever they show an edge.
+    fn is_drawn(&self) -> bool {
         true
     }
 

@@ -18,8 +18,8 @@ const LOOKS: u32 = 257;
 
 /// Contact solves that a balance with the springs takes, as a rule.
 const SOLVES: f64 = 12.0;
-/// Turns in which several contacts are solved until they agree.
-const TURNS: f64 = 4.0;
+/// Balances' worth of work of several contacts until they agree: their trials do not begin at each other's end.
+const TURNS: f64 = 30.0;
 /// Directions of the dome at which its depth in an object is looked at.
 const DEPTH_LOOKS: u32 = 2000;
 
@@ -32,7 +32,8 @@ fn per_frame(scene: &Scene, name: LevelName) -> u64 {
     };
     let work: f64 = scene.objects().iter().map(of_object).sum();
     let turns = if scene.objects().len() > 1 { TURNS } else { 1.0 };
-    (SOLVES * turns * work) as u64
+    let solves = if name == LevelName::Linear { 1.0 } else { SOLVES };
+    (solves * turns * work) as u64
 }
 
 /// A coarser level than the scene's that the plan may take: its name, how far its pictures of dots may be from those
@@ -136,5 +137,31 @@ impl Effect for ContactEffect {
     fn apply(&self, scene: &Scene, pipeline: &mut Pipeline) -> Result<(), SimError> {
         pipeline.contact = Some(level_of(scene));
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::stepper::Stepper;
+    use crate::work::Work;
+    use std::path::Path;
+
+    #[test]
+    fn what_contact_costs_is_near_what_it_takes() {
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("designs/scenes");
+        for name in ["ball", "block-hard", "nut", "usb-plug"] {
+            let scene = Scene::load(&folder.join(name).with_extension("json")).unwrap();
+            let mut stepper = Stepper::new(&scene, level_of(&scene)).unwrap();
+            let (mut work, mut touched) = (Work::default(), 0);
+            for frame in 0..scene.frame_count().min(17) {
+                let touch = stepper.next(frame, scene.time_s(frame), &mut work).unwrap();
+                touched += u64::from(touch.contact.is_some());
+            }
+            let counted = work.of(EffectName::Contact) as f64 / touched as f64;
+            let ratio = ContactEffect.cost(&scene).per_frame as f64 / counted;
+            println!("{name}: {ratio:.2} times what {touched} touched frames take");
+            assert!((0.1..10.0).contains(&ratio), "{name}: {ratio}");
+        }
     }
 }

@@ -3,9 +3,7 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
-use crate::effects::light_bound;
 use crate::electronics::defocus::{Blur, PIXELS_PER_UNIT, Widths, steps_for};
-use crate::light::bounds;
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -24,19 +22,11 @@ impl Effect for Defocus {
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
         let Some(focus) = &scene.file().electronics.focus else { return Ok(Bound::default()) };
         let widths = Widths::of(scene, focus);
-        let largest = widths.largest();
-        let steps = steps_for(largest);
-        // What a pixel keeps of itself after all steps, along both axes; the rest comes from others.
-        let keeps = (1.0 - largest / steps as f64).powi(2 * steps as i32);
-        let change = (1.0 - keeps) * light_bound::brightest_level(scene)?;
         // A spot whose blur widens to one side is pulled there by the slope of the variance.
-        let pull = widths.steepest();
-        let grey = bounds::grey_of_change(scene.file().electronics.gamma, change);
-        Ok(Bound { px: pull, grey })
+        Ok(Bound::px(widths.steepest()))
     }
 
-    fn grey_has_shift(&self) -> bool {
-        // The weights of all steps are positive and add up to 1: a pixel changes by what it gives to others at most.
+    fn is_drawn(&self) -> bool {
         true
     }
 

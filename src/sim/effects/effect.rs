@@ -38,8 +38,8 @@ pub trait Effect: Sync {
     /// A scene on which the bound cannot be computed (the fault is then the scene's).
     fn bound(&self, scene: &Scene) -> Result<Bound, SimError>;
 
-    /// Whether the bound's grey levels hold all that the effect does to a pixel, its shift at edges included.
-    fn grey_has_shift(&self) -> bool {
+    /// Whether the plan looks up in pictures of the scene what it does to a pixel: then `bound` tells of places alone.
+    fn is_drawn(&self) -> bool {
         false
     }
 

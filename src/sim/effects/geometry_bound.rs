@@ -139,7 +139,7 @@ fn quickest_level(scene: &Scene) -> Level {
 ///
 /// # Errors
 /// A frame whose load has no balance.
-pub(super) fn solved_frames(scene: &Scene) -> Result<Arc<SolvedFrames>, SimError> {
+pub fn solved_frames(scene: &Scene) -> Result<Arc<SolvedFrames>, SimError> {
     scene.keep(|| SolvedFrames::new(scene, quickest_level(scene), &frames(scene)))
 }
 

@@ -4,7 +4,6 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
-use crate::effects::light_bound;
 use crate::raster::sensor_state::units;
 use crate::{Pipeline, Scene, SimError};
 
@@ -36,18 +35,17 @@ impl Effect for InkEdge {
         let edge = |dot: &domecast_design::layout::Dot| {
             let share = ink.edge_mm / dot.diameter_mm;
             let radius_px = wider * 0.5 * dot.image_outline.widths().1;
-            // Half of the ramp's width, px, and what the nested outlines' unlike areas do to the centroid: its
-            // distance from the centre times two thirds of the square of the share. A whole dot's lies near its
-            // centre, but that of one that is broken, or ends at the picture's edge, may lie at its rim.
-            (share * radius_px, radius_px * share * share)
+            // What the nested outlines' unlike areas do to the centroid: its distance from the centre times two thirds of
+            // the square of the share. A whole dot's lies near its centre, but that of one that is broken, or ends at the
+            // picture's edge, may lie at its rim.
+            radius_px * share * share
         };
-        let edges = scene.layout().dots.iter().map(edge);
-        let (width_px, shift_px) = edges.fold((0.0_f64, 0.0_f64), |(w, s), (a, b)| (w.max(a), s.max(b)));
-        // A ramp of half width w about an edge is the mean over edges up to w to either side. Where an edge lies on that of a
-        // pixel, half of them cover w / 2 of it in the mean. An aslant edge is up to sqrt(2) long in a pixel, but only where it
-        // lies well inside. Never does it cover more than half.
-        let covered = (0.25 * width_px * (1.0 + width_px).min(std::f64::consts::SQRT_2)).min(0.5);
-        Ok(Bound { px: shift_px, grey: light_bound::inked_grey(scene, covered)? })
+        let shift_px = scene.layout().dots.iter().map(edge).fold(0.0, f64::max);
+        Ok(Bound::px(shift_px))
+    }
+
+    fn is_drawn(&self) -> bool {
+        true
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

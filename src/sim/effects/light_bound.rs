@@ -6,9 +6,9 @@ use super::geometry_bound::poses;
 use crate::SimError;
 use crate::bound::Bound;
 use crate::effect_name::{EffectChoice, EffectName};
-use crate::electronics::defects::Defects;
-use crate::light::bounds::{CoarseLight, grey_of_change, grey_of_change_from, grey_of_level};
+use crate::light::bounds::{CoarseLight, grey_of_change, grey_of_level};
 use crate::light::random_field::MAX_DEVIATIONS;
+use crate::light::shading::Shading;
 use crate::light::{LightUse, is_lit_by_leds};
 use crate::scene::Scene;
 
@@ -134,64 +134,16 @@ pub fn brightest_level(scene: &Scene) -> Result<f64, SimError> {
     Ok(membrane.max(markers).max(brightest_beside(scene)))
 }
 
-/// Levels between which an edge may lie: the darkest and the brightest, full scales.
-fn range(scene: &Scene) -> Result<(f64, f64), SimError> {
-    let file = &scene.file().light;
-    let inked = file.membrane_level * scene.file().ink.reflectance * (1.0 - unevenness(scene)).max(0.0);
-    // Under the design's lights parts of the dome may be dark, and so may dust be.
-    let dark = light(scene)?.is_some() || scene.file().dust.is_some();
-    let darkest = if dark { 0.0 } else { inked.min(file.surround_level) };
-    Ok((darkest, brightest_level(scene)?))
-}
-
-/// What `covered`, a change of the part of a pixel that something covers, does to it at most, grey levels.
+/// The membranes and markers that stand for what the scene shows of them: at rest, and as bright as objects can make them.
+/// `None`: evenly lit.
 ///
 /// # Errors
 /// Lights that do not fit the design.
-pub fn covered_grey(scene: &Scene, covered: f64) -> Result<f64, SimError> {
-    let (darkest, brightest) = range(scene)?;
-    let change = covered.clamp(0.0, 1.0) * (brightest - darkest).max(0.0);
-    Ok(grey_of_change_from(scene.file().electronics.gamma, darkest, change))
-}
-
-/// What ink over a part of a pixel more takes of it, grey levels.
-///
-/// # Errors
-/// Lights that do not fit the design.
-pub fn inked_grey(scene: &Scene, covered: f64) -> Result<f64, SimError> {
-    let (file, ink) = (scene.file(), &scene.file().ink);
-    let [_, ground] = brightest_membrane(scene)?;
-    let darkest = match light(scene)? {
-        Some(_) => 0.0,
-        None => file.light.membrane_level * ink.reflectance * (1.0 - unevenness(scene)).max(0.0),
-    };
-    let change = covered.clamp(0.0, 1.0) * ground * (1.0 - ink.reflectance);
-    Ok(grey_of_change_from(file.electronics.gamma, darkest, change))
-}
-
-/// No value that the sensor reads is above this, full scales: the brightest level, and what the hottest pixel adds to it,
-/// behind the largest gain.
-///
-/// # Errors
-/// Lights that do not fit the design.
-pub fn brightest_value(scene: &Scene) -> Result<f64, SimError> {
-    Ok(max_gain(scene) * (brightest_level(scene)? + hottest(scene)))
-}
-
-/// What the hottest pixel adds at a gain of 1, full scales.
-fn hottest(scene: &Scene) -> f64 {
-    if scene.choice(EffectName::Defects) == EffectChoice::Never {
-        return 0.0;
-    }
-    Defects::of(scene).hottest()
-}
-
-/// The largest step between two codes of the picture at a gain of 1, grey levels.
-///
-/// # Errors
-/// Lights that do not fit the design.
-pub fn contrast_grey(scene: &Scene) -> Result<f64, SimError> {
-    Ok(grey_of_level(scene.file().electronics.gamma, brightest_level(scene)? + hottest(scene)))
+pub fn grounds(scene: &Scene) -> Result<Vec<Option<Box<dyn Shading>>>, SimError> {
+    let Some(light) = light(scene)? else { return Ok(vec![None]) };
+    let moved = if scene.file().objects.is_empty() { &[false][..] } else { &[false, true] };
+    let used = whole(scene);
+    Ok(moved.iter().map(|moved| Some(Box::new(light.ground(&used, *moved)) as Box<dyn Shading>)).collect())
 }
 
 /// The most that a loss by field angle takes of any pixel, grey levels; `left` tells what it leaves, `edge_rad` where the

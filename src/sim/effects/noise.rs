@@ -3,16 +3,11 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
-use crate::effects::light_bound;
-use crate::electronics::noise::{SensorNoise, VALUE_UNITS, steps};
-use crate::light::bounds;
+use crate::electronics::noise::{SensorNoise, VALUE_UNITS};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
 pub struct Noise;
-
-/// Levels from dark to the brightest at which the noise is looked at.
-const LEVELS: u32 = 64;
 
 impl Effect for Noise {
     fn name(&self) -> EffectName {
@@ -27,22 +22,12 @@ impl Effect for Noise {
         ))
     }
 
-    fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        let electronics = &scene.file().electronics;
-        let Some(noise) = &electronics.noise else { return Ok(Bound::default()) };
-        // The 99.9th percentile of a Gaussian's size is 3.29 deviations; Poisson's law reaches further by less than
-        // (z^2 - 1) / 6 + 1 electrons. The converter is off by half a step. The steepest place of the code takes it.
-        let brightest = light_bound::brightest_value(scene)?.min(1.0);
-        // Behind the largest gain full scale stands for the fewest electrons.
-        let full = noise.full_scale_electrons / light_bound::max_gain(scene);
-        let at = |level: f64| {
-            let deviation = (full * level + noise.read_electrons.powi(2)).sqrt();
-            let change = (3.29 * deviation + 3.0) / full + 0.5 / steps(noise);
-            // Downwards the code of a gamma above 1 is steeper.
-            bounds::grey_of_change_from(electronics.gamma, (level - change).max(0.0), change)
-        };
-        let levels = (0..=LEVELS).map(|k| brightest * f64::from(k) / f64::from(LEVELS));
-        Ok(Bound::grey(levels.map(at).fold(0.0, f64::max)))
+    fn bound(&self, _scene: &Scene) -> Result<Bound, SimError> {
+        Ok(Bound::default())
+    }
+
+    fn is_drawn(&self) -> bool {
+        true
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

@@ -3,9 +3,7 @@
 use crate::bound::Bound;
 use crate::effect_name::EffectName;
 use crate::effects::effect::{Cost, Effect};
-use crate::effects::light_bound;
-use crate::electronics::sharpening::{UnsharpMask, given_away, pixel_units, weights};
-use crate::light::bounds;
+use crate::electronics::sharpening::{UnsharpMask, pixel_units, weights};
 use crate::{Pipeline, Scene, SimError};
 
 /// See the module.
@@ -23,15 +21,12 @@ impl Effect for Sharpening {
         })
     }
 
-    fn bound(&self, scene: &Scene) -> Result<Bound, SimError> {
-        let electronics = &scene.file().electronics;
-        let Some(section) = &electronics.sharpening else { return Ok(Bound::default()) };
-        // The mask may make any value darker or brighter by so much, from what may be dark.
-        let random = electronics.noise.is_some() || electronics.defects.is_some();
-        let random = random || electronics.auto_exposure.is_some() || electronics.white_balance.is_some();
-        let brightest = if random { 1.0 } else { light_bound::brightest_level(scene)?.min(1.0) };
-        let change = section.amount * given_away(section) * brightest;
-        Ok(Bound::grey(bounds::grey_of_change(electronics.gamma, change)))
+    fn bound(&self, _scene: &Scene) -> Result<Bound, SimError> {
+        Ok(Bound::default())
+    }
+
+    fn is_drawn(&self) -> bool {
+        true
     }
 
     fn cost(&self, scene: &Scene) -> Cost {

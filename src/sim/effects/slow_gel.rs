@@ -54,7 +54,7 @@ impl Effect for SlowGel {
 
     fn cost(&self, scene: &Scene) -> Cost {
         let contact = super::contact::ContactEffect.cost(scene);
-        Cost { once: contact.once, per_frame: MORE_SOLVES * contact.per_frame }
+        Cost { once: 0, per_frame: MORE_SOLVES * contact.per_frame }
     }
 
     fn needs(&self) -> &'static [EffectName] {

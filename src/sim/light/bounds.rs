@@ -10,6 +10,7 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 
 use super::bound_samples::{RINGS, Sample, Samples, View, samples, views};
+use super::coarse_ground::CoarseGround;
 use super::parts::LightUse;
 use super::setup::{self, Channels};
 use super::shade::leaves;
@@ -228,6 +229,28 @@ impl CoarseLight {
             of(0).max(of(1)).max(of(2))
         };
         MARGIN * self.seen().map(level).fold(0.0, f64::max) + self.stray
+    }
+
+    /// The membrane as it rests, or as bright as it can be where objects turn and move it, and the white markers.
+    pub fn ground(&self, used: &LightUse, moved: bool) -> CoarseGround {
+        let light = self.light(used);
+        let mut patches = vec![Channels::default(); RINGS.count()];
+        let mut markers = Vec::new();
+        for ((sample, view), light) in self.samples.list.iter().zip(&self.views).zip(&light) {
+            let level: Channels = std::array::from_fn(|c| {
+                // Of what is seen beside the picture alone, the way straight up.
+                let passed = self.passed(used, sample, c, view.map_or(0.0, |view| view.momentum[0]));
+                self.gain(sample, c) * (light[c].still + light[c].own) * passed + self.stray
+            });
+            if sample.beside.is_some() {
+                markers.push((sample.place, level));
+            } else if let Some(patch) = patches.get_mut(sample.patch)
+                && sample.normal.is_none() == moved
+            {
+                patch.iter_mut().zip(level).for_each(|(known, level)| *known = known.max(level));
+            }
+        }
+        CoarseGround { dome: *self.optics[1].dome(), patches, markers }
     }
 
     /// The most that a loss by field angle takes of any pixel, grey levels: `left` tells what it leaves of the light.

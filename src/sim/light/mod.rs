@@ -7,6 +7,7 @@
 
 mod bound_samples;
 pub mod bounds;
+pub(crate) mod coarse_ground;
 pub(crate) mod gloss;
 pub mod hollows;
 pub mod illumination;

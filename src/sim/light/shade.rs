@@ -21,14 +21,14 @@ pub const MOVED_UNITS: u64 = 90;
 pub const LEAVING_UNITS: u64 = 6;
 /// Work of one exact evaluation of one light at one point without shadow: sixteen ways.
 pub const EXACT_UNITS: u64 = 16 * 150;
-/// The same for the shadow: looks, halvings, and each of them past all hollows.
-pub const SHADOW_UNITS: u64 = 4 * 14 * 600;
+/// The same for the shadow: looks, halvings, and each of them past the hollow that stopped the last one, seldom past all.
+pub const SHADOW_UNITS: u64 = 4 * 14 * 170;
 /// The same for what the sheet's faces take.
 pub const FRESNEL_UNITS: u64 = 16 * 25;
 /// Work of a diffuser's table.
-pub const DIFFUSER_UNITS: u64 = 20_000_000;
+pub const DIFFUSER_UNITS: u64 = 6_000_000;
 /// Work of the dome's balance with itself.
-pub const ROOM_UNITS: u64 = 40_000_000;
+pub const ROOM_UNITS: u64 = 15_000_000;
 
 /// Places of the table of what leaves towards the camera.
 const LEAVING: usize = 512;

@@ -5,15 +5,17 @@ use crate::electronics::exposure::{MIN_MEAN, MIN_PART};
 use crate::electronics::sharpening::given_away;
 use crate::light::bounds::grey_of_change;
 use crate::light::random_field::MAX_DEVIATIONS;
+use crate::plan::search::effect_of;
 use crate::scene::Scene;
 
 /// The most by which effects after this one multiply what its absence changes, in the code: every other effect's bound is
-/// stated for a picture that nothing after it enlarges. 1 where nothing does.
+/// stated for a picture that nothing after it enlarges, but for what is looked up in pictures: they have been sharpened, and show
+/// the dots as they are. 1 where nothing does.
 pub(crate) fn growth(scene: &Scene, effect: EffectName) -> f64 {
     let file = scene.file();
     let after = |other: EffectName| is_after(scene, effect, other);
     let mut factor = 1.0;
-    if let Some(section) = file.electronics.sharpening.as_ref().filter(|_| after(EffectName::Sharpening)) {
+    if let Some(section) = file.electronics.sharpening.as_ref().filter(|_| is_sharpened(scene, effect)) {
         factor *= 1.0 + 2.0 * section.amount * given_away(section);
     }
     let electronics = &file.electronics;
@@ -32,7 +34,7 @@ pub(crate) fn growth(scene: &Scene, effect: EffectName) -> f64 {
         factor *= gain * (1.0 + 1.0 / min_mean);
     }
     // Some dots are darker than the ink that the bounds of what moves edges know.
-    if let Some(uneven) = file.ink.uneven.as_ref().filter(|_| effect <= EffectName::InkEdge)
+    if let Some(uneven) = file.ink.uneven.as_ref().filter(|_| effect <= EffectName::Dots)
         && scene.choice(EffectName::UnevenInk) != EffectChoice::Never
     {
         let ink = file.ink.reflectance;
@@ -50,10 +52,11 @@ fn is_after(scene: &Scene, effect: EffectName, other: EffectName) -> bool {
     effect < other && scene.choice(other) != EffectChoice::Never
 }
 
-/// Whether the camera sharpens what this effect changes.
+/// Whether the camera sharpens what this effect changes, and its bound does not know.
 pub(crate) fn is_sharpened(scene: &Scene, effect: EffectName) -> bool {
     let sharpening = scene.file().electronics.sharpening.as_ref().filter(|section| section.amount > 0.0);
-    sharpening.is_some() && is_after(scene, effect, EffectName::Sharpening)
+    let drawn = effect_of(effect).is_some_and(|effect| effect.is_drawn());
+    sharpening.is_some() && !drawn && is_after(scene, effect, EffectName::Sharpening)
 }
 
 /// What becomes of a change of the code by some grey levels that the absence of an effect makes, behind the effects after it.

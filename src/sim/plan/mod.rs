@@ -5,6 +5,7 @@ pub(crate) mod fill;
 mod growth;
 #[cfg(test)]
 mod honesty;
+mod pictures;
 #[cfg(test)]
 mod random_scenes;
 mod search;
@@ -23,6 +24,7 @@ use crate::effects::geometry_bound::shift_px;
 use crate::effects::light_bound;
 use crate::plan::fill::{fill_grey, fill_tolerance};
 use crate::plan::growth::{grown, growth};
+use crate::plan::pictures::Pictures;
 use crate::plan::search::{Candidate, best_set, closed, drop_orphans, effect_of};
 use crate::raster::settings::Geometry;
 use crate::scene::Scene;
@@ -77,6 +79,7 @@ impl Plan {
 
     fn made(scene: &Scene, candidate: bool) -> Result<Self, SimError> {
         let mut entries: Vec<Entry> = Vec::new();
+        let pictures = Pictures::of(scene);
         for name in EffectName::ALL {
             let effect = effect_of(name);
             let reason = effect.and_then(|effect| effect.calls_for(scene));
@@ -86,7 +89,7 @@ impl Plan {
                     used: scene.choice(name) != EffectChoice::Never,
                     called_for: true,
                     why,
-                    bound: Some(effect.bound(scene)?),
+                    bound: Some(pictures.bound(effect)?),
                     cost: Some(effect.cost(scene)),
                 },
                 _ => Entry {
@@ -108,7 +111,7 @@ impl Plan {
             plan.filled_grey = fill_grey(scene);
         }
         if candidate {
-            plan.leave_out(scene)?;
+            plan.leave_out(scene, &pictures)?;
         }
         Ok(plan)
     }
@@ -130,7 +133,8 @@ impl Plan {
         let mut steps = 1.0;
         if let (Some(_), Some(noise)) = (kept(EffectName::Noise), &scene.file().electronics.noise) {
             let step = 255.0 / f64::from((1_u32 << noise.bits.min(31)) - 1);
-            steps += step * growth(scene, EffectName::Noise);
+            // What is before the noise grows behind it as its rounding does.
+            steps += step * growth(scene, EffectName::Defects);
         }
         sum + steps
     }
@@ -155,7 +159,7 @@ impl Plan {
     /// one's bound is that of its absence alone, and two absences might add to more than their sum.
     fn holds_jointly(
         &self,
-        scene: &Scene,
+        (scene, pictures): (&Scene, &Pictures<'_>),
         (candidates, set): (&[Candidate], u64),
         tolerance: &ToleranceSection,
     ) -> Result<bool, SimError> {
@@ -177,15 +181,15 @@ impl Plan {
         let with = Geometry::of(&uses);
         let without = Geometry::of(&|name| uses(name) && !out(name));
         let shift = shift_px(scene, with, without)?;
-        Ok(shift <= tolerance.px && grey_of_shift(scene, shift)? <= tolerance.grey)
+        Ok(shift <= tolerance.px && pictures.shift_grey(shift)? <= tolerance.grey)
     }
 
-    fn leave_out(&mut self, scene: &Scene) -> Result<(), SimError> {
+    fn leave_out(&mut self, scene: &Scene, pictures: &Pictures<'_>) -> Result<(), SimError> {
         let mut tolerance = scene.file().tolerance;
         tolerance.grey -= self.filled_grey;
         let left = tolerance;
         let frames = u64::from(scene.frame_count());
-        self.choose_level(scene, &mut tolerance)?;
+        self.choose_level(scene, pictures, &mut tolerance)?;
         let mut candidates: Vec<Candidate> = Vec::new();
         for (index, entry) in self.entries.iter().enumerate() {
             let Some((bound, cost)) = entry.bound.filter(|_| entry.used).zip(entry.cost) else { continue };
@@ -193,8 +197,8 @@ impl Plan {
             if bound.px > tolerance.px || own > tolerance.grey {
                 continue;
             }
-            let whole = effect_of(entry.effect).is_some_and(|effect| effect.grey_has_shift());
-            let at_edges = if whole { 0.0 } else { grey_of_shift(scene, bound.px)? };
+            let whole = effect_of(entry.effect).is_some_and(|effect| effect.is_drawn());
+            let at_edges = if whole { 0.0 } else { pictures.shift_grey(bound.px)? };
             let (cost, grey) = (cost.total(frames), own + at_edges);
             let free = scene.choice(entry.effect) == EffectChoice::Plan;
             if grey <= tolerance.grey && free && cost > 0 {
@@ -210,7 +214,7 @@ impl Plan {
                     && self.grey_of(scene, &candidates, set) <= tolerance.grey
             };
             chosen = best_set(&candidates, tolerance.px, tolerance.grey, &allowed);
-            if self.holds_jointly(scene, (&candidates, chosen), &left)? {
+            if self.holds_jointly((scene, pictures), (&candidates, chosen), &left)? {
                 break;
             }
             banned.push(chosen);
@@ -232,7 +236,12 @@ impl Plan {
     }
 
     /// Takes the coarsest level of contact that the tolerance allows; what it uses up is taken off.
-    fn choose_level(&mut self, scene: &Scene, tolerance: &mut ToleranceSection) -> Result<(), SimError> {
+    fn choose_level(
+        &mut self,
+        scene: &Scene,
+        pictures: &Pictures<'_>,
+        tolerance: &mut ToleranceSection,
+    ) -> Result<(), SimError> {
         let free = scene.choice(EffectName::Contact) == EffectChoice::Plan;
         if !self.uses(EffectName::Contact) || !free {
             return Ok(());
@@ -240,7 +249,7 @@ impl Plan {
         for (name, px, _) in effects::contact::coarser_levels(scene) {
             // Under the design's lights a membrane of another shape may be lit quite otherwise.
             let lit = scene.draws() && scene.file().light.leds.is_some();
-            let grey = if lit { 255.0 } else { grey_of_shift(scene, px)? };
+            let grey = if lit { 255.0 } else { pictures.shift_grey(px)? };
             let steps = if grey > 0.0 { 1.0 } else { 0.0 };
             if px > tolerance.px || grey + steps > tolerance.grey {
                 continue;
@@ -300,24 +309,5 @@ fn is_none(grey: &f64) -> bool {
     *grey == 0.0
 }
 
-/// Largest shift that shows no other places than the picture without it, px.
-const MAX_SHIFT_PX: f64 = 4.0;
-
 /// Sets that are tried before the plan gives up leaving anything out.
 const JOINT_TRIES: u32 = 16;
-
-/// What a shift of some pixels can do to the value of a pixel, grey levels: zero where no images are drawn.
-///
-/// A straight or convex edge that moves by `d` changes the covered part of a pixel by at most `d` times the pixel's width
-/// across the motion, `sqrt(2)`; two edges in one pixel may move apart. A larger shift may show other, brighter places.
-fn grey_of_shift(scene: &Scene, px: f64) -> Result<f64, SimError> {
-    if !scene.draws() || px == 0.0 {
-        return Ok(0.0);
-    }
-    if px > MAX_SHIFT_PX {
-        return Ok(255.0);
-    }
-    // What any geometric effect moves, all others may enlarge.
-    let grey = light_bound::covered_grey(scene, 2.0 * std::f64::consts::SQRT_2 * px)?;
-    Ok(grown(scene, EffectName::LensDistortion, grey))
-}

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use domecast_optics::numeric::SeededRandom;
 
-use super::grey_of_shift;
 use super::growth::grown;
+use super::pictures::Pictures;
 use super::random_scenes::{apart, lit_designs, lit_scene, shipped};
 use super::search::effect_of;
 use crate::contact::between::Around;
@@ -84,20 +84,25 @@ fn difference(scene: &Scene, random: bool, a: &[Drawn], b: &[Drawn]) -> (f64, f6
 fn measure(name: &str, scene: &Scene, numbers: &[u32], enough: usize, ratios: &mut Ratios) -> Vec<String> {
     let plan = Plan::exact(scene).unwrap();
     let touches = touches(scene, &plan);
-    // Noise hides what is smaller: the other effects are measured without it, and before a lossy code.
-    let quiet = |plan: &Plan, kept: EffectName| {
+    let pictures = Pictures::of(scene);
+    // Noise hides what is smaller: effects are measured without it, and what acts on it with it as well; all before a lossy code.
+    let all = |noisy: bool| {
         let mut plan = plan.clone();
         for entry in &mut plan.entries {
-            entry.used &= entry.effect == kept
-                || !matches!(
-                    entry.effect,
-                    EffectName::Noise | EffectName::Sharpening | EffectName::Compression
-                );
+            entry.used &= match entry.effect {
+                EffectName::Noise => noisy,
+                EffectName::Compression => false,
+                _ => true,
+            };
         }
         plan
     };
-    let bare_plan = quiet(&plan, EffectName::Dots);
-    let bare = frames(scene, &bare_plan, numbers, &touches);
+    let all = [all(false), all(true)];
+    let has_noise = all[0] != all[1];
+    let with = [false, true].map(|noisy| {
+        let drawn = || frames(scene, &all[usize::from(noisy)], numbers, &touches);
+        if noisy && !has_noise { Vec::new() } else { drawn() }
+    });
     let mut below = Vec::new();
     for entry in plan.entries.iter().filter(|entry| entry.used) {
         let bound = entry.bound.unwrap();
@@ -105,26 +110,34 @@ fn measure(name: &str, scene: &Scene, numbers: &[u32], enough: usize, ratios: &m
         if bound == Bound::UNBOUNDED || known >= enough {
             continue;
         }
-        let random = entry.effect == EffectName::Noise;
-        let with_it = quiet(&plan, entry.effect);
-        let mut without = with_it.clone();
-        without.entries.iter_mut().filter(|other| other.effect == entry.effect).for_each(|e| e.used = false);
-        let own;
-        let with = if with_it == bare_plan {
-            &bare
-        } else {
-            own = frames(scene, &with_it, numbers, &touches);
-            &own
-        };
         // A slow gel is another contact.
-        let elastic = (entry.effect == EffectName::SlowGel).then(|| self::touches(scene, &without));
-        let others = elastic.as_deref().unwrap_or(&touches);
-        let (px, grey) = difference(scene, random, with, &frames(scene, &without, numbers, others));
+        let mut elastic = None;
+        let (mut px, mut grey) = (0.0_f64, 0.0_f64);
+        for noisy in [false, true] {
+            let measured = match entry.effect {
+                EffectName::Noise => noisy,
+                effect if noisy => has_noise && effect >= EffectName::Bayer,
+                _ => true,
+            };
+            if !measured {
+                continue;
+            }
+            let mut without = all[usize::from(noisy)].clone();
+            let own = without.entries.iter_mut().filter(|other| other.effect == entry.effect);
+            own.for_each(|own| own.used = false);
+            if entry.effect == EffectName::SlowGel {
+                elastic = Some(self::touches(scene, &without));
+            }
+            let others = elastic.as_deref().unwrap_or(&touches);
+            let without = frames(scene, &without, numbers, others);
+            let found = difference(scene, noisy, &with[usize::from(noisy)], &without);
+            (px, grey) = (px.max(found.0), grey.max(found.1));
+        }
         let by_px = bound.px / px.max(MIN_PX);
         // What effects after it enlarge counts as in the plan.
         let own = grown(scene, entry.effect, bound.grey);
-        let has_shift = effect_of(entry.effect).unwrap().grey_has_shift();
-        let at_edges = if has_shift { 0.0 } else { grey_of_shift(scene, bound.px).unwrap() };
+        let has_shift = effect_of(entry.effect).unwrap().is_drawn();
+        let at_edges = if has_shift { 0.0 } else { pictures.shift_grey(bound.px).unwrap() };
         let whole = (own + at_edges).min(255.0);
         let by_grey = whole / grey.max(MIN_GREY);
         let ratio = if !scene.draws() || (bound.grey == 0.0 && px > MIN_PX) { by_px } else { by_grey };

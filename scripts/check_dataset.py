@@ -198,8 +198,13 @@ def tracked(program, spec, folder):
     check(0.8 < min(share) <= max(share) < 1.25, f"tracked forces are {min(share):.3f} to {max(share):.3f} of the truth (sensors as built)")
     check(still < 0.02, f"no tracked force before the contact: {still:.4f} N")
     check(min(found) > 0.97, f"dots tracked: {min(found):.3f} at least")
-    unknown = np.isnan(np.concatenate([video["readings.npy"] for video in videos.values()])).any(axis=0)
-    check([columns[k] for k in np.flatnonzero(unknown)] == ["contact_radius_mm"], "only the contact's radius is not tracked")
+    check(not np.isnan(np.concatenate([video["readings.npy"] for video in videos.values()])).any(), "all readings are tracked")
+    at = columns.index("contact_radius_mm")
+    pairs = np.array([(video["readings.npy"][k, at], true) for video in videos.values()
+                      for k, (true, force) in enumerate(zip(video["json"]["truth"]["contact_radius_mm"], video["json"]["truth"]["force_n"])) if force > 0.3])
+    ratio = pairs[:, 0] / pairs[:, 1]
+    check(np.median(ratio) > 0.85 and np.median(ratio) < 1.2 and ratio.min() > 0.5,
+          f"tracked radii of contacts are {ratio.min():.2f} to {ratio.max():.2f}, in the median {np.median(ratio):.2f} of the truth")
 
 
 def pooled(frames, rest):

@@ -38,7 +38,7 @@ def simulate(program, folder, name, design, objects, count):
     subprocess.run([program, "simulate", path, "--depth", "--out", out, "--quiet"], check=True)
     lines = folder / f"{name}.jsonl"
     subprocess.run([program, "track", out, "--constants", folder / design / "constants" / "constants.json", "--traction",
-                    "--out", lines, "--quiet"], check=True)
+                    "--reference", "1", "--out", lines, "--quiet"], check=True)
     read = lambda file: [json.loads(line) for line in file.read_text().splitlines()]
     return read(lines), read(out / "truth.jsonl"), out
 

@@ -221,6 +221,7 @@ def entries(constants_path, repository, folder):
         "Shape.set_rest": Entry(plainly(lambda a, b: shape.set_rest(a, rgb=b)), [frames, truth], 0.1),
         "Shape.update": Entry(plainly(lambda a, b, c: shape.update(a, b, rgb=c)), [frames, readings, truth], 0.1),
         "Traction": Entry(lambda a, b: domecast.Traction(a, correlation_mm=b), [(sensor, anything), (None, some.one_of(numbers, anything))], 0.02),
+        "Traction.set_rest": Entry(lambda a: traction.set_rest(a), [readings], 0.2),
         "Traction.update": Entry(lambda a, b: traction.update(a, shape=b), [readings, maps], 0.2),
         "Traction.pressure": Entry(lambda a: traction.pressure(a), [maps], 0.5),
         "Forces.json": Entry(lambda a, b: forces.json(a, shape=b), [fields, maps], 1),

@@ -190,6 +190,7 @@ def shapes(folder, frames, rest):
     tracker = domecast.Tracker(sensor)
     shape, forces = domecast.Shape(sensor, tracker), domecast.Traction(sensor, correlation_mm=1)
     shape.set_rest(read_png(rest), rgb=True)
+    forces.set_rest(domecast.Tracker(sensor).update(read_png(rest), rgb=True))
     for number, (frame, line) in enumerate(zip(frames, lines, strict=True)):
         reading = tracker.update(frame, rgb=True)
         found = shape.update(frame, reading, rgb=True)

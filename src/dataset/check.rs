@@ -22,7 +22,7 @@ pub struct Dataset {
 }
 
 /// Changes when other bytes come of the same spec.
-const FORM: &str = "domecast-dataset 1";
+const FORM: &str = "domecast-dataset 2";
 
 pub(crate) fn sha256_hex(parts: &[&[u8]]) -> String {
     let mut digest = Sha256::new();

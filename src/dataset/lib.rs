@@ -10,6 +10,7 @@
 
 mod check;
 mod draw;
+mod frame_reader;
 mod index;
 mod make;
 mod read;

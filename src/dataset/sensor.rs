@@ -3,6 +3,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::check::Dataset;
+use crate::frame_reader::FrameReader;
 use crate::sensor_draw::SensorDraw;
 use domecast_contact::{Contact, Level};
 use domecast_design::sections::{DesignFile, IndexRgb, IndexValue};
@@ -42,6 +43,8 @@ pub struct FullSensor {
     pub scene: Scene,
     /// As [`BuiltSensor::plan`].
     pub plan: Plan,
+    /// What reads its frames, with the constants of the design as it was meant.
+    pub reader: FrameReader,
 }
 
 /// Normal numbers that end at [`MAX_SD`].
@@ -102,7 +105,7 @@ impl Dataset {
             crate::spec::ReadingsKind::Tracked => {
                 let meant = self.scene_of(self.design.sections(), 1.0, &own)?;
                 let (scene, plan) = self.built_scene(meant, &built, 1.0, &print)?;
-                Some(Box::new(FullSensor { scene, plan }))
+                Some(Box::new(FullSensor { scene, plan, reader: FrameReader::new(&self.design)? }))
             }
         };
         Ok(BuiltSensor { scene, plan, dome, own, full })

@@ -8,14 +8,14 @@ use crate::scene::video_scene;
 use crate::sensor::{BuiltSensor, FullSensor};
 use crate::video::{NoVideo, Refused, Video, touches};
 use domecast_optics::numeric::SeededRandom;
-use domecast_runtime::track::{CameraFrame, TrackOptions, Tracker};
+use domecast_runtime::track::CameraFrame;
 use domecast_sim::{Around, Renderer, Scratch};
 
 /// Stream of the noise of what is not tracked.
 const STREAM_TRACKED: u64 = 0x7eac;
 
-/// The readings of a video: the tracker has the design's constants, not those of the sensor as built, and what it says of the
-/// frame at rest is taken off. The contact's radius is not tracked, nor is the hand's travel.
+/// The readings of a video: the tracker has the design's constants, not those of the sensor as built, and counts from its frame at rest.
+/// The hand's travel is not tracked.
 ///
 /// # Errors
 /// [`NoVideo`].
@@ -31,12 +31,7 @@ pub fn tracked(
     let scene = full.scene.with_file(file)?;
     let touched = touches(dataset, sensor, &scene, draw)?;
     let renderer = Renderer::new(&scene, &full.plan).map_err(NoVideo::Fault)?;
-    let layout = domecast_design::layout::Layout::of_design(&dataset.design);
-    let layout = layout.map_err(|error| refused(error.to_string()))?;
-    let constants = domecast_fab::constants::of(&dataset.design, &layout);
-    let constants = constants.map_err(|error| refused(error.to_string()))?;
-    let tracker = Tracker::new(&constants, TrackOptions::default());
-    let mut tracker = tracker.map_err(|error| refused(error.to_string()))?;
+    let mut reader = full.reader.clone();
     let at_mm = scene.reference_mm();
     let mut random = SeededRandom::stream(seed, STREAM_TRACKED);
     let mut scratch = Scratch::default();
@@ -51,20 +46,26 @@ pub fn tracked(
         let Some(image) = drawn.image else { continue };
         let frame = CameraFrame::new(image.width, image.height, image.channels, &image.bytes);
         let frame = frame.map_err(|fault| refused(format!("{fault:?}")))?;
-        let said = tracker.track(order as u64, &frame);
-        scratch.give_back(image);
+        let said = reader.track(order as u64, &frame).clone();
         let Some(rest) = &rest else {
-            rest = Some(TrackedRest::new(said, at_mm));
+            if said.black_dots.iter().all(|dot| dot.reference.is_none()) {
+                return Err(refused(format!("the frame at rest is {}", said.status())));
+            }
+            reader.set_rest(&frame, &said).map_err(|error| refused(error.to_string()))?;
+            rest = Some(TrackedRest::new(&said, at_mm));
+            scratch.give_back(image);
             continue;
         };
-        let [wrench, platform] = rest.rigid(said);
-        let seen: Vec<Option<SeenDot>> = rest.dots(said).collect();
+        let [wrench, platform] = rest.rigid(&said);
+        let seen: Vec<Option<SeenDot>> = rest.dots(&said).collect();
         let travel_mm = match dataset.spec().readings.robot_travel_sd_mm {
             Some(sd_mm) => video.travel_mm[at] + sd_mm * random.normal(),
             None => f64::NAN,
         };
         let height = f64::from(dataset.design.sections().camera.height);
-        rows.push(row(touched.course.times_s[at], &wrench, &platform, travel_mm, &seen, f64::NAN, height));
+        let radius_mm = reader.radius_mm(&frame, &said);
+        scratch.give_back(image);
+        rows.push(row(touched.course.times_s[at], &wrench, &platform, travel_mm, &seen, radius_mm, height));
         dots.push(seen.into_iter().map(written).collect());
     }
     Ok(Readings { rows, dots })

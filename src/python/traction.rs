@@ -35,6 +35,16 @@ impl PyTraction {
         Ok(Self { forces })
     }
 
+    /// Takes the reading of a frame of the untouched sensor: its dots lie where that shows them.
+    fn set_rest(&mut self, reading: &PyReading) -> PyResult<()> {
+        let tracked = reading.tracked();
+        if self.forces.set_rest(tracked) {
+            return Ok(());
+        }
+        let (value, allowed) = (tracked.status(), "a reading of this sensor with a pose, untouched");
+        Err(Fault::argument("reading", value, "has no pose, or is another sensor's", allowed).into())
+    }
+
     /// The forces in a frame, with its heights where they are measured.
     #[pyo3(signature = (reading, *, shape = None))]
     fn update(

@@ -54,6 +54,11 @@ impl TrackerArguments {
         self.camera_turned.is_some_and(|deg| deg != 0.0)
     }
 
+    /// Whether the first frames say what the untouched sensor shows.
+    pub fn has_reference(&self) -> bool {
+        self.reference.is_some_and(|frames| frames > 0)
+    }
+
     /// A picture that is mirrored and then turned is, mirrored back, turned the other way.
     fn camera_turned_rad(&self) -> Option<f64> {
         let turned_rad = self.camera_turned.map(f64::to_radians);

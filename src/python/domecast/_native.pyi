@@ -245,6 +245,10 @@ class Traction:
     def __new__(cls, sensor: Sensor, *, correlation_mm: float | None = None) -> Traction:
         """`correlation_mm`: over how far pressures are taken to be alike; 1 where heights are given, as the command line does."""
 
+    def set_rest(self, reading: Reading) -> None:
+        """Takes the reading of a frame of the untouched sensor: its dots lie where that shows them. Without it, and without the tracker's
+        `reference`, forces that move dots by no more than they are printed to (a tenth of a millimetre) are not seen."""
+
     def update(self, reading: Reading, *, shape: ShapeMap | None = None) -> Forces: ...
     def pressure(self, shape: ShapeMap) -> tuple[Floats32, Floats32]:
         """The last frame's pressures on the grid of its height map, N/mm2, and their deviations."""

@@ -77,8 +77,8 @@ pub(crate) use marks::marker_in_still;
 pub use meter::{MarkerCentroid, MeasuredWrench, WrenchMeter};
 pub use options::{Channel, MIN_MARKER_RISE_LEVELS, Reference, TrackOptions};
 pub use report::{
-    CSV_HEADER, DOTS_CSV_HEADER, DotResult, Field, MarkerResult, Problem, Problems, RECORD_BYTES, Tracked,
-    write_csv, write_dots_csv, write_json, write_json_fields, write_record,
+    CSV_HEADER, DOTS_CSV_HEADER, DotReference, DotResult, Field, MarkerResult, Problem, Problems,
+    RECORD_BYTES, Tracked, write_csv, write_dots_csv, write_json, write_json_fields, write_record,
 };
 pub use tracker::Tracker;
 pub use wrench::Springs;

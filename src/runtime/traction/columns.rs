@@ -6,9 +6,8 @@ use rayon::prelude::*;
 use super::active_set::Rows;
 use super::forces::{ForceDistribution, MIN_WRENCH_SD_N, SHEAR_RATIO};
 use super::model::AXES;
-use super::wrench_rows::WrenchRows;
+use super::wrench_rows::{SpringLoad, WrenchRows};
 use crate::shape::rows::share;
-use crate::track::Tracked;
 use domecast_optics::numeric::Rigid;
 
 /// How closely the forces must add to the wrench beside its own noise: a part of the force; moments by the dome's radius.
@@ -23,16 +22,15 @@ fn six(force: DVec3, moment: DVec3) -> [f64; 6] {
 
 impl ForceDistribution {
     /// The wrench as rows, where it is known.
-    fn wrench_rows(&self, tracked: &Tracked, pose: &Rigid) -> Option<WrenchRows> {
-        let (reference_mm, wrench) = self.reference_mm.zip(tracked.wrench)?;
+    fn wrench_rows(&self, pose: &Rigid) -> Option<WrenchRows> {
+        let (reference_mm, SpringLoad { wrench, sd }) = self.reference_mm.zip(self.load)?;
         // In the platform's frame, about where the reference point is in it.
         let platform_from_rest = pose.inverse();
         let force = platform_from_rest.vector(wrench.force_n);
         let moment = platform_from_rest.vector(wrench.moment_nmm);
-        let noise = tracked.wrench_sd_random.unwrap_or_default();
         let (part_n, arm_mm) = (WRENCH_PART * force.length() + MIN_WRENCH_SD_N, self.radius_mm);
         let units = six(DVec3::ONE, DVec3::splat(arm_mm));
-        let own = six(noise.force_n, noise.moment_nmm);
+        let own = six(sd.force_n, sd.moment_nmm);
         Some(WrenchRows {
             about_mm: platform_from_rest.point(reference_mm),
             six: six(force, moment),
@@ -41,8 +39,8 @@ impl ForceDistribution {
     }
 
     /// Takes what a turn wants: dots, wrench, heights.
-    pub(super) fn want(&mut self, tracked: &Tracked, pose: &Rigid) {
-        self.wrench = self.wrench_rows(tracked, pose);
+    pub(super) fn want(&mut self, pose: &Rigid) {
+        self.wrench = self.wrench_rows(pose);
         self.wanted.clear();
         for k in 0..self.dots.len() {
             let px = (self.dots[k].seen_px - self.nonlinear_px(k)) * self.dots[k].per_sd;

@@ -53,7 +53,7 @@ impl ForceDistribution {
         let load_sd_n = self.posterior.sd_of(nodes.iter().map(|node| node.area_mm2).enumerate())?;
         let own_sd_n =
             load_sd_n.hypot(if springs_sd_n.is_some() { 0.0 } else { self.model.young_sd_part * load_n });
-        let random_sd_n = if springs_sd_n.is_some() { load_sd_n } else { own_sd_n };
+        let random_sd_n = self.load.map_or(own_sd_n, |load| load_sd_n.hypot(load.sd.force_n.length()));
         if load_n < MIN_OVER_SD * random_sd_n {
             return None;
         }

@@ -7,13 +7,14 @@ use super::model::{AXES, Dot, ElasticModel};
 use super::posterior::Posterior;
 use super::pressure_room::PressureRoom;
 use super::result::{DotTraction, LocalForces, TractionStatus};
-use super::wrench_rows::WrenchRows;
+use super::seen_dots::place_sd_px;
+use super::wrench_rows::{SpringLoad, WrenchRows};
 use crate::constants::Constants;
 use crate::shape::{ShapeMap, rows};
 use crate::track::TrackError;
 use crate::track::Tracked;
 use domecast_optics::SensorOptics;
-use domecast_optics::numeric::Rigid;
+use domecast_springs::Wrench;
 
 /// Turns of the forces with the skin, and of the rays with its motion, in a frame: each leaves a few hundredths.
 const TURNS: u32 = 3;
@@ -51,7 +52,10 @@ pub struct ForceDistribution {
     pub(super) dot_columns: Vec<f64>,
     /// The same of the height of each node, mm.
     pub(super) height_columns: Vec<f64>,
-    /// The wrench's rows of this turn.
+    /// What the springs said of the frame of the untouched sensor, where one was given.
+    pub(super) rest_wrench: Option<Wrench>,
+    /// What they say of this frame, and its rows in this turn.
+    pub(super) load: Option<SpringLoad>,
     pub(super) wrench: Option<WrenchRows>,
     pub(super) columns: Vec<f64>,
     pub(super) wanted: Vec<f64>,
@@ -89,8 +93,17 @@ impl ForceDistribution {
             let by_point = optics.project_with_jacobian(*surface_mm).map_or([DVec3::ZERO; 2], |(_, by)| {
                 [0, 1].map(|i| DVec3::new(by[(i, 0)], by[(i, 1)], by[(i, 2)]))
             });
-            let (seen_px, linear_px) = (DVec2::ZERO, DVec2::ZERO);
-            Dot { surface_mm: *surface_mm, by_point, rest_px: None, seen_px, linear_px, per_sd: 0.0 }
+            Dot {
+                surface_mm: *surface_mm,
+                rest_mm: *surface_mm,
+                rest_frames: 0,
+                place_sd_px: place_sd_px(constants, &by_point),
+                by_point,
+                rest_px: None,
+                seen_px: DVec2::ZERO,
+                linear_px: DVec2::ZERO,
+                per_sd: 0.0,
+            }
         };
         let dots: Vec<Dot> = places.iter().map(dot_of).collect();
         let (n, max_rows) = (model.nodes.len(), 2 * dots.len() + 6 + model.nodes.len());
@@ -104,11 +117,13 @@ impl ForceDistribution {
         let springs = constants.springs.as_ref();
         Ok(Self {
             set: ActiveSet::new(n, max_rows),
-            posterior: Posterior::new(&model, &places, &by_point),
+            posterior: Posterior::new(&model, &dots),
             reference_mm: springs.map(|springs| DVec3::from_array(springs.at_mm)),
             radius_mm: constants.optics.dome_radius_mm,
             dot_columns,
             height_columns: model.heights_by(),
+            rest_wrench: None,
+            load: None,
             wrench: None,
             columns: vec![0.0; AXES * n * max_rows],
             wanted: Vec::with_capacity(max_rows),
@@ -162,8 +177,9 @@ impl ForceDistribution {
         self.result.dots.clear();
         self.result.contact = None;
         (self.result.rms_px, self.result.compliance_factor) = (0.0, 1.0);
-        let pose = if self.reference_mm.is_some() { tracked.pose } else { Some(Rigid::identity()) };
-        let Some(pose) = pose.filter(|pose| self.optics.move_to(pose).is_ok() && self.see(tracked)) else {
+        let Some(pose) =
+            self.pose_of(tracked).filter(|pose| self.optics.move_to(pose).is_ok() && self.see(tracked))
+        else {
             self.set.clear();
             self.result.status = TractionStatus::NoMotion;
             return;
@@ -173,26 +189,23 @@ impl ForceDistribution {
             self.result.status = TractionStatus::ForeignReading;
             return;
         }
-        for dot in &mut self.dots {
-            dot.rest_px = self.optics.project_deformed(dot.surface_mm).ok();
-        }
+        self.load = self.load(tracked);
         let mut ended = Ended::Solved;
         self.softness = 1.0;
         self.move_skin();
         self.allow(map);
         self.need();
         // Of an untouched sensor nothing is to be found: all nodes would be asked in vain.
-        let is_touched =
-            self.is_moved || map.is_some_and(|map| map.contact.is_some()) || self.is_pressed(tracked);
+        let is_touched = self.is_moved || map.is_some_and(|map| map.contact.is_some()) || self.is_pressed();
         if !is_touched {
             self.set.clear();
             self.move_skin();
         }
         for _ in 0..if is_touched { TURNS } else { 0 } {
             self.take_heights(map);
-            self.want(tracked, &pose);
+            self.want(&pose);
             ended = self.solve_turn();
-            self.soften(tracked);
+            self.soften();
             self.move_skin();
         }
         self.result.status = match ended {
@@ -205,21 +218,20 @@ impl ForceDistribution {
     /// What the projection of the moved dot is beyond its linear part, px.
     pub(super) fn nonlinear_px(&self, k: usize) -> DVec2 {
         let (dot, moved_mm) = (&self.dots[k], self.dots_moved_mm[k]);
-        let now = self.optics.project_deformed(dot.surface_mm + moved_mm);
+        let now = self.optics.project_deformed(dot.rest_mm + moved_mm);
         now.ok().zip(dot.rest_px).map_or(DVec2::ZERO, |(now, rest)| now - rest - dot.linear_px)
     }
 
     /// Whether a force of more than what the wrench is off bears on the sensor, where it says.
-    fn is_pressed(&self, tracked: &Tracked) -> bool {
-        let wrench = self.reference_mm.and(tracked.wrench).zip(tracked.wrench_sd);
-        wrench.is_some_and(|(wrench, sd)| wrench.force_n.length() > PRESSED_OVER_SD * sd.force_n.length())
+    fn is_pressed(&self) -> bool {
+        self.load
+            .is_some_and(|load| load.wrench.force_n.length() > PRESSED_OVER_SD * load.sd.force_n.length())
     }
 
     /// How much softer the dome is than the constants say: the factor that fits the dots best, where the wrench says the force.
-    fn soften(&mut self, tracked: &Tracked) {
-        let known_n = self.reference_mm.and(tracked.wrench).map_or(0.0, |wrench| wrench.force_n.length());
-        let noise_n = tracked.wrench_sd_random.unwrap_or_default().force_n.length() + MIN_WRENCH_SD_N;
-        if known_n < SOFTNESS_OVER_SD * noise_n {
+    fn soften(&mut self) {
+        let Some(load) = self.load else { return };
+        if load.wrench.force_n.length() < SOFTNESS_OVER_SD * (load.sd.force_n.length() + MIN_WRENCH_SD_N) {
             return;
         }
         let prior = 1.0 / self.model.young_sd_part.max(1e-3).powi(2);
@@ -303,13 +315,13 @@ impl ForceDistribution {
                 coarse += share * self.model.variance_within(node, &self.set.tractions)
                     / self.stretch[node].powi(2);
             }
-            let mut sd = self.posterior.sd_at(&self.model, k, dot.surface_mm) * pressure.max(0.1);
+            let mut sd = self.posterior.sd_at(&self.model, k, dot) * pressure.max(0.1);
             if self.reference_mm.is_none() {
                 sd = sd.hypot(self.model.young_sd_part * traction.length());
             }
             self.result.dots.push(DotTraction {
                 id: found.id,
-                surface_mm: dot.surface_mm + self.dots_moved_mm[k],
+                surface_mm: dot.rest_mm + self.dots_moved_mm[k],
                 traction_n_mm2: traction,
                 noise_sd_n_mm2: sd,
                 sd_n_mm2: sd.hypot(coarse.sqrt()),

@@ -35,7 +35,14 @@ pub(super) struct Node {
 /// A dot and how its image moves with it.
 #[derive(Debug, Clone)]
 pub(super) struct Dot {
+    /// Its place in the constants, mm.
     pub surface_mm: DVec3,
+    /// Where it lies on the untouched dome, mm: by the constants, or as frames of the untouched sensor show it.
+    pub rest_mm: DVec3,
+    /// Such frames; 0: the constants' place.
+    pub rest_frames: u32,
+    /// Standard deviation of its image by that of its place in the constants, px.
+    pub place_sd_px: f64,
     pub by_point: [DVec3; 2],
     /// Its image on the untouched dome where the platform is now, px.
     pub rest_px: Option<DVec2>,

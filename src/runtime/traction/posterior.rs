@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::active_set::{ActiveSet, Rows};
 use super::cholesky::{factor, forward};
-use super::model::ElasticModel;
+use super::model::{Dot, ElasticModel};
 
 /// A dot without a deviation of its own, px.
 pub(super) const USUAL_DOT_SD_PX: f64 = 0.02;
@@ -23,28 +23,32 @@ pub(super) struct Posterior {
     /// By how much deviations are larger than the rows' own say.
     wider: f64,
     solved: Vec<f64>,
-    /// By dot: deviation of a pressure about it that nothing else is near, N/mm2.
-    alone_n_mm2: Vec<f64>,
+    /// By dot: deviation of a pressure about it that nothing else is near, N/mm2; where its place at rest was seen, and where it is
+    /// the constants'.
+    alone_n_mm2: Vec<[f64; 2]>,
 }
 
 impl Posterior {
     /// For dots at these places, whose images move so with them.
-    pub fn new(model: &ElasticModel, dots_mm: &[DVec3], by_point: &[[DVec3; 2]]) -> Self {
+    pub fn new(model: &ElasticModel, dots: &[Dot]) -> Self {
         let n = model.nodes.len();
-        let alone = |at: &DVec3| {
+        let alone = |dot: &Dot| {
             // A smooth pressure about the dot, of height 1.
             let height = |k: usize| {
-                let q = model.nodes[k].at_mm.distance_squared(*at);
+                let q = model.nodes[k].at_mm.distance_squared(dot.surface_mm);
                 (-q / (2.0 * model.correlation_mm * model.correlation_mm)).exp()
             };
             let heights: Vec<(usize, f64)> =
                 (0..n).map(|k| (k, height(k))).filter(|(_, height)| *height > 0.01).collect();
-            let mut seen = 1.0 / (model.pressure_sd_n_mm2 * model.pressure_sd_n_mm2);
-            for (d, by) in by_point.iter().enumerate() {
-                let u: DVec3 = heights.iter().map(|(k, h)| model.dots_mm[k * dots_mm.len() + d] * *h).sum();
-                seen += (by[0].dot(u).powi(2) + by[1].dot(u).powi(2)) / (USUAL_DOT_SD_PX * USUAL_DOT_SD_PX);
+            let mut seen = [1.0 / (model.pressure_sd_n_mm2 * model.pressure_sd_n_mm2); 2];
+            for (d, other) in dots.iter().enumerate() {
+                let u: DVec3 = heights.iter().map(|(k, h)| model.dots_mm[k * dots.len() + d] * *h).sum();
+                let squares: f64 = other.by_point.iter().map(|by| by.dot(u).powi(2)).sum();
+                for (seen, place_sd_px) in seen.iter_mut().zip([USUAL_DOT_SD_PX, other.place_sd_px]) {
+                    *seen += squares / (USUAL_DOT_SD_PX.powi(2) + place_sd_px.powi(2));
+                }
             }
-            1.0 / seen.sqrt()
+            seen.map(|seen| 1.0 / seen.sqrt())
         };
         Self {
             nodes: Vec::with_capacity(MAX_NODES),
@@ -53,7 +57,7 @@ impl Posterior {
             is_known: false,
             wider: 1.0,
             solved: Vec::with_capacity(MAX_NODES),
-            alone_n_mm2: dots_mm.iter().map(alone).collect(),
+            alone_n_mm2: dots.iter().map(alone).collect(),
         }
     }
 
@@ -107,8 +111,11 @@ impl Posterior {
     }
 
     /// Deviation of the pressure at a dot, N/mm2.
-    pub fn sd_at(&mut self, model: &ElasticModel, dot: usize, at_mm: DVec3) -> f64 {
-        let alone = self.alone_n_mm2.get(dot).copied().unwrap_or(model.pressure_sd_n_mm2);
-        self.sd_of(model.about(at_mm)).unwrap_or(alone)
+    pub fn sd_at(&mut self, model: &ElasticModel, number: usize, dot: &Dot) -> f64 {
+        let alone = self.alone_n_mm2.get(number).map(|[seen, of_constants]| match dot.rest_frames {
+            0 => *of_constants,
+            _ => *seen,
+        });
+        self.sd_of(model.about(dot.surface_mm)).or(alone).unwrap_or(model.pressure_sd_n_mm2)
     }
 }

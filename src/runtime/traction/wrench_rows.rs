@@ -1,5 +1,6 @@
-//! A wrench as rows of the least squares.
+//! What the springs say, and as rows of the least squares.
 
+use domecast_springs::Wrench;
 use glam::DVec3;
 
 /// The rows of a wrench.
@@ -10,4 +11,11 @@ pub(super) struct WrenchRows {
     /// Force and moment, and one over the deviation of each.
     pub six: [f64; 6],
     pub per_sd: [f64; 6],
+}
+
+/// What the springs say of a frame's load, and its deviations.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SpringLoad {
+    pub wrench: Wrench,
+    pub sd: Wrench,
 }

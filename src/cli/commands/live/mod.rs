@@ -19,7 +19,7 @@ use domecast_live::source::{CameraRequest, ControlRequest, LiveSource, open_devi
 use domecast_live::{HeightReader, LiveEvent, LiveReader};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeFromColor, ShapeOptions};
-use domecast_runtime::track::{CameraFrame, Tracker};
+use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
 use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
 use session::{Outlets, Session};
 
@@ -74,12 +74,12 @@ fn check_size(
     }
 }
 
-/// What reads the skin, from a frame at rest.
+/// What reads the skin, from a frame at rest, and what is tracked in that.
 fn skin_of(
     arguments: &LiveArguments,
     constants: &Constants,
     tracker: &Tracker,
-) -> Result<Option<ShapeFromColor>, Failure> {
+) -> Result<Option<(ShapeFromColor, Tracked)>, Failure> {
     let Some(rest) = &arguments.rest else { return Ok(None) };
     if arguments.show.is_none() && arguments.record.is_none() {
         return Err(input_fault(
@@ -97,7 +97,7 @@ fn skin_of(
     let frame = frame.map_err(|error| fault(rest, error.to_string()))?;
     let tracked = tracker.clone().track(0, &frame).clone();
     shape.set_rest(&frame, &tracked).map_err(|error| fault(rest, error.to_string()))?;
-    Ok(Some(shape))
+    Ok(Some((shape, tracked)))
 }
 
 /// Reads until the source ends, the frames that were asked for are there, or Ctrl-C.
@@ -113,7 +113,11 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
         Some(port) => {
             let correlation_mm = skin.is_some().then_some(SHAPE_CORRELATION_MM);
             // constants of earlier builds have no dome to press: their page shows no forces on the skin
-            let forces = ForceDistribution::new(&constants, correlation_mm).ok();
+            let mut forces = ForceDistribution::new(&constants, correlation_mm).ok();
+            if let Some((forces, (_, at_rest))) = forces.as_mut().zip(skin.as_ref()) {
+                // the skin was read from it: it has a pose
+                let _ = forces.set_rest(at_rest);
+            }
             let shown = ShownSensor { optics: tracker.optics().clone(), forces };
             Some(LivePage::start(port, shown).map_err(|error| {
                 let problem = format!("cannot be used ({error})");
@@ -130,7 +134,7 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
         Recording::begin(output, path, "live", &rules, &constants, &tracker, pace)
     };
     let recording = arguments.record.as_ref().map(begin).transpose()?;
-    let heights = skin.map(HeightReader::start).transpose().map_err(Failure::Print)?;
+    let heights = skin.map(|(skin, _)| HeightReader::start(skin)).transpose().map_err(Failure::Print)?;
     // the first Ctrl-C ends the reading in good order, with the recording's index and the summary
     let wish = StopWish::heed();
     let outlets = Outlets { page, recording, heights };

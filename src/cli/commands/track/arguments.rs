@@ -23,7 +23,7 @@ pub enum Format {
 
 /// Arguments of `domecast track`.
 #[derive(Debug, clap::Args)]
-#[command(group(clap::ArgGroup::new("read_against_rest").args(["shape", "hardness"]).multiple(true)))]
+#[command(group(clap::ArgGroup::new("read_against_rest").args(["shape", "hardness", "traction"]).multiple(true)))]
 pub struct TrackArguments {
     /// A folder of PNG or JPEG frames, frames, a video (through ffmpeg), a file of raw frames (with --raw), or `-` for
     /// standard input (PGM or PPM pictures one after the other, or raw with --raw).
@@ -41,7 +41,8 @@ pub struct TrackArguments {
     /// that needs the wrench alone reads a tenth of the bytes.
     #[arg(long, value_name = "NAME,..", value_delimiter = ',', value_parser = field)]
     pub fields: Vec<Field>,
-    /// State the forces on the skin as well: traction (pressure and shear) at each dot, and what touches as a whole.
+    /// State the forces on the skin as well: traction (pressure and shear) at each dot, and what touches as a whole. Give --reference or
+    /// --rest with it: dots are printed to a tenth of a millimetre, which a light touch does not move them by.
     #[arg(long)]
     pub traction: bool,
     /// Draw dots, axes and force over each frame, into this folder; with --shape the skin's depth as colours and the outline
@@ -75,7 +76,7 @@ pub struct TrackArguments {
     /// The model sees each so many-th frame: its window should last about as long as the videos that it was trained with.
     #[arg(long, requires = "hardness", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..), value_name = "N")]
     pub hardness_every: u64,
-    /// A frame of the untouched sensor, which shape and hardness are read against.
+    /// A frame of the untouched sensor, which shape, forces on the skin and hardness are read against.
     #[arg(long, requires = "read_against_rest", value_name = "FRAME")]
     pub rest: Option<PathBuf>,
     /// Raw frames of this size: WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb.

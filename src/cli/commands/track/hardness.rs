@@ -6,12 +6,12 @@ use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::arguments::{Format, TrackArguments};
+use super::rest_frame::RestFrame;
 use crate::commands::input::input_fault;
 use crate::commands::output::Failure;
 use domecast_dataset::{COLUMNS, DOT_COLUMNS, RIGID_COLUMNS, SeenDot, TrackedRest, dots_features};
 use domecast_hardness::{FrameView, HardnessEstimate, HardnessReader, Unsure};
-use domecast_live::decode;
-use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
+use domecast_runtime::track::{CameraFrame, Tracked};
 
 /// A model, and which of the frames it sees.
 pub(super) struct HardnessLines {
@@ -51,7 +51,7 @@ impl HardnessLines {
     /// `None` where no model is named.
     pub(super) fn open(
         arguments: &TrackArguments,
-        tracker: &Tracker,
+        at_rest: Option<&RestFrame>,
         at_mm: DVec3,
     ) -> Result<Option<Self>, Failure> {
         let Some(model) = &arguments.hardness else { return Ok(None) };
@@ -68,26 +68,17 @@ impl HardnessLines {
         let mut reader = HardnessReader::load(model)
             .map_err(|e| input_fault(model, format!("{}: {}", e.at, e.problem), &e.allowed))?;
         let columns = columns(model, &reader)?;
-        let Some(path) = &arguments.rest else {
+        let Some(at_rest) = at_rest else {
             let allowed = "--rest FRAME of the untouched sensor";
             return Err(input_fault(model, "is given without --rest", allowed));
         };
-        let fault = |problem: String| input_fault(path, problem, "a frame of the untouched sensor");
-        let bytes = std::fs::read(path).map_err(|e| fault(format!("cannot be read: {e}")))?;
-        let mut picture = decode::picture(&bytes).map_err(&fault)?;
-        if arguments.tracker.camera_mirrored {
-            picture.mirror();
-        }
-        let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes)
-            .map_err(|e| fault(e.to_string()))?;
+        let frame = at_rest.frame()?;
         if !reader.set_rest(&view(&frame)) {
-            return Err(fault("is not whole".into()));
+            return Err(at_rest.fault("is not whole".into()));
         }
-        let mut at_rest = tracker.clone();
-        let tracked = at_rest.track(0, &frame);
-        let rest = TrackedRest::new(tracked, at_mm);
+        let rest = TrackedRest::new(&at_rest.tracked, at_mm);
         if !rest.is_known() {
-            return Err(fault(format!("has no wrench (status \"{}\")", tracked.status())));
+            return Err(at_rest.fault(format!("has no wrench (status \"{}\")", at_rest.tracked.status())));
         }
         let (every, height_px) = (arguments.hardness_every, frame.height() as f64);
         let (readings, seen) = (Vec::new(), Vec::new());

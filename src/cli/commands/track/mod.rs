@@ -3,6 +3,7 @@
 mod arguments;
 mod hardness;
 mod pictures;
+mod rest_frame;
 mod results;
 mod shape;
 mod source;
@@ -18,6 +19,7 @@ use domecast_live::decode::Picture;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{CameraFrame, CameraTurn, Tracked, Tracker};
 use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
+use rest_frame::RestFrame;
 use results::Results;
 use source::FrameSource;
 use tally::Tally;
@@ -68,10 +70,33 @@ fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
 fn forces_of(
     arguments: &TrackArguments,
     constants: &Constants,
+    rest: Option<&RestFrame>,
 ) -> Result<Option<ForceDistribution>, Failure> {
+    if !arguments.traction {
+        return Ok(None);
+    }
     let correlation_mm = arguments.shape.is_some().then_some(SHAPE_CORRELATION_MM);
-    let forces = arguments.traction.then(|| ForceDistribution::new(constants, correlation_mm));
-    forces.transpose().map_err(|e| arguments.unfit(&e))
+    let mut forces =
+        ForceDistribution::new(constants, correlation_mm).map_err(|error| arguments.unfit(&error))?;
+    if let Some(rest) = rest.filter(|rest| !forces.set_rest(&rest.tracked)) {
+        return Err(rest.fault(format!("has no pose: {}", rest.tracked.status())));
+    }
+    Ok(Some(forces))
+}
+
+/// Without a rest little can be said of forces on the skin.
+fn warn_without_rest(output: &Output, arguments: &TrackArguments, constants: &Constants) {
+    let has_rest = arguments.rest.is_some() || arguments.tracker.has_reference();
+    if !arguments.traction || has_rest || constants.optics_uncertainty.is_some() {
+        return;
+    }
+    if let Some(tolerances) = &constants.tolerances {
+        output.warn(&format!(
+            "--traction: where the dots of this sensor lie untouched is known to {} mm only, as they are printed, and forces that move \
+             them by no more are not seen: give --reference N (the first N frames are untouched) or --rest FRAME",
+            tolerances.black_dot_mm
+        ));
+    }
 }
 
 fn frame_of(picture: &Result<Picture, String>) -> Result<CameraFrame<'_>, String> {
@@ -86,15 +111,17 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     let constants = read_constants(&arguments.constants)?;
     let mut tracker =
         Tracker::new(&constants, arguments.tracker.options()).map_err(|e| arguments.unfit(&e))?;
-    let mut forces = forces_of(arguments, &constants)?;
     let inputs = inputs_of(arguments);
     let rules = output.rules(&inputs);
-    let mut results = Results::open(output, arguments, &rules, &constants, &tracker)?;
+    let rest = RestFrame::open(arguments, &tracker)?;
+    let mut results = Results::open(output, arguments, &rules, &constants, &tracker, rest.as_ref())?;
+    let mut forces = forces_of(arguments, &constants, rest.as_ref())?;
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
     let mut times = FrameTimes::open(arguments.times.as_deref())?;
     results.begin(arguments)?;
     let mut tally = Tally::default();
     warn_without_key(output, arguments, &constants);
+    warn_without_rest(output, arguments, &constants);
     let mut turn = None;
     while let Some(mut next) = source.next_frame() {
         if arguments.tracker.camera_mirrored

@@ -9,6 +9,7 @@ use serde_json::Value;
 use super::arguments::{Format, TrackArguments};
 use super::hardness::HardnessLines;
 use super::pictures::Pictures;
+use super::rest_frame::RestFrame;
 use super::shape::ShapeFiles;
 use crate::commands::output::{Failure, Output};
 use crate::commands::recording::{Recording, RecordingPace, recorded, time_ns};
@@ -107,11 +108,12 @@ impl Results {
         rules: &OutputRules<'_>,
         constants: &Constants,
         tracker: &Tracker,
+        rest: Option<&RestFrame>,
     ) -> Result<Self, Failure> {
         let at_mm = tracker.springs().map_or(DVec3::ZERO, Springs::at_mm);
         let pictures = Pictures::new(arguments, rules, constants, tracker)?;
-        let shape = ShapeFiles::open(arguments, rules, constants, tracker)?;
-        let hardness = HardnessLines::open(arguments, tracker, at_mm)?;
+        let shape = ShapeFiles::open(arguments, rules, constants, tracker, rest)?;
+        let hardness = HardnessLines::open(arguments, rest, at_mm)?;
         let sink = Sink::new(arguments.out.as_deref(), rules)?;
         let page = match &arguments.report {
             Some(path) => {

@@ -5,10 +5,10 @@ use std::path::Path;
 use serde_json::json;
 
 use super::arguments::TrackArguments;
+use super::rest_frame::RestFrame;
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
 use domecast_files::{OutputRules, StagedFolder, npy_f32, npy_u8, ply, png_u16};
-use domecast_live::decode;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeMap, ShapeOptions};
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
@@ -22,28 +22,21 @@ pub struct ShapeFiles {
 }
 
 impl ShapeFiles {
-    /// `None` where no shape is asked for. The frame at rest is tracked with a tracker of its own.
+    /// `None` where no shape is asked for.
     pub fn open(
         arguments: &TrackArguments,
         rules: &OutputRules<'_>,
         constants: &Constants,
         tracker: &Tracker,
+        rest: Option<&RestFrame>,
     ) -> Result<Option<Self>, Failure> {
         let Some(path) = &arguments.shape else { return Ok(None) };
         let of_constants = |error: ShapeError| unfit(&arguments.constants, &error);
         let mut shape =
             ShapeFromColor::new(constants, tracker, ShapeOptions::default()).map_err(of_constants)?;
-        if let Some(rest) = &arguments.rest {
-            let bytes = std::fs::read(rest).map_err(|error| {
-                input_fault(rest, format!("cannot be read: {error}"), "a PNG or JPEG frame")
-            })?;
-            let fault = |problem: String| input_fault(rest, problem, "a frame of the untouched sensor");
-            let picture = decode::picture(&bytes).map_err(&fault)?;
-            let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes)
-                .map_err(|error| fault(error.to_string()))?;
-            let mut at_rest = tracker.clone();
-            let tracked = at_rest.track(0, &frame).clone();
-            shape.set_rest(&frame, &tracked).map_err(|error| unfit(rest, &error))?;
+        if let Some(rest) = rest {
+            let taken = shape.set_rest(&rest.frame()?, &rest.tracked);
+            taken.map_err(|error| rest.fault(error.to_string()))?;
         }
         let folder = StagedFolder::new(path, "track", rules)?;
         Ok(Some(Self { shape, folder, pressure: PressureMap::default() }))

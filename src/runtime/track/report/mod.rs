@@ -20,5 +20,5 @@ pub use fields::Field;
 pub use problem::{Problem, Problems};
 pub use record::{RECORD_BYTES, write_record};
 pub(super) use reporter::{FrameFindings, Reporter};
-pub use result::{DotResult, MarkerResult, Tracked};
+pub use result::{DotReference, DotResult, MarkerResult, Tracked};
 pub use write::{CSV_HEADER, DOTS_CSV_HEADER, write_csv, write_dots_csv, write_json, write_json_fields};

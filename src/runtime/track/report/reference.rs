@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::result::Tracked;
+use super::result::{DotReference, Tracked};
 use crate::track::wrench::WrenchErrors;
 use domecast_springs::Wrench;
 
@@ -67,8 +67,13 @@ impl ReferenceMean {
             result.wrench_sd = errors.and_then(|errors| errors.sd_less_mean(&self.errors, frames));
         }
         for (dot, (sum, count)) in result.black_dots.iter_mut().zip(&self.displacement) {
-            if let Some(displacement) = dot.displacement_mm.as_mut().filter(|_| *count > 0) {
-                *displacement -= *sum / f64::from(*count);
+            if *count == 0 {
+                continue;
+            }
+            let displacement_mm = *sum / f64::from(*count);
+            dot.reference = Some(DotReference { displacement_mm, frames: *count });
+            if let Some(displacement) = &mut dot.displacement_mm {
+                *displacement -= displacement_mm;
             }
         }
         is_taken

@@ -36,6 +36,17 @@ pub struct DotResult {
     /// Unit direction of that ray in the dome, platform's frame, away from the camera: along it nothing is known of the
     /// displacement.
     pub ray: Option<DVec3>,
+    /// What the reference frames say of its place, where there are such and show it; `displacement_mm` is less that.
+    pub reference: Option<DotReference>,
+}
+
+/// Where reference frames show a dot of the untouched skin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DotReference {
+    /// Mean of its rays met with the undeformed dome, less its place in the constants, mm: print and camera are off by that.
+    pub displacement_mm: DVec3,
+    /// The frames that show it.
+    pub frames: u32,
 }
 
 /// A white marker in a frame.

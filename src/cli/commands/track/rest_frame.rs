@@ -1,0 +1,51 @@
+//! `track --rest`: the frame of the untouched sensor that shape, forces and hardness are read against.
+
+use std::path::{Path, PathBuf};
+
+use super::arguments::TrackArguments;
+use crate::commands::input::input_fault;
+use crate::commands::output::Failure;
+use domecast_live::decode::{self, Picture};
+use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
+
+/// The frame, and what is tracked in it by a tracker of its own.
+pub(super) struct RestFrame {
+    path: PathBuf,
+    picture: Picture,
+    pub tracked: Tracked,
+}
+
+impl RestFrame {
+    /// `None` where none is given.
+    pub fn open(arguments: &TrackArguments, tracker: &Tracker) -> Result<Option<Self>, Failure> {
+        let Some(path) = &arguments.rest else { return Ok(None) };
+        let bytes = std::fs::read(path)
+            .map_err(|error| input_fault(path, format!("cannot be read: {error}"), "a PNG or JPEG frame"))?;
+        let mut picture = decode::picture(&bytes).map_err(|problem| fault(path, problem))?;
+        if arguments.tracker.camera_mirrored {
+            picture.mirror();
+        }
+        let mut own = tracker.clone();
+        let tracked = own.track(0, &frame_of(path, &picture)?).clone();
+        Ok(Some(Self { path: path.clone(), picture, tracked }))
+    }
+
+    /// As trackers take it.
+    pub fn frame(&self) -> Result<CameraFrame<'_>, Failure> {
+        frame_of(&self.path, &self.picture)
+    }
+
+    /// That it cannot be used.
+    pub fn fault(&self, problem: String) -> Failure {
+        fault(&self.path, problem)
+    }
+}
+
+fn frame_of<'a>(path: &Path, picture: &'a Picture) -> Result<CameraFrame<'a>, Failure> {
+    let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
+    frame.map_err(|error| fault(path, error.to_string()))
+}
+
+fn fault(path: &Path, problem: String) -> Failure {
+    input_fault(path, problem, "a frame of the untouched sensor")
+}

@@ -1,4 +1,4 @@
-//! What says of frames at the design's own size what a robot would be told.
+//! What track, shape and forces say of frames at the design's own size, as a robot has them.
 
 use domecast_design::layout::Layout;
 use domecast_design::{Design, DesignError};

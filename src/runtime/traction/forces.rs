@@ -3,11 +3,10 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::active_set::{ActiveSet, Ended, Rows};
-use super::model::{AXES, Dot, ElasticModel};
+use super::model::{AXES, Dot, ElasticModel, place_sd_px};
 use super::posterior::Posterior;
 use super::pressure_room::PressureRoom;
 use super::result::{DotTraction, LocalForces, TractionStatus};
-use super::seen_dots::place_sd_px;
 use super::wrench_rows::{SpringLoad, WrenchRows};
 use crate::constants::Constants;
 use crate::shape::{ShapeMap, rows};

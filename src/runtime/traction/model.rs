@@ -52,6 +52,17 @@ pub(super) struct Dot {
     pub per_sd: f64,
 }
 
+/// Standard deviation of a dot's image by its place in the constants, px: as it is printed, or as `calibrate-optics` saw it; `by_point`:
+/// how the image moves with the point.
+pub(super) fn place_sd_px(constants: &Constants, by_point: &[DVec3; 2]) -> f64 {
+    let Some(tolerances) = &constants.tolerances else { return 0.0 };
+    if constants.optics_uncertainty.is_some() {
+        return tolerances.black_centroid_px;
+    }
+    let squares: f64 = by_point.iter().map(|by| by.length_squared()).sum();
+    tolerances.black_dot_mm * (0.5 * squares).sqrt()
+}
+
 /// What forces on the nodes move.
 #[derive(Debug, Clone)]
 pub(super) struct ElasticModel {

@@ -8,7 +8,6 @@ use super::forces::ForceDistribution;
 use super::model::Dot;
 use super::posterior::USUAL_DOT_SD_PX;
 use super::wrench_rows::SpringLoad;
-use crate::constants::Constants;
 use crate::track::{DotResult, Tracked};
 use domecast_optics::numeric::Rigid;
 use domecast_springs::Wrench;
@@ -103,15 +102,4 @@ impl ForceDistribution {
         let sd = Wrench::from_array(random.to_array().map(|sd| SQRT_2 * sd));
         Some(SpringLoad { wrench: wrench - at_rest, sd })
     }
-}
-
-/// Standard deviation of a dot's image by its place in the constants, px: as it is printed, or as `calibrate-optics` saw it; `by_point`:
-/// how the image moves with the point.
-pub(super) fn place_sd_px(constants: &Constants, by_point: &[DVec3; 2]) -> f64 {
-    let Some(tolerances) = &constants.tolerances else { return 0.0 };
-    if constants.optics_uncertainty.is_some() {
-        return tolerances.black_centroid_px;
-    }
-    let squares: f64 = by_point.iter().map(|by| by.length_squared()).sum();
-    tolerances.black_dot_mm * (0.5 * squares).sqrt()
 }

@@ -140,7 +140,7 @@ impl Contact {
             let limit_mm = DEEPEST * self.elastomer.depth_scale_mm();
             return Err(ContactError::TooDeep { depth_mm: inside_mm, limit_mm });
         }
-        state.deviation = deviation(self.level, &self.elastomer, indenter, &state);
+        state.deviation = deviation(self.level, &self.elastomer, indenter, sensor_from_object, &state);
         Ok(state)
     }
 

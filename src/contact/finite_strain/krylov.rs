@@ -2,8 +2,6 @@
 
 /// Directions that are kept.
 const MAX_DIRECTIONS: usize = 80;
-/// Residual at the end, as a part of the first.
-const TOLERANCE: f64 = 1e-8;
 /// A residual that still makes a Newton step.
 const MAX_RESIDUAL: f64 = 1e-2;
 
@@ -11,11 +9,13 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Solves `times(x) = rhs`; `solve` nearly inverts `times` in place. `None` if that is not good enough.
+/// Solves `times(x) = rhs` until the residual is `tolerance` of its size; `solve` nearly inverts `times` in place. `None` if that
+/// is not good enough.
 pub(super) fn gmres(
     times: impl Fn(&[f64]) -> Vec<f64>,
     solve: impl Fn(&mut [f64]),
     rhs: &[f64],
+    tolerance: f64,
 ) -> Option<Vec<f64>> {
     let size = dot(rhs, rhs).sqrt();
     if size == 0.0 {
@@ -56,7 +56,7 @@ pub(super) fn gmres(
         let from = goal.pop()?;
         goal.extend([turn.0 * from, -turn.1 * from]);
         let residual = (turn.1 * from).abs() / size;
-        if residual < TOLERANCE || left <= f64::EPSILON * size {
+        if residual < tolerance || left <= f64::EPSILON * size {
             break;
         }
         basis.push(next.into_iter().map(|value| value / left).collect());
@@ -96,8 +96,8 @@ mod tests {
         };
         let wanted: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
         let rhs = times(&wanted);
-        let found =
-            gmres(times, |x| x.iter_mut().enumerate().for_each(|(i, x)| *x /= 2.0 + i as f64 * 0.1), &rhs);
+        let nearly = |x: &mut [f64]| x.iter_mut().enumerate().for_each(|(i, x)| *x /= 2.0 + i as f64 * 0.1);
+        let found = gmres(times, nearly, &rhs, 1e-8);
         let off = found.unwrap().iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-7, "{off}");
     }

@@ -15,6 +15,9 @@ const MAX_WITHOUT_GAIN: usize = 8;
 const MAX_HALVINGS: u32 = 5;
 /// Residual that counts as none, as a part of the forces between object and dome.
 const TOLERANCE: f64 = 1e-9;
+/// What may be left of the residual by a step under sliding friction: the linear system is solved in steps of its own, and a
+/// Newton step leaves more than this but for the last ones.
+const STEP: f64 = 1e-4;
 /// No step moves a node by more than this part of the radius.
 const LONGEST: f64 = 0.15;
 /// Growth of the residual that a whole step may have: points that come to touch bear at once.
@@ -152,7 +155,7 @@ impl Problem<'_> {
                 }
                 y
             };
-            rhs = gmres(times, |x| self.body.solve(&factors, x), &rhs)?;
+            rhs = gmres(times, |x| self.body.solve(&factors, x), &rhs, STEP)?;
         }
         rhs.iter()
             .all(|value| value.is_finite())

@@ -1,7 +1,8 @@
 //! The levels against the truth: axisymmetric solutions of scikit-fem (tests/cases/golden_neo_hookean.json), and contacts drawn
 //! at random, by the finite-strain level (tests/cases/contact_reference.json).
 //!
-//! `DOMECAST_REFERENCE=from..to` or `a,b,c` with the ignored test below solves the drawn contacts anew and prints their lines.
+//! `DOMECAST_REFERENCE=from..to` or `a,b,c` with the ignored test below solves the drawn contacts anew and prints their lines. Those
+//! that were tried and have no reference are named in the table's `not_solved`.
 
 use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
@@ -16,10 +17,14 @@ struct Case {
     object: &'static str,
     elastomer: Elastomer,
     indenter: Indenter,
-    pose: Rigid,
+    /// Where the object is, frame by frame; what is compared is the last one.
+    poses: Vec<Rigid>,
     /// How deep the object lies in the undeformed dome, over the radius.
     depth: f64,
 }
+
+/// Frames of an object that goes sideways.
+const FRAMES: u32 = 4;
 
 fn mesh(name: &str, scale: f64) -> ContactSolid {
     let path = format!("{}/../../designs/scenes/meshes/{name}.stl", env!("CARGO_MANIFEST_DIR"));
@@ -60,14 +65,17 @@ fn object(name: &'static str, radius: f64, random: &mut SeededRandom) -> (Contac
 
 const OBJECTS: [&str; 11] =
     ["ball", "plate", "rod", "punch", "ball", "block", "small ball", "edge", "nut", "bolt", "usb_plug"];
+/// From this seed on objects go sideways as well, and a cone is among them.
+const SIDEWAYS: u64 = 200;
 
 fn case(seed: u64) -> Case {
     let mut random = SeededRandom::new(7000 + seed);
-    let name = OBJECTS[(seed % OBJECTS.len() as u64) as usize];
+    let number = (seed % OBJECTS.len() as u64) as usize;
+    let name = if seed >= SIDEWAYS && number == 4 { "cone" } else { OBJECTS[number] };
     let radius = [10.0, 5.0, 10.0, 20.0][(seed / OBJECTS.len() as u64 % 4) as usize];
     let (solid, turned) = object(name, radius, &mut random);
     let poisson = [0.49, 0.45, 0.48, 0.495][(random.uniform() * 4.0) as usize];
-    // From seed 100 on with friction, under objects that come along the dome's normal.
+    // From seed 100 on with friction, up to SIDEWAYS under objects that come along the dome's normal.
     let friction = random.uniform() * f64::from(u8::from(seed >= 100));
     let young_mpa = 0.1 + random.uniform();
     let elastomer = Elastomer { dome_radius_mm: radius, center_z_mm: 0.0, young_mpa, poisson, friction };
@@ -92,14 +100,39 @@ fn case(seed: u64) -> Case {
             deepest(&Placed::new(indenter.solid.clone(), pose), DomeShape::hemisphere(radius));
         way -= distance + depth * radius;
     }
-    Case { object: name, elastomer, indenter, pose, depth }
+    if seed < SIDEWAYS {
+        return Case { object: name, elastomer, indenter, poses: vec![pose], depth };
+    }
+    // Half of them slide at their depth, half are pressed in on the way.
+    let aside =
+        glam::DQuat::from_axis_angle(normal, TURN_RAD * random.uniform()) * normal.any_orthonormal_vector();
+    let lifted = if random.uniform() < 0.5 { 0.0 } else { 0.5 * depth };
+    let back = (normal * lifted - aside * (0.02 + 0.13 * random.uniform())) * radius;
+    let at = |frame: u32| pose.translation_mm + back * (1.0 - f64::from(frame) / f64::from(FRAMES));
+    let poses = (0..=FRAMES).map(|frame| Rigid::new(rotation, at(frame))).collect();
+    Case { object: name, elastomer, indenter, poses, depth }
+}
+
+/// The state after all frames.
+fn state_after(
+    contact: &Contact,
+    indenter: &Indenter,
+    poses: &[Rigid],
+) -> Result<ContactState, ContactError> {
+    let mut state = None;
+    for pose in poses {
+        state = Some(contact.solve(indenter, pose, state.as_ref())?);
+    }
+    Ok(state.unwrap())
 }
 
 /// Places of the dome at which displacements are compared, about the object and all over.
 fn places(case: &Case) -> Vec<DVec3> {
     let radius = case.elastomer.dome_radius_mm;
-    let (at, _, _) =
-        deepest(&Placed::new(case.indenter.solid.clone(), case.pose), DomeShape::hemisphere(radius));
+    let (at, _, _) = deepest(
+        &Placed::new(case.indenter.solid.clone(), case.poses[case.poses.len() - 1]),
+        DomeShape::hemisphere(radius),
+    );
     let turn = glam::DQuat::from_rotation_arc(DVec3::Z, at / radius);
     let spiral = |count: u32, low: f64| {
         (0..count).map(move |i| {
@@ -114,14 +147,17 @@ fn places(case: &Case) -> Vec<DVec3> {
 }
 
 fn rounded(value: f64) -> f64 {
-    (value * 1e6).round() / 1e6
+    (value * 1e5).round() / 1e5
 }
 
 /// The reference's line of a contact.
 fn solved(seed: u64, across: usize) -> Result<Value, ContactError> {
     let case = case(seed);
     let contact = Contact::new(case.elastomer, Level::FiniteStrain { across })?;
-    let state = contact.solve(&case.indenter, &case.pose, None)?;
+    // Its steps are its own: the frames between first and last would only be more of them.
+    let mut poses = case.poses.clone();
+    poses.drain(1..case.poses.len().max(2) - 1);
+    let state = state_after(&contact, &case.indenter, &poses)?;
     let moved: Vec<[f64; 3]> =
         places(&case).iter().map(|p| state.displacement_mm(*p).to_array().map(rounded)).collect();
     Ok(json!({
@@ -160,7 +196,7 @@ struct Known {
     name: String,
     elastomer: Elastomer,
     indenter: Indenter,
-    pose: Rigid,
+    poses: Vec<Rigid>,
     force_n: DVec3,
     places_mm: Vec<DVec3>,
     displacements_mm: Vec<DVec3>,
@@ -210,7 +246,7 @@ fn golden() -> Vec<Known> {
                 name: format!("{object} {size} on {radius}, nu {poisson}, {}", of("depth_mm")),
                 elastomer,
                 indenter: Indenter::rigid(solid.clone().unwrap()),
-                pose: Rigid::from_translation(DVec3::Z * (radius + middle_mm - of("depth_mm"))),
+                poses: vec![Rigid::from_translation(DVec3::Z * (radius + middle_mm - of("depth_mm")))],
                 force_n: DVec3::Z * of("force_n"),
                 places_mm: polar.iter().map(|p| DVec3::new(p.sin(), 0.0, p.cos()) * radius).collect(),
                 displacements_mm,
@@ -235,10 +271,10 @@ fn drawn() -> Vec<Known> {
                 elastomer: case.elastomer,
                 places_mm: places(&case),
                 indenter: case.indenter,
-                pose: case.pose,
+                poses: case.poses,
                 force_n: vector(&line["force_n"]),
                 displacements_mm: line["displacements_mm"].as_array().unwrap().iter().map(vector).collect(),
-                is_fitted: seed.is_multiple_of(2),
+                is_fitted: line["fitted"].as_bool().unwrap(),
             }
         })
         .collect()
@@ -254,7 +290,7 @@ fn a_deep_touch_is_near_large_strain() {
         let is_wide = force_n > 0.06 * known.elastomer.plane_strain_mpa() * radius * radius;
         let element_mm = if is_wide { 0.1 } else { 0.05 } * radius;
         let contact = Contact::new(known.elastomer, Level::Linear { element_mm }).unwrap();
-        let state = contact.solve(&known.indenter, &known.pose, None).unwrap();
+        let state = state_after(&contact, &known.indenter, &known.poses).unwrap();
         let (elements, part) =
             (state.contact_radius_mm / element_mm, state.wrench.force_n.length() / force_n - 1.0);
         if elements < 2.4 {
@@ -263,7 +299,7 @@ fn a_deep_touch_is_near_large_strain() {
         seen += 1;
         assert_eq!(state.status, Status::Solved);
         let depth_mm =
-            -deepest(&Placed::new(known.indenter.solid.clone(), known.pose), known.elastomer.dome()).1;
+            -deepest(&Placed::new(known.indenter.solid.clone(), known.poses[0]), known.elastomer.dome()).1;
         let off_mm = off_mm(known, &state);
         println!("{}: {:+.1} %, {off_mm:.3} mm, {elements:.1} elements", known.name, 100.0 * part);
         assert!(part.abs() < if elements < 3.3 { 0.07 } else { 0.055 }, "{}: {part}", known.name);
@@ -281,7 +317,7 @@ fn off_mm(known: &Known, state: &ContactState) -> f64 {
 /// Estimate over deviation, of force and displacement; deviations below a hundredth of the whole count as that.
 fn ratios(known: &Known, level: Level) -> Option<[f64; 2]> {
     let contact = Contact::new(known.elastomer, level).unwrap();
-    let state = contact.solve(&known.indenter, &known.pose, None).ok()?;
+    let state = state_after(&contact, &known.indenter, &known.poses).ok()?;
     let off_mm = off_mm(known, &state);
     let whole_mm = known.displacements_mm.iter().map(|u| u.length()).fold(0.0, f64::max);
     let off_n = state.wrench.force_n.distance(known.force_n);
@@ -311,9 +347,7 @@ fn long_every_level_says_how_far_it_is_off() {
     ] {
         for is_fitted in [true, false] {
             let mut found = [Vec::new(), Vec::new()];
-            // Edges on small elements take minutes.
-            let is_quick = |known: &&Known| name != "linear, R/20" || known.indenter.solid.is_ball();
-            for known in known.iter().filter(|known| known.is_fitted == is_fitted).filter(is_quick) {
+            for known in known.iter().filter(|known| known.is_fitted == is_fitted) {
                 let Some(ratios) = ratios(known, level(known.elastomer.dome_radius_mm)) else { continue };
                 if ratios.iter().any(|ratio| *ratio < 0.5) {
                     below.push(format!("{name}: {ratios:?} times, {}", known.name));
@@ -328,7 +362,7 @@ fn long_every_level_says_how_far_it_is_off() {
                     "{name}, {what}, {} contacts, fitted {is_fitted}: {low:.2}, {middle:.2}, {high:.2} times",
                     found.len()
                 );
-                if !(0.8..4.8).contains(&middle) {
+                if !(0.9..4.0).contains(&middle) {
                     below.push(format!("{name} {what}: {middle}"));
                 }
             }

@@ -5,7 +5,7 @@
 //! `I dA/A * transmitted * sr_per_mm2 * (arriving . normal)`, so the sum over the emitter is a vector, the
 //! *vector irradiance*, whose product with the normal is the irradiance of any surface that faces the light.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec2, DVec3, DVec4, Vec3Swizzles, Vec4Swizzles};
 
 use super::cavity::Cavities;
 use super::fresnel;
@@ -70,8 +70,13 @@ pub struct EmitterRule {
 struct Diagonal {
     shift: f64,
     weight: f64,
-    /// Where along it is looked first, its ends among them, evenly spaced: `v`, and the weights of the rule's places there.
-    looks: Vec<(f64, Vec<f64>)>,
+    /// The range of `v`.
+    ends: [f64; 2],
+    /// Where along it is looked first, its ends among them, evenly spaced.
+    looks: Vec<f64>,
+    /// Along it the polynomial through the places is one in `v`, of Chebyshev's series over the range: for each of its terms, how
+    /// much of it each place gives.
+    series: Vec<Vec<f64>>,
 }
 
 impl Default for EmitterRule {
@@ -99,14 +104,10 @@ impl EmitterRule {
         let diagonal = |(shift, from, to, weight): (f64, f64, f64, f64)| {
             let count = ((to - from) * LOOKS).ceil().max(1.0);
             let look = |k: usize| {
-                let v = if k as f64 == count { to } else { from + (to - from) * k as f64 / count };
-                let mut lines = [Vec::new(), Vec::new()];
-                made.weigh(v + shift, &mut lines[0]);
-                made.weigh(v, &mut lines[1]);
-                let [across, along] = &lines;
-                (v, across.iter().flat_map(|across| along.iter().map(move |along| across * along)).collect())
+                if k as f64 == count { to } else { from + (to - from) * k as f64 / count }
             };
-            Diagonal { shift, weight, looks: (0..=count as usize).map(look).collect() }
+            let looks = (0..=count as usize).map(look).collect();
+            Diagonal { shift, weight, ends: [from, to], looks, series: made.series(shift, [from, to]) }
         };
         made.diagonals = made.nodes().iter().flat_map(pair).map(diagonal).collect();
         made
@@ -114,6 +115,27 @@ impl EmitterRule {
 
     fn nodes(&self) -> &[(f64, f64)] {
         self.rule.nodes()
+    }
+
+    /// Chebyshev's series of the places' weights along `u = v + shift`, from their values at as many places as it has terms
+    /// (L. N. Trefethen, Approximation Theory and Approximation Practice, ch. 3 and 4).
+    fn series(&self, shift: f64, [from, to]: [f64; 2]) -> Vec<Vec<f64>> {
+        let terms = 2 * self.nodes().len() - 1;
+        let turn = |p: usize| (p as f64 + 0.5) * std::f64::consts::PI / terms as f64;
+        let mut lines = [Vec::new(), Vec::new()];
+        let mut series = vec![vec![0.0; self.nodes().len().pow(2)]; terms];
+        for p in 0..terms {
+            let v = 0.5 * (from + to) + 0.5 * (to - from) * turn(p).cos();
+            self.weigh(v + shift, &mut lines[0]);
+            self.weigh(v, &mut lines[1]);
+            let [across, along] = &lines;
+            for (k, term) in series.iter_mut().enumerate() {
+                let part = if k == 0 { 1.0 } else { 2.0 * (k as f64 * turn(p)).cos() } / terms as f64;
+                let weights = across.iter().flat_map(|across| along.iter().map(move |along| across * along));
+                term.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += part * weight);
+            }
+        }
+        series
     }
 
     /// Weights of the values at the places in the polynomial through them, at `v` (J.-P. Berrut and L. N. Trefethen, Barycentric
@@ -132,79 +154,72 @@ impl EmitterRule {
 }
 
 /// What one place of the emitter gives.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Share {
+    /// Where its ray meets the sheet's underside and, to a point of the dome, its top, x and y of each, mm; the origin for a
+    /// point of the top itself.
+    crossings_mm: DVec4,
     flux: DVec3,
-    /// From the place to where its ray meets the sheet's underside, mm.
-    way_mm: DVec3,
-    /// Where its ray to a point of the dome crosses the sheet's top; the origin for a point of the top itself.
-    top_mm: DVec3,
 }
 
-/// The shares of the rule's places, line by line, and the polynomial in both coordinates through them.
-struct Shares<'a> {
-    rule: &'a EmitterRule,
-    all: Vec<Share>,
-    weights: [Vec<f64>; 2],
+impl Share {
+    /// Itself and a part of another.
+    fn and(&self, other: &Self, part: f64) -> Self {
+        Self {
+            crossings_mm: self.crossings_mm + other.crossings_mm * part,
+            flux: self.flux + other.flux * part,
+        }
+    }
 }
 
-impl Shares<'_> {
-    /// What the shares have at a place of the unit square.
-    fn at<const N: usize>(&mut self, u: f64, v: f64, of: impl Fn(&Share) -> [DVec3; N]) -> [DVec3; N] {
-        let [across, along] = &mut self.weights;
-        self.rule.weigh(u, across);
-        self.rule.weigh(v, along);
-        let weights = across.iter().flat_map(|across| along.iter().map(move |along| across * along));
-        weighted(&self.all, weights, of)
+impl Diagonal {
+    /// The terms of what the places' shares are along it.
+    fn terms<'a>(&'a self, all: &'a [Share]) -> impl Iterator<Item = Share> + 'a {
+        let sum = move |term: &Vec<f64>| {
+            term.iter().zip(all).fold(Share::default(), |sum, (part, share)| sum.and(share, *part))
+        };
+        self.series.iter().map(sum)
     }
 
-    /// The flux of the whole square.
-    fn whole(&self) -> DVec3 {
-        let nodes = self.rule.nodes();
-        let weights = nodes.iter().flat_map(|(_, across)| nodes.iter().map(move |(_, along)| across * along));
-        self.all.iter().zip(weights).map(|(share, weight)| share.flux * weight).sum()
+    /// What the terms sum to at a place (C. W. Clenshaw's recurrence).
+    fn at(&self, terms: &[Share], v: f64) -> Share {
+        let [from, to] = self.ends;
+        let x = (2.0 * v - from - to) / (to - from);
+        let Some((first, others)) = terms.split_first() else { return Share::default() };
+        let (mut next, mut after) = (Share::default(), Share::default());
+        for term in others.iter().rev() {
+            (next, after) = (term.and(&next, 2.0 * x).and(&after, -1.0), next);
+        }
+        first.and(&next, x).and(&after, -1.0)
     }
+}
 
-    /// The flux of what is in sight; `is_free` is given a place of the square, its way and where its ray crosses the sheet's top.
-    fn in_sight(&mut self, mut is_free: impl FnMut(f64, f64, [DVec3; 2]) -> bool) -> DVec3 {
-        let rule = self.rule;
-        let ways = |share: &Share| [share.way_mm, share.top_mm];
-        let (mut pieces, mut looked) = (Vec::new(), Vec::new());
-        let mut is_whole = true;
-        for diagonal in &rule.diagonals {
-            looked.clear();
-            looked.extend(diagonal.looks.iter().map(|(v, weights)| {
-                (*v, is_free(v + diagonal.shift, *v, weighted(&self.all, weights.iter().copied(), ways)))
-            }));
-            is_whole &= looked.iter().all(|(_, free)| *free);
-            let free = |v: f64| is_free(v + diagonal.shift, v, self.at(v + diagonal.shift, v, ways));
-            pieces_in_sight(&looked, free, |low, high| pieces.push((diagonal, low, high)));
-        }
-        if is_whole {
-            return self.whole();
-        }
-        let mut sum = DVec3::ZERO;
-        for (diagonal, low, high) in pieces {
+/// The flux of the whole square.
+fn whole(rule: &EmitterRule, all: &[Share]) -> DVec3 {
+    let nodes = rule.nodes();
+    let weights = nodes.iter().flat_map(|(_, across)| nodes.iter().map(move |(_, along)| across * along));
+    all.iter().zip(weights).map(|(share, weight)| share.flux * weight).sum()
+}
+
+/// The flux of what is in sight of the square, of its places' shares; `is_free` is given a place of it and its ray's crossings.
+fn in_sight(rule: &EmitterRule, all: &[Share], is_free: &mut dyn FnMut(f64, f64, DVec4) -> bool) -> DVec3 {
+    let (mut terms, mut looked) = (Vec::new(), Vec::new());
+    let mut sum = DVec3::ZERO;
+    let mut is_whole = true;
+    for diagonal in &rule.diagonals {
+        terms.clear();
+        terms.extend(diagonal.terms(all));
+        let mut free = |v: f64| is_free(v + diagonal.shift, v, diagonal.at(&terms, v).crossings_mm);
+        looked.clear();
+        looked.extend(diagonal.looks.iter().map(|v| (*v, free(*v))));
+        is_whole &= looked.iter().all(|(_, free)| *free);
+        pieces_in_sight(&looked, free, |low, high| {
             for (v, up) in rule.rule.over(low, high) {
-                let [flux] = self.at(v + diagonal.shift, v, |share| [share.flux]);
-                sum += flux * (diagonal.weight * up);
+                sum += diagonal.at(&terms, v).flux * (diagonal.weight * up);
             }
-        }
-        sum
+        });
     }
-}
-
-/// What shares have, weighted.
-fn weighted<const N: usize>(
-    shares: &[Share],
-    weights: impl Iterator<Item = f64>,
-    of: impl Fn(&Share) -> [DVec3; N],
-) -> [DVec3; N] {
-    let mut sums = [DVec3::ZERO; N];
-    for (share, weight) in shares.iter().zip(weights) {
-        sums.iter_mut().zip(of(share)).for_each(|(sum, part)| *sum += part * weight);
-    }
-    sums
+    if is_whole { whole(rule, all) } else { sum }
 }
 
 impl DirectLight<'_> {
@@ -224,25 +239,27 @@ impl DirectLight<'_> {
         for &(u, _) in rule.nodes() {
             for &(v, _) in rule.nodes() {
                 let source = place(u, v);
-                let Some(share) = self.share(emitter, source, point_mm, &indices, &mut near) else {
+                let Some((share, underside_mm)) = self.share(emitter, source, point_mm, &indices, &mut near)
+                else {
                     return DVec3::ZERO;
                 };
                 all.push(share);
-                for end in [source, source + share.way_mm] {
+                for end in [source, underside_mm] {
                     (low, high) = (low.min(end), high.max(end));
                 }
             }
         }
         let open = if self.cavities.is_some() { self.through_platform } else { 1.0 };
-        let mut shares = Shares { rule, all, weights: Default::default() };
         let mut sum = DVec3::ZERO;
+        // The sheet's underside lies over all emitters.
+        let underside_z_mm = high.z;
         let mut gather = |part: f64, is_free: &mut dyn FnMut(DVec3, DVec3) -> bool| {
-            sum += part
-                * shares.in_sight(|u, v, [way_mm, top_mm]| {
-                    let source = place(u, v);
-                    let end = source + way_mm;
-                    self.enters(end) && self.is_in_foot(top_mm) && is_free(source, end)
-                });
+            let mut reaches = |u: f64, v: f64, at_mm: DVec4| {
+                self.enters(at_mm.xy())
+                    && self.is_in_foot(at_mm.zw())
+                    && is_free(place(u, v), at_mm.xy().extend(underside_z_mm))
+            };
+            sum += part * in_sight(rule, &all, &mut reaches);
         };
         if open > 0.0 {
             gather(open, &mut |_, _| true);
@@ -265,16 +282,17 @@ impl DirectLight<'_> {
     }
 
     /// Whether a place of the plane of the sheet's underside is the sheet's.
-    fn enters(&self, underside_mm: DVec3) -> bool {
-        underside_mm.truncate().abs().cmple(self.sheet_half_mm).all()
+    fn enters(&self, underside_mm: DVec2) -> bool {
+        underside_mm.abs().cmple(self.sheet_half_mm).all()
     }
 
     /// Whether a place of the plane of the sheet's top lies under the dome: only there light goes on into the silicone.
-    fn is_in_foot(&self, top_mm: DVec3) -> bool {
-        top_mm.truncate().length() <= self.optics.dome().rim_radius_mm()
+    fn is_in_foot(&self, top_mm: DVec2) -> bool {
+        top_mm.length() <= self.optics.dome().rim_radius_mm()
     }
 
-    /// What a place of the emitter sends to a point; `None` where no ray leads there. `near` is a neighbour's tangent.
+    /// What a place of the emitter sends to a point, and where its ray meets the sheet's underside; `None` where no ray leads
+    /// there. `near` is a neighbour's tangent.
     fn share(
         &self,
         emitter: &Emitter,
@@ -282,7 +300,7 @@ impl DirectLight<'_> {
         point_mm: DVec3,
         indices: &[f64],
         near: &mut f64,
-    ) -> Option<Share> {
+    ) -> Option<(Share, DVec3)> {
         let tube = self.optics.light_tube(source, point_mm, *near).ok()?;
         *near = tube.tangent;
         let per_sr = emitter.lobe.per_sr(tube.leaving.dot(emitter.platform_from_emitter.matrix3.z_axis));
@@ -293,7 +311,8 @@ impl DirectLight<'_> {
         } else {
             DVec3::ZERO
         };
-        Some(Share { flux, way_mm: tube.underside_mm - source, top_mm })
+        let crossings_mm = tube.underside_mm.xy().extend(top_mm.x).extend(top_mm.y);
+        Some((Share { crossings_mm, flux }, tube.underside_mm))
     }
 }
 

@@ -166,6 +166,8 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
     };
     let (a_eye, a_points) = side(with, &mut uncounted)?;
     let (b_eye, b_points) = side(without, &mut uncounted)?;
+    // The same points on both sides, in all colours.
+    let on_dome_mm = a_points.on_dome_mm();
     let frames = frames(scene);
     let sampled = (frames.len() as u32) < scene.frame_count();
     let colours = if a_eye.channels() == 1 && b_eye.channels() == 1 { 1 } else { scene.planes() };
@@ -175,8 +177,10 @@ pub fn shift_px(scene: &Scene, with: Geometry, without: Geometry) -> Result<f64,
     for (frame, touch) in solved.touches() {
         let time_s = scene.time_s(frame);
         let between = Between::at_frame(touch.clone());
+        let displaced_mm = between.is_deformed().then(|| between.displacements_mm(&on_dome_mm));
         let mut at = |eye: &Projector, geometry: Geometry| {
-            let shape = SkinShape { touch: Some(between.clone()), ..SkinShape::default() };
+            let displaced_mm = displaced_mm.clone();
+            let shape = SkinShape { touch: Some(between.clone()), displaced_mm, map: None };
             SensorState::new(eye, geometry, time_s, touch.state.clone(), shape, &mut uncounted)
         };
         let (a, b) = (at(&a_eye, with)?, at(&b_eye, without)?);

@@ -131,12 +131,13 @@ impl Samples {
 type Cases = [[Ways; 3]; 2];
 
 fn cases(scene: &Scene) -> Result<Cases, SimError> {
+    let cavities = setup::cavities(scene.design())?;
     let of = |diffuser: bool| -> Result<[Ways; 3], SimError> {
-        let ways = |fresnel, platform_shadow| {
-            setup::ways(scene, &LightUse { diffuser, fresnel, platform_shadow, ..LightUse::ALL })
-        };
-        let open = ways(false, false)?;
-        Ok([open.clone(), Ways { fresnel: true, ..open }, ways(true, true)?])
+        let used = LightUse { diffuser, fresnel: false, platform_shadow: false, ..LightUse::ALL };
+        let open = setup::ways(scene, &used)?;
+        let passed = Ways { fresnel: true, ..open.clone() };
+        let left = Ways { cavities: Some(cavities.clone()), ..passed.clone() };
+        Ok([open, passed, left])
     };
     Ok([of(false)?, of(true)?])
 }

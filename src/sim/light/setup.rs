@@ -1,5 +1,7 @@
 //! From the design's lights and the scene's to the sources of a field.
 
+use std::sync::OnceLock;
+
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
 use super::cavity::Cavities;
@@ -7,6 +9,7 @@ use super::direct::Emitter;
 use super::hollows::hollows_of;
 use super::lobe::{Diffuser, Lobe};
 use super::parts::LightUse;
+use super::shelf::Shelf;
 use super::tables::{Source, Ways};
 use crate::SimError;
 use crate::scene::Scene;
@@ -93,15 +96,21 @@ pub fn sources(scene: &Scene, used: &LightUse) -> Result<Vec<Source>, SimError> 
 
 /// What one of the lights sends into each direction, behind its diffuser where it has one.
 pub fn lobe(leds: &LedsSection) -> Lobe {
+    static SHELF: Shelf<OnceLock<Lobe>> = Shelf::new();
+    let kept = SHELF.get(&format!("{} {:?}", leds.lobe_exponent, leds.diffuser));
+    if let Some(found) = kept.get() {
+        return found.clone();
+    }
     let bare = Lobe::cosine_power(leds.lobe_exponent);
-    match leds.diffuser {
+    let made = match leds.diffuser {
         None => bare,
         Some(tape) => bare.behind(&Diffuser {
             lambert_fraction: tape.lambert_fraction,
             lobe_width_rad: tape.lobe_width_deg.to_radians(),
             transmittance: tape.transmittance,
         }),
-    }
+    };
+    kept.get_or_init(|| made).clone()
 }
 
 /// The sources of other lights than the design's, in the light of a scene: its power and crosstalk.
@@ -191,7 +200,13 @@ pub fn ways_among(scene: &Scene, sources: Vec<Source>, cavities: Option<Cavities
 /// # Errors
 /// A platform that the design cannot have.
 pub fn cavities(design: &Design) -> Result<Cavities, SimError> {
-    cavities_of(&Measures::of(design).map_err(DesignError::from)?)
+    static SHELF: Shelf<OnceLock<Cavities>> = Shelf::new();
+    let kept = SHELF.get(design.text());
+    if let Some(found) = kept.get() {
+        return Ok(found.clone());
+    }
+    let made = cavities_of(&Measures::of(design).map_err(DesignError::from)?)?;
+    Ok(kept.get_or_init(|| made).clone())
 }
 
 /// The same of the measures.

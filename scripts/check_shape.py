@@ -82,14 +82,10 @@ PRESSES = {
 
 # Pixels within 1, 2, 3 deviations, all that are known to 60 degrees, touched or not: a normal number's shares, and by how much they may
 # be off: of one frame, whose errors go together over the dome, from below alone; of a design's frames; of all. Wide as they are: on
-# thumb24 deviations are a quarter too large, for holes (dots among them) count twice the noise of what is beside them.
+# thumb24 deviations are a quarter too large, for its flank, where the light is known worse, says what is left over for all of the dome.
 SHARES = (0.683, 0.954, 0.997)
-ONE, DESIGN, ALL = 0.25, 0.2, 0.13
+ONE, DESIGN, ALL = 0.15, 0.19, 0.12
 deviations = {}
-
-# Share of the frames of an untouched sensor, with noise of two levels, that may state a touch. None is asked; picam-r20 has spikes of
-# some cells between its dots that its deviations do not know.
-MAX_FALSE = {"thumb24": 0.0, "digit-rigid": 0.1, "picam-r20": 0.5}
 
 # Touched pixels of a ball that both find, over those that either finds: as much as the simulator's elements of half a millimetre draw of an
 # outline. Halved (0.25 mm), the same balls are at 0.88 to 0.94; on exact skins the rule itself reaches 0.96 to 0.99 (`contact_outlines.py`).
@@ -319,7 +315,7 @@ def untouched(domecast, work, design, constants, count):
     # some 60 MB of maps a frame
     shutil.rmtree(work / f"{design}-untouched-shape")
     stated = [line["contact"] for line in map(json.loads, lines) if line.get("contact")]
-    check(f"{design}: untouched", len(lines) >= count and len(stated) <= MAX_FALSE[design] * count,
+    check(f"{design}: untouched", len(lines) >= count and not stated,
           f"{len(stated)} touches in {count} frames" + "".join(f", {c['depth_mm']:.3f} mm deep" for c in stated[:3]))
 
 

@@ -2,8 +2,13 @@
 //!
 //! A height is what slopes add up to from the bonded rim. Slopes whose errors have the spectral density `S` (rad^2 cells^2) make
 //! heights err by `S / k^2` at the wave number k: each octave of wavelengths from a cell up to the dome adds `S ln 2 / (2 pi)` squares
-//! of a cell's size (Green's function of the Laplace equation in the plane). Least squares go around places that say little, so what
-//! counts of a region is the geometric mean of its `S` (A. M. Dykhne, Sov. Phys. JETP 32, 1971: conduction of a random sheet).
+//! of a cell's size (Green's function of the Laplace equation in the plane: `S (ln R + 0.546) / (2 pi)` in the middle of a disc of R
+//! cells). Least squares go around places that say little, so what counts of a region is the geometric mean of its `S` (A. M. Dykhne,
+//! Sov. Phys. JETP 32, 1971: conduction of a random sheet).
+//!
+//! Holes, dots among them, are filled from around: a region's slope rests on the readings that it has, so `S` is that of a reading
+//! over the share of the region that is no hole. A hole itself errs as what is around it. A reading that was drawn towards its
+//! surroundings errs less from cell to cell, but over many cells as much as it did before.
 //!
 //! How large errors are beside what the readings promise is seen at each size of block. They have two halves: one is the slope of some
 //! height and cannot be seen; the other, the curl, is the slope of nothing, and is what the least squares leave over. Noise and what
@@ -16,12 +21,21 @@ use super::cells::{Cells, View};
 use super::normals::CellReading;
 use super::rows::share;
 
-/// Cells along the side of the smallest blocks, those of a camera's JPEG, how often these are doubled, and for how many of the
-/// doublings what is left over is looked at: there are few larger ones.
+/// Cells along the side of the smallest blocks, those of a camera's JPEG, which are doubled until one covers the picture, and for how
+/// many of the sizes what is left over is looked at: there are few larger ones.
 const BLOCK: usize = 4;
-const LEVELS: usize = 5;
 const MIN_STRIPS: usize = 6;
 const SEEN_LEVELS: usize = 2;
+
+/// Part of the noise of the frame at rest, whose cells are smoothed before they are divided by, that is left in means over blocks of
+/// these sizes. In larger ones all of it is: errors there are those of two frames.
+const REST_LEFT: [f32; SEEN_LEVELS] = [0.373, 0.644];
+
+/// The size from which on blocks say what share of them is holes: smaller ones may lie within one.
+const HOLE_LEVEL: usize = 2;
+
+/// Readings are taken to cover no less of a block.
+const MIN_COVERED: f32 = 0.1;
 
 /// Octaves from a cell to the smallest block.
 const FIRST_OCTAVES: f32 = 2.0;
@@ -44,9 +58,6 @@ const DEPTH_PART: f32 = 0.02;
 /// Part of the slope of a hole that is filled in from around.
 const HOLE_PART: f32 = 0.25;
 
-/// Variance of the noise in a hole over that beside it: readings on one side only, not on two.
-const HOLE_NOISE: f32 = 2.0;
-
 /// Rounds of the walk: one more than the ways have turns back.
 const WALKS: usize = 3;
 
@@ -55,13 +66,16 @@ const WALKS: usize = 3;
 struct Block {
     cells: f32,
     read: f32,
-    /// Logarithms of variances of a cell's step, mm^2: of those that are read, and of all.
+    /// Cells that are filled in from around, and those that are neither that nor read: without light.
+    holes: f32,
+    unlit: f32,
+    /// Logarithms of variances of a cell's step, mm^2: of those that are read, and of those that are not.
     logs: f32,
-    all_logs: f32,
+    other_logs: f32,
     /// Variances of the steps across and down, where they are read, mm^2, and what is left between the cells, mm.
     variances_mm2: [f32; 2],
     left_mm: [f32; 2],
-    /// Variance of a cell's step, mm^2, once all are added.
+    /// What an octave of waves as long as the block adds to a height's variance, times `2 pi / ln 2`, mm^2, once all are added.
     variance_mm2: f32,
 }
 
@@ -75,9 +89,7 @@ struct Size {
 /// Deviations of the cells' heights, kept between frames.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Deviations {
-    sizes: [Size; LEVELS],
-    /// By how much errors over blocks of a size are larger than promised, as squares.
-    factors: [f32; LEVELS],
+    sizes: Vec<Size>,
     ratios: Vec<f32>,
     /// Variance of the noise of a height, mm^2, by smallest block.
     noise_mm2: Vec<f32>,
@@ -100,10 +112,10 @@ impl Deviations {
     ) {
         let w = cells.width;
         let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
-        self.sizes[0].clear(w.div_ceil(BLOCK), cells.height.div_ceil(BLOCK));
+        self.clear(w.div_ceil(BLOCK), cells.height.div_ceil(BLOCK));
         self.hole_mm.clear();
         self.hole_mm.resize(cells.count(), 0.0);
-        let Size { columns, blocks } = &mut self.sizes[0];
+        let Some(Size { columns, blocks }) = self.sizes.first_mut() else { return };
         let strips = blocks.par_chunks_mut(*columns).zip(self.hole_mm.par_chunks_mut(BLOCK * w));
         let strips = strips.zip(view.spans.par_chunks(BLOCK)).enumerate().with_min_len(share(MIN_STRIPS));
         strips.for_each(|(strip, ((blocks, hole_mm), spans))| {
@@ -118,11 +130,10 @@ impl Deviations {
                 let mut variances_mm2 = [0.0; 2];
                 for (k, next) in [right, below].into_iter().enumerate() {
                     let square = view.surface_mm[next].distance_squared(view.surface_mm[cell]);
-                    variances_mm2[k] = square * 0.5 * (readings[cell].spread[k] + readings[next].spread[k]);
+                    variances_mm2[k] = square * 0.5 * (readings[cell].noise[k] + readings[next].noise[k]);
                 }
                 let log = 0.5 * (variances_mm2[0] * variances_mm2[1]).max(1e-30).ln();
                 block.cells += 1.0;
-                block.all_logs += log;
                 if [cell, right, below].into_iter().all(|cell| readings[cell].is_read) {
                     block.read += 1.0;
                     block.logs += log;
@@ -132,53 +143,98 @@ impl Deviations {
                     }
                 } else {
                     let size_mm = view.surface_mm[right].distance(view.surface_mm[cell]);
-                    hole_mm[row * w + column] = (HOLE_PART * tilt(cell).length() * size_mm).max(1e-6);
+                    hole_mm[row * w + column] = HOLE_PART * tilt(cell).length() * size_mm;
+                    if !readings[cell].is_read {
+                        block.other_logs += log;
+                        let is_hole = readings[cell].tilt.weight() < 1.0;
+                        *(if is_hole { &mut block.holes } else { &mut block.unlit }) += 1.0;
+                    }
                 }
             }
         });
-        self.add_up(cells.height.div_ceil(BLOCK));
+        let factors = self.factors();
+        self.find_variances(factors);
         self.add_noise();
         self.walk_from_rim(cells, view, readings);
     }
 
-    /// Makes the larger blocks of the smallest, and their factors.
-    fn add_up(&mut self, rows: usize) {
-        let (mut rows, mut before) = (rows, 1.0);
-        for k in 0..LEVELS {
+    /// Empties the blocks, of which the smallest have so many columns and rows; the largest is one.
+    fn clear(&mut self, mut columns: usize, mut rows: usize) {
+        for k in 0.. {
+            if self.sizes.len() == k {
+                self.sizes.push(Size::default());
+            }
+            self.sizes[k].clear(columns, rows);
+            if columns * rows <= 1 {
+                break;
+            }
+            (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
+        }
+    }
+
+    /// Makes the larger blocks of the smallest. By how much errors over blocks are larger than promised, as squares: of each size that is
+    /// looked at, and of all larger ones.
+    fn factors(&mut self) -> [f32; SEEN_LEVELS + 1] {
+        for k in 1..self.sizes.len() {
             let (finer, coarser) = self.sizes.split_at_mut(k);
-            let Some(size) = coarser.first_mut() else { return };
-            if let Some(fine) = finer.last() {
-                rows = rows.div_ceil(2);
-                size.clear(fine.columns.div_ceil(2), rows);
-                for (i, block) in fine.blocks.iter().enumerate() {
-                    let to = i / fine.columns / 2 * size.columns + i % fine.columns / 2;
-                    size.blocks[to].add(block);
-                }
+            let (Some(fine), Some(size)) = (finer.last(), coarser.first_mut()) else { break };
+            for (i, block) in fine.blocks.iter().enumerate() {
+                size.blocks[i / fine.columns / 2 * size.columns + i % fine.columns / 2].add(block);
             }
-            size.blocks.iter_mut().for_each(Block::find_variance);
-            if k < SEEN_LEVELS {
-                before =
-                    size.factor(((BLOCK << k) * (BLOCK << k)) as f32, &mut self.ratios).unwrap_or(before);
+        }
+        // Of a size without blocks to look at, that of the smaller one, with what more of the noise at rest is left in it; before the
+        // first, what noise promises.
+        let (mut factor, mut left) = (1.0, 0.0);
+        let mut factors = [1.0; SEEN_LEVELS + 1];
+        for (k, out) in factors.iter_mut().enumerate() {
+            let own_left = REST_LEFT.get(k).copied().unwrap_or(1.0);
+            let whole = ((BLOCK << k) * (BLOCK << k)) as f32;
+            let size = self.sizes.get(k).filter(|_| k < SEEN_LEVELS);
+            let seen = size.and_then(|size| size.factor(whole, &mut self.ratios));
+            factor = seen.unwrap_or(factor * (1.0 + own_left) / (1.0 + left));
+            (left, *out) = (own_left, factor);
+        }
+        factors
+    }
+
+    /// Finds what each block's octave adds, the largest first: one in a hole errs as what is around it.
+    fn find_variances(&mut self, factors: [f32; SEEN_LEVELS + 1]) {
+        for k in (0..self.sizes.len()).rev() {
+            let (finer, coarser) = self.sizes.split_at_mut(k + 1);
+            let (smaller, own) = finer.split_at_mut(k);
+            let Some(Size { columns, blocks }) = own.first_mut() else { break };
+            let columns = *columns;
+            let around = |i: usize, up: usize| {
+                let size = coarser.get(up.checked_sub(1)?)?;
+                size.blocks.get(((i / columns) >> up) * size.columns + ((i % columns) >> up))
+            };
+            let factor = factors[k.min(SEEN_LEVELS)];
+            let to_holes = HOLE_LEVEL.saturating_sub(smaller.len());
+            for (i, block) in blocks.iter_mut().enumerate() {
+                let beyond = around(i, 1).map(|block| block.variance_mm2);
+                let covered = around(i, to_holes).unwrap_or(block).covered();
+                block.variance_mm2 = block.octave_mm2(factor / covered, beyond);
             }
-            self.factors[k] = before;
         }
     }
 
     /// Adds up the octaves for each of the smallest blocks.
     fn add_noise(&mut self) {
-        let finest = &self.sizes[0];
         self.noise_mm2.clear();
+        let [Some(finest), Some(largest)] = [self.sizes.first(), self.sizes.last()] else { return };
+        let dome: f32 = largest.blocks.iter().map(|block| block.cells).sum();
+        // Of the disc's radius in cells, with as many cells as the dome.
+        let all_octaves = (0.5 * (dome / std::f32::consts::PI).log2()).max(0.0);
         for i in 0..finest.blocks.len() {
             let (row, column) = (i / finest.columns.max(1), i % finest.columns.max(1));
-            let mut sum = 0.0;
-            for (k, (size, factor)) in self.sizes.iter().zip(self.factors).enumerate() {
+            let (mut sum, mut left) = (0.0, all_octaves);
+            for (k, size) in self.sizes.iter().enumerate() {
                 let block = &size.blocks[(row >> k) * size.columns + (column >> k)];
-                let octaves = if k == 0 {
-                    OWN_CELL + FIRST_OCTAVES * std::f32::consts::LN_2
-                } else {
-                    std::f32::consts::LN_2
-                };
-                sum += octaves * factor * block.variance_mm2;
+                let is_last = k + 1 == self.sizes.len();
+                let octaves = if is_last { left } else { left.min(if k == 0 { FIRST_OCTAVES } else { 1.0 }) };
+                let own_cell = if k == 0 { OWN_CELL } else { 0.0 };
+                sum += (own_cell + octaves * std::f32::consts::LN_2) * block.variance_mm2;
+                left -= octaves;
             }
             self.noise_mm2.push(sum / std::f32::consts::TAU);
         }
@@ -239,11 +295,8 @@ impl Deviations {
     /// Variance of a cell's height less what a dark ring leaves, mm^2.
     pub fn variance_mm2(&self, cell: usize, width: usize, height_mm: f32) -> f32 {
         let (row, column) = (cell / width / BLOCK, cell % width / BLOCK);
-        let noise = self.noise_mm2.get(row * self.sizes[0].columns + column).copied().unwrap_or(0.0);
-        let hole_mm = self.hole_mm[cell];
-        // What is read on a hole's border errs alike all through it.
-        let noise = if hole_mm > 0.0 { HOLE_NOISE * noise } else { noise };
-        noise + (DEPTH_PART * height_mm).powi(2) + hole_mm.powi(2) * BLOCK as f32
+        let noise = self.noise_mm2.get(row * width.div_ceil(BLOCK) + column).copied().unwrap_or(0.0);
+        noise + (DEPTH_PART * height_mm).powi(2) + self.hole_mm[cell].powi(2) * BLOCK as f32
     }
 }
 
@@ -272,21 +325,55 @@ impl Size {
 }
 
 impl Block {
-    /// Finds the variance of a cell's step. Holes are filled from what is read around them, and err as that does.
-    fn find_variance(&mut self) {
-        let (logs, cells) =
-            if self.read > 0.0 { (self.logs, self.read) } else { (self.all_logs, self.cells) };
-        self.variance_mm2 = if cells > 0.0 { (logs / cells).exp() } else { 0.0 };
+    /// Share of the block that is no hole.
+    fn covered(&self) -> f32 {
+        (1.0 - self.holes / self.cells.max(1.0)).max(MIN_COVERED)
+    }
+
+    /// What an octave adds: of readings with this factor; where there are none, as much as is open without light, or as `beyond` the holes.
+    fn octave_mm2(&self, factor: f32, beyond: Option<f32>) -> f32 {
+        let others = self.holes + self.unlit;
+        match beyond {
+            _ if self.read > 0.0 => (self.logs / self.read).exp() * factor,
+            Some(beyond) if self.unlit <= 0.0 => beyond,
+            _ if others > 0.0 => (self.other_logs / others).exp(),
+            _ => 0.0,
+        }
     }
 
     fn add(&mut self, other: &Self) {
         self.cells += other.cells;
         self.read += other.read;
         self.logs += other.logs;
-        self.all_logs += other.all_logs;
+        self.holes += other.holes;
+        self.unlit += other.unlit;
+        self.other_logs += other.other_logs;
         for k in [0, 1] {
             self.variances_mm2[k] += other.variances_mm2[k];
             self.left_mm[k] += other.left_mm[k];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rest::SMOOTHING;
+    use super::*;
+
+    #[test]
+    fn what_smoothing_leaves_of_the_noise_at_rest_is_that_of_its_means() {
+        for (k, left) in REST_LEFT.into_iter().enumerate() {
+            let block = BLOCK << k;
+            let mut sums = vec![0.0_f32; block + 2 * SMOOTHING];
+            sums[SMOOTHING..SMOOTHING + block].fill(1.0);
+            for _ in 0..SMOOTHING {
+                let at = |i: Option<usize>| i.and_then(|i| sums.get(i)).copied().unwrap_or(0.0);
+                let mean = |i: usize| (at(i.checked_sub(1)) + at(Some(i)) + at(Some(i + 1))) / 3.0;
+                sums = (0..sums.len()).map(mean).collect();
+            }
+            // Across and down alike.
+            let share = sums.iter().map(|v| v * v).sum::<f32>() / block as f32;
+            assert!((share * share - left).abs() < 1e-3, "{block}: {}", share * share);
         }
     }
 }

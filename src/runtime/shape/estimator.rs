@@ -261,7 +261,8 @@ impl ShapeFromColor {
             let irradiance = here.base + here.direct(out);
             let precision = irradiance.max(Vec3A::splat(1e-12)).powf(-2.0) * TURN_PRECISION;
             let deeper = light.at(at - ray * TURN_STEP_MM);
-            let reading = normals::read(&deeper, irradiance, precision, out, out.any_orthonormal_vector())?;
+            let along = out.any_orthonormal_vector();
+            let reading = normals::read(&deeper, irradiance, precision, Vec3A::ZERO, out, along)?;
             Some((out - reading.normal) / TURN_STEP_MM)
         });
         let rows = self.turn_per_mm.par_chunks_mut(self.cells.width).zip(&view.spans).enumerate();

@@ -19,6 +19,8 @@ pub(super) struct Reading {
     pub normal: Vec3A,
     /// Covariance of the normal's tilt along the two tangents, rad^2: `xx, xy, yy`.
     pub covariance: [f32; 3],
+    /// The same by noise alone.
+    pub noise: [f32; 3],
     /// Sum of squares of what is left over, in standard deviations: one degree of freedom.
     pub misfit: f32,
 }
@@ -28,15 +30,18 @@ pub(super) struct Reading {
 pub(super) struct CellReading {
     /// Tilt of the normal away from the undeformed dome's, and its weight.
     pub tilt: Weighted,
-    /// Variance of the tilt across and down, rad^2.
+    /// Variance of the tilt across and down, rad^2, as the cells around say it too.
     pub spread: [f32; 2],
+    /// The same by noise alone and of the reading alone, as it counts over many cells.
+    pub noise: [f32; 2],
     /// Whether the colours say a normal.
     pub is_read: bool,
 }
 
 impl Default for CellReading {
     fn default() -> Self {
-        Self { tilt: Weighted::default(), spread: [FILLED_SD_RAD * FILLED_SD_RAD; 2], is_read: false }
+        let filled = [FILLED_SD_RAD * FILLED_SD_RAD; 2];
+        Self { tilt: Weighted::default(), spread: filled, noise: filled, is_read: false }
     }
 }
 
@@ -49,12 +54,13 @@ pub(super) fn tangents(normal: Vec3A, along: Vec3A) -> [Vec3A; 2] {
 
 /// The normal that explains the irradiance of three channels, one step from a guess: linear in the levels, so that noise has no
 /// mean, and therefore not of unit length. `precision` is one over the variance of each channel's irradiance, 0 where the
-/// channel says nothing; `along` the direction of the first tangent.
+/// channel says nothing; `noise` the variance that noise alone has; `along` the direction of the first tangent.
 #[inline]
 pub(super) fn read(
     light: &PointLight,
     irradiance: Vec3A,
     precision: Vec3A,
+    noise: Vec3A,
     guess: Vec3A,
     along: Vec3A,
 ) -> Option<Reading> {
@@ -80,10 +86,15 @@ pub(super) fn read(
     let rest = left - j1 * step.x - j2 * step.y - whole * brightness;
     let misfit = weigh(rest, rest) + (brightness / BRIGHTNESS_SD).powi(2);
     let normal = guess + t1 * step.x + t2 * step.y;
+    // What each channel moves the slopes by.
+    let by = |k: f32, j: Vec3A| (j - whole * (k * bright)) * precision;
+    let (g1, g2) = (by(k1, j1), by(k2, j2));
+    let (s1, s2) = ((g1 * m22 - g2 * m12) * inverse, (g2 * m11 - g1 * m12) * inverse);
     let is_finite = normal.is_finite() && misfit.is_finite();
     is_finite.then_some(Reading {
         normal,
         covariance: [m22 * inverse, -m12 * inverse, m11 * inverse],
+        noise: [(s1 * s1).dot(noise), (s1 * s2).dot(noise), (s2 * s2).dot(noise)],
         misfit,
     })
 }
@@ -105,7 +116,8 @@ mod tests {
             let mut guess = Vec3A::Z;
             let mut misfit = 0.0;
             for _ in 0..3 {
-                let reading = read(&light, irradiance, precision, guess, Vec3A::X).expect("three colours");
+                let reading = read(&light, irradiance, precision, 1.0 / precision, guess, Vec3A::X)
+                    .expect("three colours");
                 (guess, misfit) = (reading.normal.normalize(), reading.misfit);
             }
             let off = guess.cross(normal).length();
@@ -113,8 +125,9 @@ mod tests {
         }
         // A channel without a say leaves two; no channel leaves nothing.
         let irradiance = light.base + light.direct(normal);
-        let two = read(&light, irradiance, precision * Vec3A::new(1.0, 1.0, 0.0), normal, Vec3A::X);
+        let two =
+            read(&light, irradiance, precision * Vec3A::new(1.0, 1.0, 0.0), Vec3A::ONE, normal, Vec3A::X);
         assert!(two.is_some_and(|two| two.normal.distance(normal) < 1e-3));
-        assert!(read(&light, irradiance, Vec3A::ZERO, normal, Vec3A::X).is_none());
+        assert!(read(&light, irradiance, Vec3A::ZERO, Vec3A::ONE, normal, Vec3A::X).is_none());
     }
 }

@@ -43,11 +43,12 @@ impl ShapeFromColor {
         let (out, ray) = (view.normal[cell], view.ray[cell]);
         let guess = right.cross(below).normalize_or(out);
         let guess = if guess.dot(ray) < 0.0 { -guess } else { guess };
-        let (irradiance, precision) = self.irradiance(cell);
-        let Some(reading) = normals::read(&self.light.at(at), irradiance, precision, guess, right) else {
+        let (irradiance, precision, noise) = self.irradiance(cell);
+        let light = self.light.at(at);
+        let Some(reading) = normals::read(&light, irradiance, precision, noise, guess, right) else {
             return unlit;
         };
-        let [xx, xy, yy] = reading.covariance;
+        let [xx, _, yy] = reading.covariance;
         if reading.misfit > BAD_MISFIT {
             return nothing;
         }
@@ -57,28 +58,32 @@ impl ShapeFromColor {
         let good = (GOOD_MISFIT / reading.misfit.max(GOOD_MISFIT)).min(1.0);
         let [t1, t2] = normals::tangents(guess, right);
         let turn = glam::Vec2::new(below.dot(t1), below.dot(t2)).normalize_or_zero();
-        let along = turn.x * turn.x * xx + 2.0 * turn.x * turn.y * xy + turn.y * turn.y * yy;
+        let down =
+            |[xx, xy, yy]: [f32; 3]| turn.x * turn.x * xx + 2.0 * turn.x * turn.y * xy + turn.y * turn.y * yy;
         // What the reading and its surroundings say together.
         let filled = FILLED_SD_RAD * FILLED_SD_RAD;
         let weight = good * filled / (good * filled + 0.5 * (xx + yy));
         CellReading {
             tilt: Weighted::new(reading.normal - out, weight),
-            spread: [xx, along].map(|v| v * filled / (v + good * filled)),
+            spread: [xx, down(reading.covariance)].map(|v| v * filled / (v + good * filled)),
+            noise: [reading.noise[0], down(reading.noise)].map(|v| v / good),
             is_read: true,
         }
     }
 
-    /// Irradiance of a cell by the picture, and one over its variance, by channel.
+    /// Irradiance of a cell by the picture, one over its variance, and the variance that noise alone has, by channel.
     #[inline]
-    fn irradiance(&self, cell: usize) -> (Vec3A, Vec3A) {
+    fn irradiance(&self, cell: usize) -> (Vec3A, Vec3A, Vec3A) {
         let variance = self.noise * self.noise / (self.cells.px * self.cells.px) as f32;
         let (view, level) = (&self.view, &self.levels[cell]);
         let gain = self.light.passed(view.ray[cell].z) * self.gain[cell];
-        let irradiance = (level.light - Vec3A::splat(self.light.stray)) / gain.max(Vec3A::splat(1e-12));
+        let known_gain = gain.max(Vec3A::splat(1e-12));
+        let irradiance = (level.light - Vec3A::splat(self.light.stray)) / known_gain;
         // Where noise would be cut off at black its mean is not the light.
         let expected = gain * self.light.still(view.place[cell]);
         let is_lit = Vec3A::select(expected.cmpgt(2.0 * self.noise), Vec3A::ONE, Vec3A::ZERO);
         let off = (level.light + Vec3A::splat(level.light.max_element())) * LEVEL_ERROR;
-        (irradiance, gain * gain * level.is_known * is_lit / (off * off + variance))
+        let precision = gain * gain * level.is_known * is_lit / (off * off + variance);
+        (irradiance, precision, variance / (known_gain * known_gain))
     }
 }

@@ -13,7 +13,7 @@ use super::rows::{MIN_ROWS, share};
 use domecast_optics::SensorOptics;
 
 /// Passes of a mean over three by three cells that smooth the ratio: noise goes, spots of the membrane stay.
-const SMOOTHING: usize = 3;
+pub(super) const SMOOTHING: usize = 3;
 
 /// How far the ratio of a place is from the middle of all, a part: spots of the membrane, the lens's falloff, the lights.
 const RATIO_SD: f32 = 0.3;

@@ -190,7 +190,7 @@ impl ShapeFromColor {
             self.turn();
         }
         levels::read(frame, &self.cells, &self.view, &self.light.linear, &mut self.levels);
-        self.marks.cover(tracked, &self.cells, &mut self.covered);
+        self.marks.cover(tracked, &self.cells, &self.view, &mut self.covered);
         let (is_dome, covered) = (&self.view.is_dome, &self.covered);
         let is_bare = |cell: usize| is_dome[cell] && !covered[cell];
         self.noise = levels::noise(frame, &self.cells, is_bare, &self.light.linear, &mut self.differences);

@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
-use super::cells::Cells;
+use super::cells::{Cells, View};
 use crate::constants::Constants;
 use crate::track::{MarkState, Tracked};
 use domecast_optics::SensorOptics;
@@ -12,6 +12,10 @@ const MARGIN_PX: f64 = 2.0;
 
 /// The same where the mark was not found, and may be that far from where the undeformed dome would show it.
 const LOST_MARGIN_PX: f64 = 5.0;
+
+/// Cells so near to what is beside the dome show some of that, as what lies beside a mark does; so do those that a pose which is off by
+/// its noise takes for the dome's. The margin of marks in cells of the usual two pixels.
+const OUTLINE_CELLS: usize = 1;
 
 /// A mark's ellipse in the picture: the images of two of its radii at right angles, px.
 #[derive(Debug, Clone, Copy)]
@@ -54,9 +58,10 @@ impl Marks {
         }
     }
 
-    /// Marks the cells that a frame's dots and markers cover.
-    pub fn cover(&self, tracked: &Tracked, cells: &Cells, covered: &mut [bool]) {
+    /// Marks the cells that a frame's dots and markers cover, and those at the dome's outline.
+    pub fn cover(&self, tracked: &Tracked, cells: &Cells, view: &View, covered: &mut [bool]) {
         covered.fill(false);
+        cover_outline(cells, view, covered);
         for (dot, ellipse) in tracked.black_dots.iter().zip(&self.dots) {
             let Some(ellipse) = ellipse else { continue };
             let seen = dot.centroid_px.filter(|_| dot.state == MarkState::Ok);
@@ -74,6 +79,21 @@ impl Marks {
         for at in &tracked.false_dots {
             let Some(ellipse) = self.dots.iter().flatten().next() else { continue };
             ellipse.cover(*at, MARGIN_PX, cells, covered);
+        }
+    }
+}
+
+/// Marks the dome's cells that have others beside them.
+fn cover_outline(cells: &Cells, view: &View, covered: &mut [bool]) {
+    let width = cells.width;
+    let is_beside = |row: usize, column: usize| {
+        let rows = row.saturating_sub(OUTLINE_CELLS)..=(row + OUTLINE_CELLS).min(cells.height - 1);
+        let columns = column.saturating_sub(OUTLINE_CELLS)..=(column + OUTLINE_CELLS).min(width - 1);
+        rows.into_iter().any(|row| columns.clone().any(|column| !view.is_dome[row * width + column]))
+    };
+    for (row, span) in view.spans.iter().enumerate() {
+        for column in span.clone().filter(|column| is_beside(row, *column)) {
+            covered[row * width + column] = true;
         }
     }
 }
@@ -118,7 +138,8 @@ mod tests {
         let cells = Cells { px: 2, width: 40, height: 40, rays: Vec::new() };
         let covered = |dot: DotResult| {
             let mut covered = vec![false; cells.count()];
-            marks.cover(&Tracked { black_dots: vec![dot], ..Tracked::default() }, &cells, &mut covered);
+            let tracked = Tracked { black_dots: vec![dot], ..Tracked::default() };
+            marks.cover(&tracked, &cells, &View::default(), &mut covered);
             move |x: usize, y: usize| covered[y / 2 * 40 + x / 2]
         };
         let (rest, ink) = (Some(DVec2::new(20.0, 20.0)), Some(DVec2::new(50.0, 40.0)));
@@ -136,5 +157,26 @@ mod tests {
         };
         let is_covered = covered(seen);
         assert!(is_covered(50, 40) && !is_covered(20, 20));
+    }
+
+    #[test]
+    fn the_dome_is_not_read_at_its_outline() {
+        let cells = Cells { px: 2, width: 9, height: 9, rays: Vec::new() };
+        let is_dome = |cell: usize| (cell % 9).abs_diff(4).pow(2) + (cell / 9).abs_diff(4).pow(2) <= 13;
+        let spans = (0..9).map(|row| {
+            let on: Vec<usize> = (0..9).filter(|column| is_dome(row * 9 + column)).collect();
+            on.first().map_or(0..0, |first| *first..on.last().map_or(*first, |last| last + 1))
+        });
+        let view =
+            View { spans: spans.collect(), is_dome: (0..81).map(is_dome).collect(), ..View::default() };
+        let mut covered = vec![false; 81];
+        let marks = Marks { dots: Vec::new(), markers: Vec::new() };
+        marks.cover(&Tracked::default(), &cells, &view, &mut covered);
+        let bare: Vec<usize> = (0..81).filter(|cell| view.is_dome[*cell] && !covered[*cell]).collect();
+        // of a disc of three and a half cells two remain
+        let wanted: Vec<usize> =
+            (0..81).filter(|cell| (cell % 9).abs_diff(4).max((cell / 9).abs_diff(4)) <= 2).collect();
+        assert!(!bare.is_empty() && bare.iter().all(|cell| wanted.contains(cell)), "{bare:?}");
+        assert!(covered.iter().zip(&view.is_dome).all(|(covered, is_dome)| *is_dome || !covered));
     }
 }

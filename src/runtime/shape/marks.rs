@@ -172,10 +172,10 @@ mod tests {
         let mut covered = vec![false; 81];
         let marks = Marks { dots: Vec::new(), markers: Vec::new() };
         marks.cover(&Tracked::default(), &cells, &view, &mut covered);
-        let bare: Vec<usize> = (0..81).filter(|cell| view.is_dome[*cell] && !covered[*cell]).collect();
+        let bare: Vec<usize> = (0..81_usize).filter(|cell| view.is_dome[*cell] && !covered[*cell]).collect();
         // of a disc of three and a half cells two remain
         let wanted: Vec<usize> =
-            (0..81).filter(|cell| (cell % 9).abs_diff(4).max((cell / 9).abs_diff(4)) <= 2).collect();
+            (0..81_usize).filter(|cell| (cell % 9).abs_diff(4).max((cell / 9).abs_diff(4)) <= 2).collect();
         assert!(!bare.is_empty() && bare.iter().all(|cell| wanted.contains(cell)), "{bare:?}");
         assert!(covered.iter().zip(&view.is_dome).all(|(covered, is_dome)| *is_dome || !covered));
     }

@@ -11,8 +11,10 @@
 //! let constants = Constants::load("constants.json".as_ref())?;
 //! let mut tracker = Tracker::new(&constants, TrackOptions::default())?;
 //! let mut forces = ForceDistribution::new(&constants, None)?;
-//! let bytes = std::fs::read("frame.rgb")?;
-//! let tracked = tracker.track(0, &CameraFrame::new(640, 480, 3, &bytes)?);
+//! let (rest, bytes) = (std::fs::read("rest.rgb")?, std::fs::read("frame.rgb")?);
+//! // untouched: where the dots were printed
+//! assert!(forces.set_rest(tracker.track(0, &CameraFrame::new(640, 480, 3, &rest)?)));
+//! let tracked = tracker.track(1, &CameraFrame::new(640, 480, 3, &bytes)?);
 //! for dot in &forces.update(tracked, None).dots {
 //!     println!("{} N/mm2 at {}", dot.traction_n_mm2, dot.surface_mm);
 //! }

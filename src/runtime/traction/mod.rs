@@ -25,7 +25,8 @@
 //! |---|---|
 //! | `model` | what a traction on each node moves, and which pressures are likely |
 //! | `active_set` | least squares with pressures that are not negative |
-//! | `columns` | rows of a turn: dots, wrench, heights |
+//! | `seen_dots` | what a reading says: how far dots lie from their places at rest, and the load by the springs |
+//! | `columns`, `wrench_rows` | rows of a turn: dots, wrench, heights |
 //! | `forces` | the turns that make a frame consistent with the moved skin |
 //! | `heights` | a height map as heights of nodes, and which of them are touched |
 //! | `pressure` | pressures on a height map's grid |

@@ -10,7 +10,7 @@ use super::measured::measured_light;
 use super::model::LightModel;
 use super::observed::{Observed, SeenPress, rest_places};
 use super::physics::Physics;
-use super::scatter::Scatter;
+use super::scatter::{FIRST_LENGTHS, Scatter};
 use super::solve::{Open, Solved, scatter, solve};
 use super::types::{BallPress, LightFit, LightFitError, LightFitOptions, place_deg};
 use super::verdict;
@@ -18,8 +18,6 @@ use crate::constants::{Constants, LightConstants};
 use crate::shape::SeenCell;
 use crate::track::{CameraFrame, Tracked};
 
-/// Lengths over which places at rest, and those of a cap, are taken to share their errors at first, parts of the dome's radius.
-const FIRST_LENGTHS: [f64; 2] = [0.3, 0.05];
 /// By how many times the errors at rest are taken to be larger first: with small ones at once, lights that are far from nominal end in
 /// a light that is none.
 const ROUGH: f64 = 4.0;

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::equations::{Problem, Values};
 use super::physics::ShadedDome;
-use super::scatter::{Group, Said, Scatter, likeliest};
+use super::scatter::{FIRST_LENGTHS, Group, Said, Scatter, likeliest};
 use super::types::LightFitError;
 
 /// Steps at most.
@@ -199,8 +199,13 @@ pub(super) fn scatter(problem: &Problem<'_>, solved: &Solved) -> Option<[Scatter
             .filter(|(i, _)| (*i > 0) == (kind > 0))
             .map(|(_, (group, _))| group.clone())
             .collect();
-        // Nothing smoother than the dome itself; in a cap, nothing finer than its cells.
-        let lengths_mm = if kind == 0 { [0.05 * dome_mm, dome_mm] } else { [0.01 * dome_mm, 0.2 * dome_mm] };
+        // At rest nothing smoother than was taken at first: what a camera's coding shifts beside dots and what tables leave out beside
+        // shadows is no longer, however little of it a fit leaves to be seen. In a cap, nothing finer than its cells.
+        let lengths_mm = if kind == 0 {
+            [0.05 * dome_mm, FIRST_LENGTHS[0] * dome_mm]
+        } else {
+            [0.01 * dome_mm, 0.2 * dome_mm]
+        };
         found[kind] = likeliest(&own, found[kind], lengths_mm, slopes, off, (&rest.0, &rest.1));
     }
     Some(found)

@@ -1,7 +1,7 @@
 //! What a force on one contact node does to every other, and to the whole surface.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -15,59 +15,83 @@ use crate::grid::{Grid, GridNode};
 const AXES: usize = 3;
 
 /// Compliance of the bonded dome between contact nodes, and its spectrum for the field.
+///
+/// A ring's hat excites as many harmonics as it has nodes, so a touch near the pole needs few of them: each is solved when a
+/// ring first asks for it.
 #[derive(Debug, Clone)]
 pub struct Compliance {
     /// The nodes that forces bear on.
     pub grid: Grid,
     /// Places between its nodes.
     pub places: NodePlaces,
+    /// How many times the dome yields that the tables are of.
+    yields: f64,
+    tables: Arc<Tables>,
+}
+
+/// What is known of the dome so far.
+#[derive(Debug)]
+struct Tables {
+    grid: Grid,
+    body: BondedBody,
+    hats: Vec<Vec<(usize, f64)>>,
+    harmonics: Vec<OnceLock<Result<Harmonic, FactorError>>>,
     /// For ring pairs i >= j and azimuth steps 0..=azimuths/2: displacement at ring i for a force at ring j, the
     /// azimuth of i less that of j, row by row, mm/N.
-    table: Arc<Vec<[f64; 9]>>,
-    /// For each harmonic, displacements of the surface nodes for forces on the rings.
-    spectrum: Arc<Vec<Spectrum>>,
+    pairs: Vec<OnceLock<Vec<[f64; 9]>>>,
 }
 
 /// One harmonic's response.
 #[derive(Debug)]
-pub struct Spectrum {
+pub struct Harmonic {
     /// First ring that this harmonic reaches.
     pub first_ring: usize,
     /// Column by column, (ring - first_ring, direction): the surface nodes' three amplitudes, hats included, mm/N.
     pub columns: Vec<Vec<f64>>,
+    /// What the rings see of each column with their own hats, column by column, mm/N.
+    pub own: Vec<f64>,
+}
+
+impl Tables {
+    fn harmonic(&self, m: usize) -> Option<&Result<Harmonic, FactorError>> {
+        self.harmonics.get(m).map(|one| one.get_or_init(|| harmonic(&self.grid, &self.body, &self.hats, m)))
+    }
 }
 
 impl Compliance {
-    /// Factors the dome's stiffness for every harmonic and solves it for every ring.
+    /// Assembles the dome's stiffness.
+    ///
+    /// # Errors
+    /// A mesh too large for memory.
     pub fn new(elastomer: &ElasticDome, elements: usize) -> Result<Self, FactorError> {
         let grid = Grid::new(elastomer.dome, elements);
-        let body = BondedBody::new(elastomer, elements)?;
         let last = (0..grid.elements).map(|ring| grid.harmonics(ring)).max().unwrap_or(1);
-        let hats: Vec<Vec<(usize, f64)>> = (0..grid.elements).map(|ring| grid.hat(ring)).collect();
-        let solved: Vec<(Spectrum, Vec<f64>)> =
-            (0..last).into_par_iter().map(|m| harmonic(&grid, &body, &hats, m)).collect::<Result<_, _>>()?;
-        let mut table = vec![[0.0; 9]; grid.elements * (grid.elements + 1) / 2 * (grid.azimuths / 2 + 1)];
-        let steps = grid.azimuths / 2 + 1;
-        table.par_chunks_mut(steps).enumerate().for_each(|(pair, entries)| {
-            let (i, j) = rings_of(pair);
-            fill_pair(&grid, &solved, i, j, entries);
-        });
-        let spectrum = Arc::new(solved.into_iter().map(|(spectrum, _)| spectrum).collect());
-        let places = NodePlaces::new(&grid);
-        Ok(Self { grid, places, table: Arc::new(table), spectrum })
+        let tables = Tables {
+            body: BondedBody::new(elastomer, elements)?,
+            hats: (0..grid.elements).map(|ring| grid.hat(ring)).collect(),
+            harmonics: (0..last).map(|_| OnceLock::new()).collect(),
+            pairs: (0..grid.elements * (grid.elements + 1) / 2).map(|_| OnceLock::new()).collect(),
+            grid: grid.clone(),
+        };
+        Ok(Self { places: NodePlaces::new(&grid), grid, yields: 1.0, tables: Arc::new(tables) })
+    }
+
+    /// Factors the dome's stiffness for the harmonics of a ring, in parallel, as far as it was not done before. To be called
+    /// before forces bear on a ring: a harmonic that has no factors answers with no displacement afterwards.
+    ///
+    /// # Errors
+    /// A harmonic without factors.
+    pub fn reach(&self, ring: usize) -> Result<(), FactorError> {
+        let solved = |m: usize| match self.tables.harmonic(m) {
+            Some(Err(error)) => Err(error.clone()),
+            _ => Ok(()),
+        };
+        (0..self.grid.harmonics(ring)).into_par_iter().try_for_each(solved)
     }
 
     /// The same of a dome that yields `factor` times as much.
     pub fn scaled(&self, factor: f64) -> Self {
-        let softer = |one: &Spectrum| Spectrum {
-            first_ring: one.first_ring,
-            columns: one.columns.iter().map(|column| column.iter().map(|v| v * factor).collect()).collect(),
-        };
-        Self {
-            table: Arc::new(self.table.iter().map(|entry| entry.map(|value| value * factor)).collect()),
-            spectrum: Arc::new(self.spectrum.iter().map(softer).collect()),
-            ..self.clone()
-        }
+        Self { yields: self.yields * factor, ..self.clone() }
     }
 
     /// The same dome, its nodes moved by forces on others (number; force in the node's frame, N) where `is_near` is true
@@ -98,7 +122,10 @@ impl Compliance {
         let ahead = (at.step + n - by.step) % n;
         let (step, sign) = if 2 * ahead <= n { (ahead, 1.0) } else { (n - ahead, -1.0) };
         let pair = at.ring * (at.ring + 1) / 2 + by.ring;
-        let e = &self.table[pair * (n / 2 + 1) + step];
+        let known =
+            self.tables.pairs.get(pair).map(|known| known.get_or_init(|| self.tables.pair(at.ring, by.ring)));
+        let e =
+            known.and_then(|known| known.get(step)).map_or([0.0; 9], |e| e.map(|value| value * self.yields));
         // Mirrored azimuths turn the sign of what couples phi to the rest.
         DMat3::from_cols(
             DVec3::new(e[0], e[3], sign * e[6]),
@@ -107,22 +134,10 @@ impl Compliance {
         )
     }
 
-    /// Harmonics of the field.
-    pub fn spectrum(&self) -> &[Spectrum] {
-        &self.spectrum
+    /// A harmonic of the field, and by how much the dome yields to it: times its columns.
+    pub(crate) fn harmonic(&self, m: usize) -> Option<(&Harmonic, f64)> {
+        Some((self.tables.harmonic(m)?.as_ref().ok()?, self.yields))
     }
-}
-
-/// Pair number to rings i >= j.
-fn rings_of(pair: usize) -> (usize, usize) {
-    let mut i = ((((8 * pair + 1) as f64).sqrt() - 1.0) / 2.0) as usize;
-    while i * (i + 1) / 2 > pair {
-        i -= 1;
-    }
-    while (i + 1) * (i + 2) / 2 <= pair {
-        i += 1;
-    }
-    (i, pair - i * (i + 1) / 2)
 }
 
 /// A ring's unit force along an axis in one harmonic, as parts of the surface nodes' (node, direction).
@@ -159,7 +174,7 @@ pub(crate) fn harmonic(
     body: &BondedBody,
     hats: &[Vec<(usize, f64)>],
     m: usize,
-) -> Result<(Spectrum, Vec<f64>), FactorError> {
+) -> Result<Harmonic, FactorError> {
     let first_ring = (0..hats.len()).find(|ring| grid.harmonics(*ring) > m).unwrap_or(hats.len());
     // Rings between that do not reach this harmonic have zero columns, and are rare.
     let rings = hats.len() - first_ring;
@@ -199,41 +214,42 @@ pub(crate) fn harmonic(
             own.push(load.iter().map(|&((p, direction), part)| part * values[AXES * p + direction]).sum());
         }
     }
-    Ok((Spectrum { first_ring, columns }, own))
+    Ok(Harmonic { first_ring, columns, own })
 }
 
-/// Sums the harmonics of one pair of rings over the azimuth steps.
-fn fill_pair(grid: &Grid, solved: &[(Spectrum, Vec<f64>)], i: usize, j: usize, entries: &mut [[f64; 9]]) {
-    let waves: Vec<(f64, f64)> = (0..grid.azimuths)
-        .map(|k| {
-            let (sine, cosine) = (TAU * k as f64 / grid.azimuths as f64).sin_cos();
-            (cosine, sine)
-        })
-        .collect();
-    for (m, (spectrum, own)) in solved.iter().enumerate() {
-        if i < spectrum.first_ring || j < spectrum.first_ring {
-            continue;
-        }
-        let rings = AXES * (grid.elements - spectrum.first_ring);
-        let (a, b) = (AXES * (i - spectrum.first_ring), AXES * (j - spectrum.first_ring));
-        let g: [f64; 9] = std::array::from_fn(|e| own[(b + e % 3) * rings + a + e / 3]);
-        if g.iter().all(|v| *v == 0.0) {
-            continue;
-        }
-        for (step, entry) in entries.iter_mut().enumerate() {
-            let (cosine, sine) = waves[m * step % grid.azimuths];
-            for row in 0..3 {
-                for column in 0..3 {
-                    let e = 3 * row + column;
-                    // r, z even; phi odd. A force along phi is the other family, with u_phi = -U_phi cos.
-                    let wave = match (row == 2, column == 2) {
-                        (false, false) | (true, true) => cosine,
-                        (true, false) => sine,
-                        (false, true) => -sine,
-                    };
-                    entry[e] += g[e] * wave;
+impl Tables {
+    /// Sums the harmonics of one pair of rings over the azimuth steps.
+    fn pair(&self, i: usize, j: usize) -> Vec<[f64; 9]> {
+        let grid = &self.grid;
+        let waves: Vec<(f64, f64)> = (0..grid.azimuths)
+            .map(|k| {
+                let (sine, cosine) = (TAU * k as f64 / grid.azimuths as f64).sin_cos();
+                (cosine, sine)
+            })
+            .collect();
+        let mut entries = vec![[0.0; 9]; grid.azimuths / 2 + 1];
+        // Beyond the coarser ring's harmonics nothing couples them.
+        for m in 0..grid.harmonics(i).min(grid.harmonics(j)) {
+            let Some(Ok(harmonic)) = self.harmonic(m) else { continue };
+            let rings = AXES * (grid.elements - harmonic.first_ring);
+            let (a, b) = (AXES * (i - harmonic.first_ring), AXES * (j - harmonic.first_ring));
+            let g: [f64; 9] = std::array::from_fn(|e| harmonic.own[(b + e % 3) * rings + a + e / 3]);
+            for (step, entry) in entries.iter_mut().enumerate() {
+                let (cosine, sine) = waves[m * step % grid.azimuths];
+                for row in 0..3 {
+                    for column in 0..3 {
+                        let e = 3 * row + column;
+                        // r, z even; phi odd. A force along phi is the other family, with u_phi = -U_phi cos.
+                        let wave = match (row == 2, column == 2) {
+                            (false, false) | (true, true) => cosine,
+                            (true, false) => sine,
+                            (false, true) => -sine,
+                        };
+                        entry[e] += g[e] * wave;
+                    }
                 }
             }
         }
+        entries
     }
 }

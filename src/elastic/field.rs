@@ -87,13 +87,12 @@ impl SurfaceField {
 
     fn sum_forces(&self) -> Vec<Vec<[f64; 6]>> {
         let grid = &self.compliance.grid;
-        let harmonics = self.compliance.spectrum().len();
         // Forces of each ring by harmonic: cos and sin sums.
         let mut rings: Vec<(usize, Vec<[f64; 6]>)> = Vec::new();
         for &(number, force) in &self.forces {
             let node = grid.node(number);
             if rings.last().is_none_or(|(ring, _)| *ring != node.ring) {
-                rings.push((node.ring, vec![[0.0; 6]; grid.harmonics(node.ring).min(harmonics)]));
+                rings.push((node.ring, vec![[0.0; 6]; grid.harmonics(node.ring)]));
             }
             let Some((_, sums)) = rings.last_mut() else { continue };
             let (step_sine, step_cosine) = grid.azimuth(node).sin_cos();
@@ -115,16 +114,17 @@ impl SurfaceField {
                     (cosine * step_cosine - sine * step_sine, sine * step_cosine + cosine * step_sine);
             }
         }
+        let harmonics = rings.iter().map(|(_, sums)| sums.len()).max().unwrap_or(0);
         let mut amplitudes = Vec::with_capacity(harmonics);
-        for (m, spectrum) in self.compliance.spectrum().iter().enumerate() {
+        for m in 0..harmonics {
             let mut nodes = vec![[0.0; 6]; self.surface()];
+            let known = self.compliance.harmonic(m);
             for (ring, sums) in &rings {
-                let (Some(sums), Some(first)) = (sums.get(m), ring.checked_sub(spectrum.first_ring)) else {
-                    continue;
-                };
+                let (Some(sums), Some((harmonic, yields))) = (sums.get(m), known) else { continue };
+                let first = ring - harmonic.first_ring;
                 for axis in 0..3 {
-                    let (even, odd) = (sums[axis], sums[3 + axis]);
-                    let column = &spectrum.columns[3 * first + axis];
+                    let (even, odd) = (yields * sums[axis], yields * sums[3 + axis]);
+                    let column = &harmonic.columns[3 * first + axis];
                     for (node, values) in nodes.iter_mut().zip(column.chunks_exact(3)) {
                         for k in 0..3 {
                             node[k] += values[k] * even;

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::body::BondedBody;
-use crate::compliance::{Spectrum, harmonic};
+use crate::compliance::{Harmonic, harmonic};
 use crate::dome::{ElasticDome, FactorError};
 use crate::element::quadratic;
 use crate::grid::{Grid, GridNode};
@@ -12,8 +12,7 @@ use crate::grid::{Grid, GridNode};
 #[derive(Debug)]
 pub struct Revolved {
     grid: Grid,
-    spectrum: Spectrum,
-    own: Vec<f64>,
+    harmonic: Harmonic,
     rings: usize,
 }
 
@@ -33,8 +32,8 @@ impl Revolved {
         let grid = Grid::new(elastomer.dome, elements);
         let rings = (0..elements).take_while(|ring| grid.meridian_rad(*ring) <= meridian_rad).count().max(1);
         let hats: Vec<_> = (0..rings).map(|ring| grid.hat(ring)).collect();
-        let (spectrum, own) = harmonic(&grid, &BondedBody::new(elastomer, elements)?, &hats, 0)?;
-        Ok(Self { grid, spectrum, own, rings })
+        let harmonic = harmonic(&grid, &BondedBody::new(elastomer, elements)?, &hats, 0)?;
+        Ok(Self { grid, harmonic, rings })
     }
 
     /// The rings, from the pole.
@@ -55,7 +54,7 @@ impl Revolved {
     /// has nowhere to go but along the axis; sideways it is given its own compliance along it, which no load there uses.
     pub fn between(&self, at: usize, by: usize) -> DMat3 {
         let width = 3 * self.rings;
-        let entry = |row: usize, column: usize| self.own[(3 * by + column) * width + 3 * at + row];
+        let entry = |row: usize, column: usize| self.harmonic.own[(3 * by + column) * width + 3 * at + row];
         // Rows and columns r, z, phi are x, z, y at the azimuth 0.
         let [r, z, phi] = [0, 1, 2];
         let (mut xx, mut yy) = (entry(r, r), entry(phi, phi));
@@ -77,7 +76,7 @@ impl Revolved {
         let (mut outwards, mut up) = (0.0, 0.0);
         for (ring, force) in forces_n.iter().enumerate() {
             for (axis, part) in [(0, force.x), (1, force.z)] {
-                let Some(column) = self.spectrum.columns.get(3 * ring + axis) else { continue };
+                let Some(column) = self.harmonic.columns.get(3 * ring + axis) else { continue };
                 for (k, n) in n.into_iter().enumerate() {
                     outwards += n * part * column[3 * (2 * element + k)];
                     up += n * part * column[3 * (2 * element + k) + 1];

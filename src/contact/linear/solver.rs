@@ -246,8 +246,11 @@ impl<'a> Solver<'a> {
             candidate.carried_mm = way.carried(&touch.placed, candidate);
         }
         let known: Vec<usize> = touch.candidates.iter().map(|c| c.node).collect();
+        let mut last_ring = 0;
         for &number in numbers.iter().filter(|number| known.binary_search(number).is_err()) {
             let parts = self.compliance.places.parts(grid, number);
+            last_ring =
+                parts.as_slice().iter().fold(last_ring, |last, (node, _)| last.max(grid.node(*node).ring));
             let area = |&(node, part): &(usize, f64)| part * grid.areas_mm2[grid.node(node).ring];
             let area_mm2 = parts.as_slice().iter().map(area).sum();
             let spread_mm =
@@ -260,6 +263,7 @@ impl<'a> Solver<'a> {
             touch.candidates.push(candidate);
         }
         touch.candidates.sort_by_key(|candidate| candidate.node);
+        self.compliance.reach(last_ring)?;
         self.fill_blocks();
         Ok(())
     }

@@ -113,6 +113,8 @@ impl ElasticModel {
             (0..grid.len()).filter(|number| grid.meridian_rad(grid.node(*number).ring) <= last_rad).collect();
         let mut of_grid = vec![None; grid.len()];
         chosen.iter().enumerate().for_each(|(k, number)| of_grid[*number] = Some(k));
+        let outermost = chosen.last().map_or(0, |number| grid.node(*number).ring);
+        compliance.reach(outermost).map_err(|error| TrackError::at("elastomer", error.to_string()))?;
         let nodes = nodes_of(&compliance, &chosen);
         let area_mm2: f64 = nodes.iter().map(|node| node.area_mm2).sum();
         let dots_apart_mm = (area_mm2 / dots_mm.len().max(1) as f64).sqrt();

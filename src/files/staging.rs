@@ -35,6 +35,8 @@ const HEAD: &str = "domecast makes a result here, which goes to:\n";
 /// Copies of one name that are kept.
 const MAX_COPIES: u32 = 10_000;
 const MAX_TRIES: u32 = 100;
+/// Sweeps of a folder that another thread may still begin to fill.
+const MAX_SWEEPS: u32 = 3;
 const PAUSE: Duration = Duration::from_millis(2);
 
 /// A staging folder of this process and where its result goes.
@@ -258,7 +260,8 @@ pub(crate) fn abandon_all() {
     for Live { folder, out } in live.iter() {
         if let (Some(base), true) = (folder.parent(), folder.exists()) {
             let rest = out.strip_prefix(base).unwrap_or(out);
-            let _ = tidy(base, folder, rest);
+            // a draft that another thread begins between its removal and the folder's holds the folder: once more, then
+            (0..MAX_SWEEPS).find(|_| tidy(base, folder, rest).is_ok());
         }
     }
     std::mem::forget(live);

@@ -83,7 +83,7 @@ impl Cavities {
     ///
     /// For a ray that stays within the part's outer faces; outside them everything counts as material.
     pub fn is_free(&self, from_mm: DVec3, to_mm: DVec3) -> bool {
-        self.near(from_mm.min(to_mm), from_mm.max(to_mm)).free_to(&[(from_mm, to_mm)], 0.0) >= 1.0
+        self.near(from_mm.min(to_mm), from_mm.max(to_mm)).is_free(from_mm, to_mm)
     }
 
     /// The hollows that reach into a box: all that rays inside it may meet.
@@ -98,33 +98,25 @@ impl Cavities {
 pub struct NearHollows<'a>(Vec<&'a Hollow>);
 
 impl NearHollows<'_> {
-    /// How far rays inside the box are free, as a part of their ways, that are so up to `begin`; 1 at their end. They go through the
-    /// same hollows together: then, the hollows being convex, all rays between them are free as far.
-    pub fn free_to<const N: usize>(&mut self, rays: &[(DVec3, DVec3); N], begin: f64) -> f64 {
+    /// [`Cavities::is_free`] for a ray inside the box.
+    pub fn is_free(&mut self, from_mm: DVec3, to_mm: DVec3) -> bool {
         // A hollow that the front lies in carries it on to its far side; where no other hollow does, it is blocked.
-        let mut front = begin;
+        let mut front = 0.0;
         for carried in 0..self.0.len() {
-            let fronts_mm = rays.map(|(from_mm, to_mm)| from_mm.lerp(to_mm, front));
+            let front_mm = from_mm.lerp(to_mm, front);
             let next = self.0.iter().enumerate().skip(carried).find_map(|(k, hollow)| {
-                let mut leave = f64::INFINITY;
-                for ((from_mm, to_mm), front_mm) in rays.iter().zip(&fronts_mm) {
-                    let span =
-                        hollow.box_holds(*front_mm).then(|| hollow.interval(*from_mm, *to_mm)).flatten()?;
-                    if span.0 > front + ROUNDING {
-                        return None;
-                    }
-                    leave = leave.min(span.1);
-                }
-                (leave > front).then_some((k, leave))
+                let (enter, leave) =
+                    hollow.box_holds(front_mm).then(|| hollow.interval(from_mm, to_mm)).flatten()?;
+                (enter <= front + ROUNDING && leave > front).then_some((k, leave))
             });
-            let Some((k, leave)) = next else { return front };
+            let Some((k, leave)) = next else { return false };
             front = leave;
             self.0.swap(carried, k);
             if front >= 1.0 - ROUNDING {
-                return 1.0;
+                return true;
             }
         }
-        front
+        false
     }
 }
 

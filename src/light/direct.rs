@@ -7,25 +7,21 @@
 
 use glam::{DAffine3, DVec2, DVec3, DVec4, Vec3Swizzles, Vec4Swizzles};
 
-use super::cavity::{Cavities, NearHollows};
+use super::cavity::Cavities;
 use super::fresnel;
 use super::lobe::Lobe;
 use super::quadrature::GaussRule;
 use domecast_optics::SensorOptics;
 
-/// Places across the emitter, each way. The emitter is small against its distance from the dome: on thumb24 with three, against 24,
-/// the rule's error is below 1e-5 of the light's largest irradiance where nothing stands in the way. Half behind the lip it is 4e-4
-/// (root mean square) and at most 0.0013, whether three or four.
-pub const PLACES: usize = 3;
+/// Places across the emitter, each way. The emitter is small against its distance from the dome: with four,
+/// the rule's error is below 1e-5 (tested against 64).
+pub const PLACES: usize = 4;
 
 /// Looks along the whole of the emitter at which pieces of a diagonal in sight are distinguished from pieces in the shadow.
 const LOOKS: f64 = 5.0;
 
-/// Halvings between two looks of which one is in sight: the edge is then known to 1/1280 of the emitter.
-const HALVINGS: u32 = 7;
-
-/// Last terms of a series along a diagonal that are left out, parts of the largest: less than what the looks tell of edges.
-const TERMS_END: f64 = 1e-5;
+/// Halvings between two looks of which one is in sight: the edge is then known to 1/2560 of the emitter.
+const HALVINGS: u32 = 9;
 
 /// A square that emits, everywhere alike.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,8 +62,6 @@ pub struct EmitterRule {
     rule: GaussRule,
     /// Barycentric weights of the polynomial through the places.
     weights: Vec<f64>,
-    /// The square's corners, with the weights of the values at all places there.
-    corners: [(DVec2, Vec<f64>); 4],
     diagonals: Vec<Diagonal>,
 }
 
@@ -102,9 +96,7 @@ impl EmitterRule {
             others.map(|(_, (v, _))| 4.0 * (nodes[i].0 - v)).product()
         };
         let weights = (0..nodes.len()).map(|i| 1.0 / product(i)).collect();
-        let mut made = Self { rule, weights, corners: Default::default(), diagonals: Vec::new() };
-        made.corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)]
-            .map(|(u, v)| (DVec2::new(u, v), made.weights_at(u, v).collect()));
+        let mut made = Self { rule, weights, diagonals: Vec::new() };
         let pair = |&(begin, weight): &(f64, f64)| {
             let turn = 1.0 - begin;
             [(begin, 0.0, turn, weight), (begin - 1.0, turn, 1.0, weight)]
@@ -130,197 +122,155 @@ impl EmitterRule {
     fn series(&self, shift: f64, [from, to]: [f64; 2]) -> Vec<Vec<f64>> {
         let terms = 2 * self.nodes().len() - 1;
         let turn = |p: usize| (p as f64 + 0.5) * std::f64::consts::PI / terms as f64;
+        let mut lines = [Vec::new(), Vec::new()];
         let mut series = vec![vec![0.0; self.nodes().len().pow(2)]; terms];
         for p in 0..terms {
             let v = 0.5 * (from + to) + 0.5 * (to - from) * turn(p).cos();
-            let weights: Vec<f64> = self.weights_at(v + shift, v).collect();
+            self.weigh(v + shift, &mut lines[0]);
+            self.weigh(v, &mut lines[1]);
+            let [across, along] = &lines;
             for (k, term) in series.iter_mut().enumerate() {
                 let part = if k == 0 { 1.0 } else { 2.0 * (k as f64 * turn(p)).cos() } / terms as f64;
-                term.iter_mut().zip(&weights).for_each(|(sum, weight)| *sum += part * weight);
+                let weights = across.iter().flat_map(|across| along.iter().map(move |along| across * along));
+                term.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += part * weight);
             }
         }
         series
     }
 
-    /// Weights of the values at all places in the polynomial through them, at a place of the square.
-    fn weights_at(&self, u: f64, v: f64) -> impl Iterator<Item = f64> + use<> {
-        let along = self.weigh(v);
-        self.weigh(u)
-            .into_iter()
-            .flat_map(move |across| along.clone().into_iter().map(move |along| across * along))
-    }
-
-    /// Weights of the values at the places of a line in the polynomial through them, at `v` (J.-P. Berrut and L. N. Trefethen,
-    /// Barycentric Lagrange interpolation, SIAM Review 46, 2004).
-    fn weigh(&self, v: f64) -> Vec<f64> {
+    /// Weights of the values at the places in the polynomial through them, at `v` (J.-P. Berrut and L. N. Trefethen, Barycentric
+    /// Lagrange interpolation, SIAM Review 46, 2004).
+    fn weigh(&self, v: f64, weights: &mut Vec<f64>) {
+        weights.clear();
         if let Some(own) = self.nodes().iter().position(|(place, _)| *place == v) {
-            return (0..self.weights.len()).map(|i| f64::from(u8::from(i == own))).collect();
+            weights.extend((0..self.weights.len()).map(|i| f64::from(u8::from(i == own))));
+            return;
         }
-        let weights = self.weights.iter().zip(self.nodes()).map(|(weight, (place, _))| weight / (v - place));
-        let sum: f64 = weights.clone().sum();
-        weights.map(|weight| weight / sum).collect()
+        weights
+            .extend(self.weights.iter().zip(self.nodes()).map(|(weight, (place, _))| weight / (v - place)));
+        let sum: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|weight| *weight /= sum);
     }
 }
 
-/// What the places of an emitter give a point.
-#[derive(Debug, Default)]
-struct Shares {
-    /// Where each ray meets the sheet's underside and, to a point of the dome, its top, x and y of each, mm; the origin for a
+/// What one place of the emitter gives.
+#[derive(Debug, Clone, Copy, Default)]
+struct Share {
+    /// Where its ray meets the sheet's underside and, to a point of the dome, its top, x and y of each, mm; the origin for a
     /// point of the top itself.
-    crossings_mm: Vec<DVec4>,
-    /// Vector irradiance without the interfaces' losses, and with them; the fourth numbers mean nothing.
-    open: Vec<DVec4>,
-    passed: Vec<DVec4>,
+    crossings_mm: DVec4,
+    flux: DVec3,
 }
 
-/// Vector irradiance at a point, in three steps; mW/mm^2, sensor frame.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Irradiance {
-    /// Through the dome's foot and the sheet's underside, with no losses.
-    pub open: DVec3,
-    /// Less what the interfaces keep (Fresnel).
-    pub passed: DVec3,
-    /// Of that, what the platform leaves.
-    pub left: DVec3,
+impl Share {
+    /// Itself and a part of another.
+    fn and(&self, other: &Self, part: f64) -> Self {
+        Self {
+            crossings_mm: self.crossings_mm + other.crossings_mm * part,
+            flux: self.flux + other.flux * part,
+        }
+    }
 }
 
 impl Diagonal {
-    /// The terms of what the places' values are along it, but for the last ones where they are next to nothing.
-    fn terms(&self, values: &[DVec4], terms: &mut Vec<DVec4>) {
-        terms.clear();
-        terms.extend(self.series.iter().map(|term| weighted(term, values)));
-        let size = |term: &DVec4| term.abs().max_element();
-        let min = TERMS_END * terms.iter().map(size).fold(0.0, f64::max);
-        terms.truncate(terms.iter().rposition(|term| size(term) > min).map_or(1, |last| last + 1));
+    /// The terms of what the places' shares are along it.
+    fn terms<'a>(&'a self, all: &'a [Share]) -> impl Iterator<Item = Share> + 'a {
+        let sum = move |term: &Vec<f64>| {
+            term.iter().zip(all).fold(Share::default(), |sum, (part, share)| sum.and(share, *part))
+        };
+        self.series.iter().map(sum)
     }
 
     /// What the terms sum to at a place (C. W. Clenshaw's recurrence).
-    fn at(&self, terms: &[DVec4], v: f64) -> DVec4 {
+    fn at(&self, terms: &[Share], v: f64) -> Share {
         let [from, to] = self.ends;
         let x = (2.0 * v - from - to) / (to - from);
-        let Some((first, others)) = terms.split_first() else { return DVec4::ZERO };
-        let (mut next, mut after) = (DVec4::ZERO, DVec4::ZERO);
+        let Some((first, others)) = terms.split_first() else { return Share::default() };
+        let (mut next, mut after) = (Share::default(), Share::default());
         for term in others.iter().rev() {
-            (next, after) = (*term + next * (2.0 * x) - after, next);
+            (next, after) = (term.and(&next, 2.0 * x).and(&after, -1.0), next);
         }
-        *first + next * x - after
+        first.and(&next, x).and(&after, -1.0)
     }
-}
-
-fn weighted(weights: &[f64], values: &[DVec4]) -> DVec4 {
-    weights.iter().zip(values).fold(DVec4::ZERO, |sum, (weight, value)| sum + *value * *weight)
 }
 
 /// The flux of the whole square.
-fn whole(rule: &EmitterRule, fluxes: &[DVec4]) -> DVec3 {
+fn whole(rule: &EmitterRule, all: &[Share]) -> DVec3 {
     let nodes = rule.nodes();
     let weights = nodes.iter().flat_map(|(_, across)| nodes.iter().map(move |(_, along)| across * along));
-    fluxes.iter().zip(weights).map(|(flux, weight)| flux.xyz() * weight).sum()
+    all.iter().zip(weights).map(|(share, weight)| share.flux * weight).sum()
 }
 
-/// What lies between the places of an emitter and a point.
-struct Sight<'a, P> {
-    light: &'a DirectLight<'a>,
-    /// Where a place of the unit square is.
-    place: P,
-    /// Height of the sheet's underside, mm.
-    underside_z_mm: f64,
-    hollows: Option<NearHollows<'a>>,
-}
-
-impl<P: Fn(DVec2) -> DVec3> Sight<'_, P> {
-    /// The ends of a ray below the sheet.
-    fn ray(&self, place: DVec2, crossings_mm: DVec4) -> (DVec3, DVec3) {
-        ((self.place)(place), crossings_mm.xy().extend(self.underside_z_mm))
+/// The flux of what is in sight of the square, of its places' shares; `is_free` is given a place of it and its ray's crossings.
+fn in_sight(rule: &EmitterRule, all: &[Share], is_free: &mut dyn FnMut(f64, f64, DVec4) -> bool) -> DVec3 {
+    let (mut terms, mut looked) = (Vec::new(), Vec::new());
+    let mut sum = DVec3::ZERO;
+    let mut is_whole = true;
+    for diagonal in &rule.diagonals {
+        terms.clear();
+        terms.extend(diagonal.terms(all));
+        let mut free = |v: f64| is_free(v + diagonal.shift, v, diagonal.at(&terms, v).crossings_mm);
+        looked.clear();
+        looked.extend(diagonal.looks.iter().map(|v| (*v, free(*v))));
+        is_whole &= looked.iter().all(|(_, free)| *free);
+        pieces_in_sight(&looked, free, |low, high| {
+            for (v, up) in rule.rule.over(low, high) {
+                sum += diagonal.at(&terms, v).flux * (diagonal.weight * up);
+            }
+        });
     }
-
-    /// The flux of what is in sight of the square.
-    fn flux(&mut self, rule: &EmitterRule, shares: &Shares) -> DVec3 {
-        let crossings = shares.crossings_mm.as_slice();
-        // Sheet, foot and hollows are convex: what lets the rays of the four corners pass together lets all others pass.
-        let corners = rule.corners.each_ref().map(|(place, weights)| (*place, weighted(weights, crossings)));
-        let enter = corners.iter().all(|(_, at_mm)| self.light.enters(*at_mm));
-        let rays = corners.map(|(place, at_mm)| self.ray(place, at_mm));
-        let together = self.hollows.as_mut().map_or(1.0, |hollows| hollows.free_to(&rays, 0.0));
-        if enter && together >= 1.0 {
-            return whole(rule, &shares.passed);
-        }
-        let mut is_free = |place: DVec2, at_mm: DVec4| {
-            let ray = self.ray(place, at_mm);
-            (enter || self.light.enters(at_mm))
-                && self.hollows.as_mut().is_none_or(|hollows| hollows.free_to(&[ray], together) >= 1.0)
-        };
-        let (mut terms, mut fluxes, mut looked) = (Vec::new(), Vec::new(), Vec::new());
-        let mut sum = DVec3::ZERO;
-        let mut is_whole = true;
-        for diagonal in &rule.diagonals {
-            diagonal.terms(crossings, &mut terms);
-            let mut free = |v: f64| is_free(DVec2::new(v + diagonal.shift, v), diagonal.at(&terms, v));
-            looked.clear();
-            looked.extend(diagonal.looks.iter().map(|v| (*v, free(*v))));
-            is_whole &= looked.iter().all(|(_, free)| *free);
-            fluxes.clear();
-            pieces_in_sight(&looked, free, |low, high| {
-                if fluxes.is_empty() {
-                    diagonal.terms(&shares.passed, &mut fluxes);
-                }
-                for (v, up) in rule.rule.over(low, high) {
-                    sum += diagonal.at(&fluxes, v).xyz() * (diagonal.weight * up);
-                }
-            });
-        }
-        if is_whole { whole(rule, &shares.passed) } else { sum }
-    }
+    if is_whole { whole(rule, all) } else { sum }
 }
 
 impl DirectLight<'_> {
     /// Vector irradiance at a point of the dome or the sheet's top, mW/mm^2, sensor frame. Its product with the
     /// unit normal *away from* the light is the irradiance.
-    pub fn vector_irradiance(&self, emitter: &Emitter, point_mm: DVec3, rule: &EmitterRule) -> DVec3 {
-        self.irradiance(emitter, point_mm, rule).left
-    }
-
-    /// [`DirectLight::vector_irradiance`] with the steps that lead to it.
     ///
     /// The rays from the rule's places are solved. Between them, flux and way are smooth, and the polynomial through the places
-    /// interpolates both: so the platform's shadow is cut without another solve. Hollows, sheet and foot are convex: where they
-    /// let the rays of the square's corners pass together, they let all others pass.
-    pub fn irradiance(&self, emitter: &Emitter, point_mm: DVec3, rule: &EmitterRule) -> Irradiance {
+    /// interpolates both: so the platform's shadow is cut without another solve.
+    pub fn vector_irradiance(&self, emitter: &Emitter, point_mm: DVec3, rule: &EmitterRule) -> DVec3 {
         let side = 2.0 * emitter.half_side_mm;
         let pose = &emitter.platform_from_emitter;
-        let place = |at: DVec2| pose.transform_point3(((at - 0.5) * side).extend(0.0));
+        let place =
+            |u: f64, v: f64| pose.transform_point3(DVec3::new((u - 0.5) * side, (v - 0.5) * side, 0.0));
         let indices = self.indices(point_mm.z);
-        let mut shares = Shares::default();
+        let mut all = Vec::with_capacity(rule.nodes().len() * rule.nodes().len());
         let (mut near, mut low, mut high) = (0.0, DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &(u, _) in rule.nodes() {
             for &(v, _) in rule.nodes() {
-                let source = place(DVec2::new(u, v));
-                let share = self.share(emitter, (source, point_mm), &indices, &mut near, &mut shares);
-                let Some(underside_mm) = share else { return Irradiance::default() };
+                let source = place(u, v);
+                let Some((share, underside_mm)) = self.share(emitter, source, point_mm, &indices, &mut near)
+                else {
+                    return DVec3::ZERO;
+                };
+                all.push(share);
                 for end in [source, underside_mm] {
                     (low, high) = (low.min(end), high.max(end));
                 }
             }
         }
+        let open = if self.cavities.is_some() { self.through_platform } else { 1.0 };
+        let mut sum = DVec3::ZERO;
         // The sheet's underside lies over all emitters.
-        let mut sight = Sight { light: self, place, underside_z_mm: high.z, hollows: None };
-        let passed = sight.flux(rule, &shares);
-        let mut left = passed;
-        if let Some(cavities) = self.cavities.filter(|_| self.through_platform < 1.0) {
+        let underside_z_mm = high.z;
+        let mut gather = |part: f64, is_free: &mut dyn FnMut(DVec3, DVec3) -> bool| {
+            let mut reaches = |u: f64, v: f64, at_mm: DVec4| {
+                self.enters(at_mm.xy())
+                    && self.is_in_foot(at_mm.zw())
+                    && is_free(place(u, v), at_mm.xy().extend(underside_z_mm))
+            };
+            sum += part * in_sight(rule, &all, &mut reaches);
+        };
+        if open > 0.0 {
+            gather(open, &mut |_, _| true);
+        }
+        if let Some(cavities) = self.cavities.filter(|_| open < 1.0) {
             // The emitter's corners lie a little beyond the rule's places.
             let beyond = DVec3::splat(emitter.half_side_mm);
-            sight.hollows = Some(cavities.near(low - beyond, high + beyond));
-            left = sight.flux(rule, &shares).lerp(passed, self.through_platform);
+            let mut hollows = cavities.near(low - beyond, high + beyond);
+            gather(1.0 - open, &mut |source, end| hollows.is_free(source, end));
         }
-        // Without the interfaces' losses as much is hidden.
-        let all = whole(rule, &shares.passed).length();
-        let seen = if all > 0.0 { passed.length() / all } else { 0.0 };
-        let open = whole(rule, &shares.open) * seen;
-        Irradiance {
-            open: open * emitter.flux_mw,
-            passed: passed * emitter.flux_mw,
-            left: left * emitter.flux_mw,
-        }
+        sum * emitter.flux_mw
     }
 
     /// The media from the air to the point.
@@ -331,36 +281,38 @@ impl DirectLight<'_> {
         layers[..count].iter().map(|layer| layer.index_for(channel)).collect()
     }
 
-    /// Whether a ray with these crossings comes in through the sheet and, on its way to the silicone, the dome's foot.
-    fn enters(&self, crossings_mm: DVec4) -> bool {
-        crossings_mm.xy().abs().cmple(self.sheet_half_mm).all()
-            && crossings_mm.zw().length() <= self.optics.dome().rim_radius_mm()
+    /// Whether a place of the plane of the sheet's underside is the sheet's.
+    fn enters(&self, underside_mm: DVec2) -> bool {
+        underside_mm.abs().cmple(self.sheet_half_mm).all()
     }
 
-    /// Adds what a place of the emitter sends to a point, and says where its ray meets the sheet's underside; `None` where no ray
-    /// leads there. `near` is a neighbour's tangent.
+    /// Whether a place of the plane of the sheet's top lies under the dome: only there light goes on into the silicone.
+    fn is_in_foot(&self, top_mm: DVec2) -> bool {
+        top_mm.length() <= self.optics.dome().rim_radius_mm()
+    }
+
+    /// What a place of the emitter sends to a point, and where its ray meets the sheet's underside; `None` where no ray leads
+    /// there. `near` is a neighbour's tangent.
     fn share(
         &self,
         emitter: &Emitter,
-        (source, point_mm): (DVec3, DVec3),
+        source: DVec3,
+        point_mm: DVec3,
         indices: &[f64],
         near: &mut f64,
-        shares: &mut Shares,
-    ) -> Option<DVec3> {
+    ) -> Option<(Share, DVec3)> {
         let tube = self.optics.light_tube(source, point_mm, *near).ok()?;
         *near = tube.tangent;
         let per_sr = emitter.lobe.per_sr(tube.leaving.dot(emitter.platform_from_emitter.matrix3.z_axis));
         let passed = if self.fresnel { fresnel::through(indices, tube.snell_invariant) } else { 1.0 };
-        let open = (tube.arriving * (per_sr * tube.sr_per_mm2)).extend(0.0);
+        let flux = tube.arriving * (per_sr * passed * tube.sr_per_mm2);
         let top_mm = if point_mm.z > 0.0 {
             point_mm - tube.arriving * (point_mm.z / tube.arriving.z)
         } else {
             DVec3::ZERO
         };
-        shares.crossings_mm.push(tube.underside_mm.xy().extend(top_mm.x).extend(top_mm.y));
-        shares.open.push(open);
-        shares.passed.push(open * passed);
-        Some(tube.underside_mm)
+        let crossings_mm = tube.underside_mm.xy().extend(top_mm.x).extend(top_mm.y);
+        Some((Share { crossings_mm, flux }, tube.underside_mm))
     }
 }
 

@@ -37,8 +37,7 @@ impl Lobe {
     /// between the half-intensity directions). `exponent` at least 0.
     pub fn cosine_power(exponent: f64) -> Self {
         let m = exponent.max(0.0);
-        let intensity = |i| (m + 1.0) / TAU * (f64::from(i) / TABLE as f64).powf(m);
-        Self { table: (0..=TABLE as u32).map(intensity).collect(), flux: 1.0 }
+        Self::from_intensity(|cos| (m + 1.0) / TAU * cos.powf(m), 1.0)
     }
 
     /// This lobe behind a diffuser that lies across its axis.
@@ -64,17 +63,18 @@ impl Lobe {
             .collect();
         let a = diffuser.lambert_fraction;
         let share = diffuser.transmittance;
-        // A Gaussian lobe is one of the cosine, as wide as the square of its angle, and smooth.
-        let every = ((TABLE as f64 * width * width / 16.0) as usize).clamp(1, 16).next_power_of_two() / 2;
-        let lobe = |i: usize| {
-            let cos = i as f64 / TABLE as f64;
-            sources.iter().map(|&(from, power)| power * mean(from, cos)).sum()
-        };
-        let lobe = filled(lobe, every.max(1));
-        let behind = |(i, lobe): (usize, &f64)| {
-            share * (i as f64 / TABLE as f64) * (a * self.flux / PI + (1.0 - a) * lobe)
-        };
-        Self { table: lobe.iter().enumerate().map(behind).collect(), flux: self.flux * share }
+        Self::from_intensity(
+            |cos| {
+                let lobe: f64 = sources.iter().map(|&(from, power)| power * mean(from, cos)).sum();
+                share * cos * (a * self.flux / PI + (1.0 - a) * lobe)
+            },
+            self.flux * share,
+        )
+    }
+
+    fn from_intensity(intensity: impl Fn(f64) -> f64 + Sync, flux: f64) -> Self {
+        let table = (0..=TABLE).into_par_iter().map(|i| intensity(i as f64 / TABLE as f64)).collect();
+        Self { table, flux }
     }
 
     /// Intensity in a direction with this cosine to the axis, 1/sr; nothing goes backwards.
@@ -100,20 +100,6 @@ impl Lobe {
         let ends = 0.5 * (self.table[0] + self.table[TABLE]);
         TAU / TABLE as f64 * (ends + self.table[1..TABLE].iter().sum::<f64>())
     }
-}
-
-/// The values of a smooth function at all places of the table, from those at every so many; cubics through four lead from one to the
-/// next.
-fn filled(value: impl Fn(usize) -> f64 + Sync, every: usize) -> Vec<f64> {
-    let known: Vec<f64> = (0..=TABLE / every).into_par_iter().map(|k| value(k * every)).collect();
-    let at = |i: usize| {
-        let first = (i / every).saturating_sub(1).min(known.len() - 4);
-        let t = i as f64 / every as f64 - first as f64;
-        let [a, b, c, d] = [t, t - 1.0, t - 2.0, t - 3.0];
-        let weights = [b * c * d / -6.0, a * c * d / 2.0, a * b * d / -2.0, a * b * c / 6.0];
-        weights.iter().zip(&known[first..]).map(|(weight, value)| weight * value).sum()
-    };
-    (0..=TABLE).map(at).collect()
 }
 
 /// The Gaussian of the angle between two directions with the given cosines to the axis, averaged over the

@@ -108,21 +108,17 @@ impl DomeRoom {
         let mut mirror = vec![0.0; rings.rings * rings.rings * rings.patches];
         let of_sphere = if rings.face.has_wall() { 0.0 } else { dome.height_mm() / dome.radius_mm() };
         if underside != Underside::Dark {
-            let place =
-                |to: usize, from: usize, shift: usize| (to * rings.rings + from) * rings.patches + shift;
-            for (to, from) in (0..rings.rings).flat_map(|to| (0..=to).map(move |from| (to, from))) {
+            for to in 0..rings.rings {
                 let target = rings.place(to, 0);
                 let (at_mm, normal) = (on_dome(&dome, target), rings.face.normal(target));
-                let mut near = 0.0;
-                // Ways are the same both ways, and to either side.
-                for shift in 0..=rings.patches / 2 {
-                    let source = rings.place(from, shift);
-                    let (value, tangent) = mirrored(optics, source, at_mm, normal, underside, near);
-                    near = tangent;
-                    for other in [shift, (rings.patches - shift) % rings.patches] {
-                        for (to, from) in [(to, from), (from, to)] {
-                            mirror[place(to, from, other)] = value * patch_mm2(rings, &dome);
-                        }
+                for from in 0..rings.rings {
+                    let mut near = 0.0;
+                    for shift in 0..rings.patches {
+                        let source = rings.place(from, shift);
+                        let (value, tangent) = mirrored(optics, source, at_mm, normal, underside, near);
+                        near = tangent;
+                        mirror[(to * rings.rings + from) * rings.patches + shift] =
+                            value * patch_mm2(rings, &dome);
                     }
                 }
             }

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::cavity::Cavities;
-use super::direct::{DirectLight, Emitter, EmitterRule, Irradiance};
+use super::direct::{DirectLight, Emitter, EmitterRule};
 use super::dome_map::{DomeFace, DomeGrid, bicubic};
 use super::radiosity::{DomeRoom, Rings, Underside};
 use super::shelf::Shelf;
@@ -55,11 +55,6 @@ pub struct Ways {
 impl Ways {
     /// Vector irradiance of one source at a point, for a flux of one, 1/mm^2.
     pub fn flux(&self, source: &Source, point_mm: DVec3, rule: &EmitterRule) -> DVec3 {
-        self.irradiance(source, point_mm, rule).left
-    }
-
-    /// The same with the steps that lead to it.
-    pub fn irradiance(&self, source: &Source, point_mm: DVec3, rule: &EmitterRule) -> Irradiance {
         let light = DirectLight {
             optics: &source.optics,
             cavities: self.cavities.as_ref(),
@@ -67,7 +62,7 @@ impl Ways {
             sheet_half_mm: self.sheet_half_mm,
             fresnel: self.fresnel,
         };
-        light.irradiance(&source.emitter, point_mm, rule)
+        light.vector_irradiance(&source.emitter, point_mm, rule)
     }
 
     /// Radius of the dome, mm.

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::direct::{EmitterRule, Irradiance};
+use super::direct::EmitterRule;
 use super::parts::LightUse;
 use super::radiosity::{DomeRoom, Rings, Underside};
 use super::setup::{self, Channels};
@@ -32,7 +32,7 @@ const BESIDE_PX: f64 = 4.0;
 pub(super) type Fluxes = [DVec3; 8];
 
 /// A place that the light is known at.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Sample {
     pub place: DVec3,
     /// The normal that counts: a marker's and a resting membrane's; `None` where it may be any.
@@ -75,48 +75,46 @@ pub(super) fn samples(scene: &Scene) -> Result<Arc<Samples>, SimError> {
 
 impl Samples {
     fn new(scene: &Scene, moved: bool) -> Result<Self, SimError> {
-        let of = |diffuser: bool| setup::ways(scene, &LightUse { diffuser, ..LightUse::ALL });
-        let ways = [of(false)?, of(true)?];
-        let [bare, _] = &ways;
-        let (face, dome) = (bare.face(), bare.optics[1].dome());
+        let cases = cases(scene)?;
+        let open = &cases[0][0];
+        let (face, dome) = (open.face(), open.optics[1].dome());
         let rings = Rings { face, ..RINGS };
-        let room = |underside| bare.optics.iter().map(|o| DomeRoom::new(o, rings, underside)).collect();
+        let room = |underside| open.optics.iter().map(|o| DomeRoom::new(o, rings, underside)).collect();
         let rooms: [Vec<DomeRoom>; 2] = [room(Underside::Dark), room(Underside::Fresnel)];
         let rule = EmitterRule::with_places(PLACES);
         let fluxes = |place: DVec3| -> Vec<Fluxes> {
-            (0..bare.sources.len()).map(|i| fluxes(&ways, i, place, &rule)).collect()
+            (0..open.sources.len()).map(|i| fluxes(&cases, i, place, &rule)).collect()
         };
-        let directions = directions(bare);
+        let directions = directions(open);
         let depths: &[f64] = if moved { &DEPTHS } else { &DEPTHS[..1] };
-        let mut places: Vec<(DVec3, DVec3, usize)> = Vec::new();
-        for part in depths {
+        let mut places: Vec<(DVec3, Option<DVec3>, usize)> = Vec::new();
+        for (depth, part) in depths.iter().enumerate() {
             for (direction, patch) in &directions {
                 // The rim is bonded: a point moves by less than it stands above the sheet.
                 let above = dome.center_mm().z + direction.z * dome.radius_mm();
-                let place = bare.point(*direction, part.max(1.0 - above / dome.radius_mm()));
-                places.push((place, face.normal(*direction), *patch));
+                let place = open.point(*direction, part.max(1.0 - above / dome.radius_mm()));
+                // A membrane that is moved has any normal, there and about it.
+                places.push((place, (depth == 0).then_some(face.normal(*direction)), *patch));
+                if moved && depth == 0 {
+                    places.push((place, None, *patch));
+                }
             }
         }
-        let on_dome = |(place, normal, patch): (DVec3, DVec3, usize)| Sample {
+        // The patches and the pole first, in their order.
+        places.sort_by_key(|(_, normal, _)| normal.is_none());
+        let on_dome = |(place, normal, patch): (DVec3, Option<DVec3>, usize)| Sample {
             place,
-            normal: Some(normal),
+            normal,
             patch,
             beside: None,
             flux: fluxes(place),
         };
         let mut list: Vec<Sample> = places.into_par_iter().map(on_dome).collect();
-        if moved {
-            // A membrane that is moved has any normal, there and about it.
-            let mut any: Vec<Sample> =
-                list.iter().map(|sample| Sample { normal: None, ..sample.clone() }).collect();
-            list.truncate(directions.len());
-            list.append(&mut any);
-        }
         let ones = vec![1.0; RINGS.count()];
         for marker in scene.markers() {
             let place = marker.position_mm;
             let beside: Vec<f64> =
-                rooms[1].iter().zip(&bare.optics).map(|(room, o)| room.beside(o, &ones, place)).collect();
+                rooms[1].iter().zip(&open.optics).map(|(room, o)| room.beside(o, &ones, place)).collect();
             list.push(Sample {
                 place,
                 normal: Some(DVec3::Z),
@@ -129,13 +127,28 @@ impl Samples {
     }
 }
 
-/// Fluxes of a source at a place, bare and behind the tape. The shadow is solved with the faces' losses; without them as much is
-/// hidden.
-fn fluxes(ways: &[Ways; 2], i: usize, place: DVec3, rule: &EmitterRule) -> Fluxes {
+/// A source's ways to a place: free, through the faces, and past the platform as well; bare and behind the tape.
+type Cases = [[Ways; 3]; 2];
+
+fn cases(scene: &Scene) -> Result<Cases, SimError> {
+    let cavities = setup::cavities(scene.design())?;
+    let of = |diffuser: bool| -> Result<[Ways; 3], SimError> {
+        let used = LightUse { diffuser, fresnel: false, platform_shadow: false, ..LightUse::ALL };
+        let open = setup::ways(scene, &used)?;
+        let passed = Ways { fresnel: true, ..open.clone() };
+        let left = Ways { cavities: Some(cavities.clone()), ..passed.clone() };
+        Ok([open, passed, left])
+    };
+    Ok([of(false)?, of(true)?])
+}
+
+/// Fluxes of a source at a place. The shadow is solved with the faces' losses; without them as much is hidden.
+fn fluxes(cases: &Cases, i: usize, place: DVec3, rule: &EmitterRule) -> Fluxes {
     let mut out = [DVec3::ZERO; 8];
-    for (ways, out) in ways.iter().zip(out.chunks_exact_mut(4)) {
-        let Some(source) = ways.sources.get(i) else { continue };
-        let Irradiance { open, passed, left } = ways.irradiance(source, place, rule);
+    for (case, out) in cases.iter().zip(out.chunks_exact_mut(4)) {
+        let [open, passed, left] = case
+            .each_ref()
+            .map(|w| w.sources.get(i).map_or(DVec3::ZERO, |source| w.flux(source, place, rule)));
         let share = if passed.length() > 0.0 { left.length() / passed.length() } else { 0.0 };
         out.copy_from_slice(&[open, open * share, passed, left]);
     }

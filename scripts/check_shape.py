@@ -107,6 +107,8 @@ def check_deviations():
             continue
         mean = np.mean(shares, axis=0)
         check(f"{design}: sd from both sides", all(np.abs(mean - SHARES) <= DESIGN), shown(mean))
+    if not deviations:
+        return
     mean = np.mean([share for shares in deviations.values() for share in shares], axis=0)
     check("all: sd from both sides", all(np.abs(mean - SHARES) <= ALL), shown(mean))
 
@@ -116,6 +118,12 @@ def run(*words):
     if done.returncode:
         sys.exit(f"{' '.join(map(str, words))}\n{done.stdout}{done.stderr}")
     return done.stdout
+
+
+def built_constants(domecast, work, design):
+    if not (work / design).exists():
+        run(domecast, "build", ROOT / f"designs/{design}.json", "--out", work / design, "--quiet")
+    return work / design / "constants/constants.json"
 
 
 def simulate(domecast, folder, design, objects):
@@ -302,21 +310,48 @@ def faults(domecast, work, dome, constants):
     refused("constants without light", "light is not in", "--constants", truth / "old.json", "--rest", truth / "swapped.png")
 
 
-def untouched(domecast, work, design, constants, count):
-    """Frames of the untouched sensor, beside a frame at rest with noise of its own: how many state a touch."""
-    picture = drawn(simulate(domecast, work / f"{design}-rest", design, None))
-    frames, still = work / f"{design}-untouched", work / f"{design}-untouched-rest.png"
-    frames.mkdir(exist_ok=True)
-    for number in range(count):
-        cv2.imwrite(str(frames / f"frame_{number:04}.png"), photograph(picture, 100 + number, False))
-    cv2.imwrite(str(still), photograph(picture, 99, False))
-    lines = run(domecast, "track", frames, "--constants", constants, "--shape", work / f"{design}-untouched-shape",
-                "--rest", still, "--force").splitlines()
-    # some 60 MB of maps a frame
-    shutil.rmtree(work / f"{design}-untouched-shape")
-    stated = [line["contact"] for line in map(json.loads, lines) if line.get("contact")]
-    check(f"{design}: untouched", len(lines) >= count and not stated,
-          f"{len(stated)} touches in {count} frames" + "".join(f", {c['depth_mm']:.3f} mm deep" for c in stated[:3]))
+# Presses of a sequence of frames on two designs whose light is scarce in places, where errors that go on from frame to frame grow; and how many
+# of twelve untouched frames state a touch at most: on thumb24-wide heights about 70 degrees are off by more than their deviations.
+SCARCE = {
+    "endoscope-r5": (lambda d: ball(2, 15, 60, 0.25, d), 0),
+    "thumb24-wide": (lambda d: ball(4, 20, 60, 0.4, d), 2),
+}
+# Shares of their untouched frames: heights are up to half as far off again as their deviations say.
+UNTOUCHED = 0.25
+
+
+def sequence(domecast, work, design, constants, press, count, most):
+    """Frames in a row beside a frame at rest with noise of its own: untouched ones, one picture again and again, a touch that stays, its release."""
+    dome, jpeg = dome_of(constants), False
+    rest, truth = simulate(domecast, work / f"{design}-rest", design, None), simulate(domecast, work / f"{design}-held", design, press(dome))
+    frames, still, shape = work / f"{design}-sequence", work / f"{design}-sequence-rest.png", work / f"{design}-sequence-shape"
+    shutil.rmtree(frames, ignore_errors=True)
+    frames.mkdir()
+    parts = {"untouched": [(rest, 100 + k) for k in range(count)], "again": [(rest, 100)] * count,
+             "held": [(truth, 200)] * 4, "released": [(rest, 100)] * 3}
+    for number, (picture, seed) in enumerate(frame for part in parts.values() for frame in part):
+        cv2.imwrite(str(frames / f"frame_{number:04}.png"), photograph(drawn(picture), seed, jpeg))
+    cv2.imwrite(str(still), photograph(drawn(rest), 99, jpeg))
+    lines = [json.loads(line) for line in run(domecast, "track", frames, "--constants", constants, "--shape", shape,
+                                              "--rest", still, "--force").splitlines()]
+    rms, shares, number, stated = {}, [], 0, {}
+    for part, pictures in parts.items():
+        stated[part] = sum(bool(line.get("contact")) for line in lines[number:number + len(pictures)])
+        for picture, _ in pictures:
+            e = errors(picture, shape, dome, number)
+            here = e["known"] & (e["polar"] <= 60)
+            rms.setdefault(part, []).append(np.sqrt(np.mean(e["off"][here] ** 2)))
+            if part == "untouched":
+                shares.append(within((np.abs(e["off"]) / e["sd"])[here]))
+            number += 1
+    # some 10 MB of maps a frame
+    shutil.rmtree(shape)
+    check(f"{design}: untouched", len(lines) == number and stated["untouched"] <= most and not stated["released"],
+          f"{stated['untouched']} touches in {count} frames, {stated['released']} in 3 after a release")
+    mean = np.mean(shares[count // 2:], axis=0)
+    check(f"{design}: sd of untouched frames in a row", all(mean >= np.array(SHARES) - (UNTOUCHED if design in SCARCE else ONE)), f"{shown(mean)}, from frame {count // 2} on")
+    for part, before in (("again", rms["untouched"][0]), ("held", rms["held"][0]), ("released", rms["untouched"][0])):
+        check(f"{design}: a frame {part}", stated["held"] == 4 and rms[part][-1] <= 1.2 * before, f"rms {before:.4f} to {rms[part][-1]:.4f} mm")
 
 
 def pillar(domecast, work):
@@ -355,17 +390,17 @@ def main():
         for design, presses in PRESSES.items():
             if arguments.only not in (None, design):
                 continue
-            built = work / design
-            if not built.exists():
-                run(arguments.domecast, "build", ROOT / f"designs/{design}.json", "--out", built, "--quiet")
-            constants = built / "constants/constants.json"
+            constants = built_constants(arguments.domecast, work, design)
             dome = dome_of(constants)
             for name, objects in list(presses.items())[: 1 if arguments.quick else None]:
                 judge(arguments.domecast, work, design, name, objects(dome), dome, constants)
-            untouched(arguments.domecast, work, design, constants, 4 if arguments.quick else 16)
+            sequence(arguments.domecast, work, design, constants, next(iter(presses.values())), 4 if arguments.quick else 16, 0)
             if design == "thumb24":
                 pillar(arguments.domecast, work)
                 faults(arguments.domecast, work, dome, constants)
+        for design, (press, most) in list(SCARCE.items())[: 1 if arguments.quick else None]:
+            if arguments.only in (None, design):
+                sequence(arguments.domecast, work, design, built_constants(arguments.domecast, work, design), press, 12, most)
     check_deviations()
     sys.exit(1 if failed else 0)
 

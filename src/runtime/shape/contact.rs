@@ -21,7 +21,7 @@ const SIDE: usize = 128;
 /// Depth from which on a touch is looked for, mm, and in deviations of the depth: a dome has some thousand places of a touch's size that
 /// err apart from each other, of which one in a hundred pictures lies five deviations too deep (one in 3.5 million does), and four in
 /// every tenth.
-const MIN_DEPTH_MM: f32 = 0.015;
+pub(super) const MIN_DEPTH_MM: f32 = 0.015;
 const MIN_DEPTH_SDS: f32 = 5.0;
 
 /// The chart reaches this much farther than where the skin is pressed in by a fifth of the depth.

@@ -4,7 +4,7 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::cells::{Cells, View};
-use super::contact::Chart;
+use super::contact::{Chart, MIN_DEPTH_MM};
 use super::deviation::Deviations;
 use super::error::ShapeError;
 use super::fill::{Pyramid, Weighted};
@@ -222,6 +222,10 @@ impl ShapeFromColor {
         let (shifts, gain) = (&mut self.shifts, &mut self.gain);
         rest.at_pose(&self.cells, &self.view, &self.rest_seen, shifts, self.is_rigid, gain);
         self.check_colours()?;
+        // Where the last frame's skin was hardly moved this one is read at rest: errors of the one would be read into the next and grow.
+        self.last_mm.clone_from(&self.moved_mm);
+        let min_mm = f64::from(MIN_DEPTH_MM);
+        self.moved_mm.iter_mut().for_each(|moved| *moved -= moved.clamp(-min_mm, min_mm));
         let mut status = SolveStatus::default();
         for pass in 0..self.options.max_passes {
             self.choose(pass == 0);
@@ -229,7 +233,12 @@ impl ShapeFromColor {
             self.read_normals();
             let spans = &self.view.spans;
             self.pyramid.fill_within(self.cells.width, &mut self.tilt, |row| spans[row].clone());
-            self.last_mm.clone_from(&self.moved_mm);
+            if pass == 0 {
+                // The solve begins at the last frame's skin all the same.
+                std::mem::swap(&mut self.moved_mm, &mut self.last_mm);
+            } else {
+                self.last_mm.clone_from(&self.moved_mm);
+            }
             status = self.integrate();
             let is_still = |(now, last): (&f64, &f64)| (now - last).abs() < STILL_MM;
             if self.moved_mm.iter().zip(&self.last_mm).all(is_still) {

@@ -16,6 +16,7 @@ import tempfile
 import cv2
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 NOISE_LEVELS = 2.0
@@ -56,7 +57,7 @@ def edge(depth, dome):
     top = dome["center_z"] + dome["radius"]
     return [{"name": "edge", "shape": {"kind": "box", "size_mm": size},
              "path": [{"time_s": 0, "position_mm": [0, 0, top - depth + 1.5 * np.sqrt(2)],
-                       "rotation_deg": [45, 0, 20]}]}]
+                       "rotation_deg": Rotation.from_euler("ZX", [20, 45], degrees=True).as_rotvec(degrees=True).tolist()}]}]
 
 
 # Height to 45 degrees (rms, 99 of 100) and to 60 (rms), mm; normals to 45, degrees rms. The last two designs' lights leave part

@@ -5,11 +5,11 @@
 //! and as noisy. It ends where the touch does, with a steep edge, while the depth goes on smoothly for long. The depth is laid
 //! out about the deepest place by the stereographic projection, which keeps circles.
 
-use glam::{DMat2, DVec2, DVec3, Vec2, Vec3A};
-use nalgebra::{SMatrix, SVector};
+use glam::{DVec3, Vec2, Vec3A};
 use rayon::prelude::*;
 
 use super::cells::{Cells, View};
+use super::curvature::Touch;
 use super::fill::{Pyramid, Weighted};
 use super::fourier::Fourier;
 use super::rows::{MIN_ROWS, share};
@@ -58,6 +58,17 @@ pub struct SkinContact {
     /// Principal curvatures of the skin at the deepest place, 1/mm, the larger first: positive where it is hollow, as under a
     /// ball. `None` where the touch is too small to tell.
     pub curvatures_per_mm: Option<[f64; 2]>,
+    /// The line along which an edge, a rod or a ridge presses. `None` where curvatures do not clearly differ, as under a ball.
+    pub edge: Option<ContactEdge>,
+}
+
+/// The line of an edge at the deepest place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactEdge {
+    /// Along it, tangent to the skin, of unit length; of its two ways the one whose x is not negative. Sensor frame.
+    pub direction: DVec3,
+    /// Standard deviation of its angle, rad.
+    pub sd_rad: f64,
 }
 
 /// The chart of one touch, and room for it, kept between frames.
@@ -217,6 +228,7 @@ impl Chart {
         normals: &[Vec3A],
         depths: &[f32],
         pressures: &[f32],
+        sds_mm: &[f32],
     ) -> Option<(SkinContact, usize)> {
         let touched = (0..depths.len()).filter(|cell| pressures[*cell] > 1.0 && depths[*cell].is_finite());
         let deepest = touched.min_by(|a, b| depths[*a].total_cmp(&depths[*b]))?;
@@ -228,15 +240,18 @@ impl Chart {
             normal += load * normals[cell].as_dvec3();
         }
         let area_mm2 = self.area_mm2();
+        let touch = Touch { points, normals, pressures, at: deepest };
+        let (radius_mm, depth_sd_mm) = ((area_mm2 / std::f64::consts::PI).sqrt(), f64::from(sds_mm[deepest]));
         let contact = SkinContact {
             area_mm2,
             point_mm: point / sum,
             normal: normal.normalize_or_zero(),
             deepest_mm: points[deepest].as_dvec3(),
             depth_mm: f64::from(-depths[deepest]),
-            depth_sd_mm: f64::NAN,
+            depth_sd_mm,
             outline_px: Vec::new(),
-            curvatures_per_mm: curvatures(points, normals, pressures, deepest, area_mm2),
+            curvatures_per_mm: touch.bend(0.5 * radius_mm).map(|bend| bend.per_mm),
+            edge: touch.edge(radius_mm, f64::from(MIN_DEPTH_SDS) * depth_sd_mm),
         };
         Some((contact, deepest))
     }
@@ -245,50 +260,4 @@ impl Chart {
 /// Whether a depth is that of a touch.
 pub(super) fn is_pressed(depth_mm: f32, sd_mm: f32) -> bool {
     depth_mm < -MIN_DEPTH_MM.max(MIN_DEPTH_SDS * sd_mm)
-}
-
-/// Fewest cells that curvatures are fitted to.
-const MIN_FITTED: usize = 30;
-
-/// Curvatures of the skin at a cell: of the paraboloid through the points of the touch within half its radius.
-fn curvatures(
-    points: &[Vec3A],
-    normals: &[Vec3A],
-    pressures: &[f32],
-    at: usize,
-    area_mm2: f64,
-) -> Option<[f64; 2]> {
-    let (origin, up) = (points[at].as_dvec3(), normals[at].as_dvec3().try_normalize()?);
-    let (x, y) = up.any_orthonormal_pair();
-    let reach = 0.5 * (area_mm2 / std::f64::consts::PI).sqrt();
-    let mut normal = SMatrix::<f64, 6, 6>::zeros();
-    let mut right = SVector::<f64, 6>::zeros();
-    let mut count = 0;
-    for (cell, _) in pressures.iter().enumerate().filter(|(_, p)| **p > 1.0) {
-        let away = points[cell].as_dvec3() - origin;
-        let flat = DVec2::new(away.dot(x), away.dot(y)) / reach;
-        if flat.length_squared() > 1.0 {
-            continue;
-        }
-        let row = SVector::<f64, 6>::from([
-            1.0,
-            flat.x,
-            flat.y,
-            0.5 * flat.x * flat.x,
-            flat.x * flat.y,
-            0.5 * flat.y * flat.y,
-        ]);
-        normal += row * row.transpose();
-        right += row * away.dot(up);
-        count += 1;
-    }
-    if count < MIN_FITTED {
-        return None;
-    }
-    let fit = normal.cholesky()?.solve(&right) / (reach * reach);
-    let bend = DMat2::from_cols(DVec2::new(fit[3], fit[4]), DVec2::new(fit[4], fit[5]));
-    let (mean, half) = (0.5 * (bend.x_axis.x + bend.y_axis.y), 0.5 * (bend.x_axis.x - bend.y_axis.y));
-    let spread = half.hypot(bend.x_axis.y);
-    let both = [mean + spread, mean - spread];
-    both.iter().all(|v| v.is_finite()).then_some(both)
 }

@@ -275,9 +275,13 @@ impl ShapeMap {
         pressures.with_min_len(share(MIN_ROWS * cells.width)).for_each(|(cell, pressure)| {
             *pressure = shown.at(cell);
         });
-        let (mut contact, deepest) =
-            chart.contact(&self.cell_point, &self.cell_normal, &self.cell_mm, &self.cell_pressure)?;
-        contact.depth_sd_mm = f64::from(self.cell_sd_mm[deepest]);
+        let (contact, deepest) = chart.contact(
+            &self.cell_point,
+            &self.cell_normal,
+            &self.cell_mm,
+            &self.cell_pressure,
+            &self.cell_sd_mm,
+        )?;
         self.contact = Some(contact);
         Some(deepest)
     }

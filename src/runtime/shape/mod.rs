@@ -39,6 +39,7 @@
 mod cells;
 mod colours;
 mod contact;
+mod curvature;
 mod deviation;
 mod error;
 mod estimator;
@@ -60,7 +61,7 @@ mod seen;
 mod system;
 mod volume;
 
-pub use contact::SkinContact;
+pub use contact::{ContactEdge, SkinContact};
 pub use error::ShapeError;
 pub use estimator::{ShapeFromColor, ShapeOptions};
 pub(crate) use light::ShapeLight;

@@ -147,6 +147,7 @@ pub fn shape_members(map: &ShapeMap, has_forces: bool) -> String {
             "depth_mm": round(contact.depth_mm),
             "depth_sd_mm": round(contact.depth_sd_mm),
             "curvatures_per_mm": contact.curvatures_per_mm.map(|both| both.map(round)),
+            "edge": contact.edge.map(|edge| json!({ "direction": point(edge.direction), "sd_rad": round(edge.sd_rad) })),
             "outline_px": contact.outline_px.iter().map(|at| at.to_array()).collect::<Vec<_>>(),
         })
     });

@@ -133,12 +133,14 @@ def simulate(domecast, folder, design, objects):
     return draw(domecast, folder, ROOT / f"designs/{design}.json", level, objects, 0.5 if design != "picam-r20" else 1.0)
 
 
-def draw(domecast, folder, design, level, objects, element_mm=0.5):
+def draw(domecast, folder, design, level, objects, element_mm=0.5, each=None):
     """Frames of a press, or of rest, without noise; made once."""
     if (folder / "truth.jsonl").exists():
         return folder
     light = json.loads((ROOT / "designs/scenes/lit.json").read_text())["light"]
     light["leds"]["level_per_mw_mm2"] = level
+    if each:
+        light["leds"]["each"] = each
     scene = {"version": 1, "name": folder.name, "design": str(design),
              "frames": {"count": 1, "rate_hz": 30}, "tolerance": {"px": 0.02, "grey": 0.5}, "light": light}
     if objects:
@@ -264,6 +266,35 @@ def written_alike(shape, dome):
     return wrong
 
 
+def in_a_touch(domecast, truth, rest, constants, dome):
+    """A patch that is cut off and a dirty dot on a touch leave what is beside them within its bounds; a light that has gone out since the frame at
+    rest feigns slopes all over the dome, of which deviations must say so."""
+    clean, touched = cv2.imread(str(truth / "camera_frame.png")), np.load(truth / "shape/frame_0000.contact.npy") > 0
+    rows, columns = np.nonzero(touched)
+    middle, end = (int(columns.mean()), int(rows.mean())), (int(columns.max()), int(rows.mean()))
+    for what, at, radius, level in (("cut off in the middle", middle, 9, 255), ("cut off at the rim", end, 9, 255), ("dirty", end, 6, 25)):
+        frame, patch = clean.copy(), np.zeros(touched.shape, np.uint8)
+        cv2.circle(patch, at, radius, 1, -1)
+        frame[patch > 0] = level
+        cv2.imwrite(str(truth / "faulty.png"), frame)
+        track(domecast, truth / "faulty.png", rest, constants, truth / "faulty")
+        e = errors(truth, truth / "faulty", dome)
+        here = e["known"] & (e["polar"] <= 45) & (cv2.dilate(patch, np.ones((13, 13))) == 0)
+        rms, own = np.sqrt(np.mean(e["off"][here] ** 2)), e["sd"][patch > 0]
+        check(f"a touch, {what}: beside it", rms <= 0.010 and np.nanmedian(own) > 1.2 * np.nanmedian(e["sd"][here]),
+              f"rms {rms:.4f} mm; sd {np.nanmedian(own):.3f} there, {np.nanmedian(e['sd'][here]):.3f} beside it")
+    level = json.loads((truth.parent / "thumb24/report/light.json").read_text())["level_per_mw_mm2"]
+    objects = PRESSES["thumb24"]["ball on the pole"](dome)
+    lights = len(json.loads(constants.read_text())["light"]["leds"])
+    dark = draw(domecast, truth.parent / "thumb24-dark", ROOT / "designs/thumb24.json", level, objects, each=[0.0] + [1.0] * (lights - 1))
+    cv2.imwrite(str(truth / "faulty.png"), photograph(drawn(dark), 1))
+    track(domecast, truth / "faulty.png", rest, constants, truth / "faulty")
+    e = errors(dark, truth / "faulty", dome)
+    here = e["known"] & (e["polar"] <= 60)
+    share, sd = np.mean(np.abs(e["off"][here]) <= 3 * e["sd"][here]), np.median(e["sd"][here])
+    check("a light out since the frame at rest says so", share >= 0.97 and sd > 0.1, f"{share:.2f} within 3 sd, of {sd:.2f} mm")
+
+
 def faults(domecast, work, dome, constants):
     """A saturated patch, a spot and a scratch leave the rest within its bounds; what cannot be read is refused by name."""
     truth, rest = work / "thumb24-ball-on-the-pole", work / "thumb24-ball-on-the-pole/camera_rest.png"
@@ -280,6 +311,8 @@ def faults(domecast, work, dome, constants):
     for what, patch in {"patch": np.s_[195:215, 398:416], "spot": np.s_[282:292, 234:244]}.items():
         sds = np.nanmean(np.abs(e["off"][patch]) / e["sd"][patch])
         check(f"its {what} says so", sds < 1.5 and np.nanmean(e["sd"][patch]) > np.nanmedian(e["sd"]), f"{sds:.2f} sd off")
+
+    in_a_touch(domecast, truth, rest, constants, dome)
 
     # A light that has become weaker since the frame at rest feigns a slope all over the dome: the deviations must say so.
     still = cv2.imread(str(truth / "camera_frame.png"))

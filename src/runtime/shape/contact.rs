@@ -9,7 +9,7 @@ use glam::{DVec3, Vec2, Vec3A};
 use rayon::prelude::*;
 
 use super::cells::{Cells, View};
-use super::curvature::Touch;
+use super::curvature::{ContactEdge, Touch};
 use super::fill::{Pyramid, Weighted};
 use super::fourier::Fourier;
 use super::rows::{MIN_ROWS, share};
@@ -60,15 +60,6 @@ pub struct SkinContact {
     pub curvatures_per_mm: Option<[f64; 2]>,
     /// The line along which an edge, a rod or a ridge presses. `None` where curvatures do not clearly differ, as under a ball.
     pub edge: Option<ContactEdge>,
-}
-
-/// The line of an edge at the deepest place.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ContactEdge {
-    /// Along it, tangent to the skin, of unit length; of its two ways the one whose x is not negative. Sensor frame.
-    pub direction: DVec3,
-    /// Standard deviation of its angle, rad.
-    pub sd_rad: f64,
 }
 
 /// The chart of one touch, and room for it, kept between frames.

@@ -3,8 +3,6 @@
 use glam::{DVec2, DVec3, Vec3A};
 use nalgebra::{SMatrix, SVector};
 
-use super::contact::ContactEdge;
-
 /// Fewest cells that curvatures are fitted to.
 const MIN_FITTED: usize = 30;
 
@@ -13,6 +11,15 @@ const EDGE_SD_RAD: f64 = 0.026;
 
 /// Deviation from which on a direction is none, rad.
 const MAX_EDGE_SD_RAD: f64 = 0.2;
+
+/// The line of an edge at the deepest place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactEdge {
+    /// Along it, tangent to the skin, of unit length; of its two ways the one whose x is not negative. Sensor frame.
+    pub direction: DVec3,
+    /// Standard deviation of its angle, rad.
+    pub sd_rad: f64,
+}
 
 /// The cells of a touch; those whose pressure is over one. `at` is the deepest.
 pub(super) struct Touch<'a> {

@@ -61,7 +61,8 @@ mod seen;
 mod system;
 mod volume;
 
-pub use contact::{ContactEdge, SkinContact};
+pub use contact::SkinContact;
+pub use curvature::ContactEdge;
 pub use error::ShapeError;
 pub use estimator::{ShapeFromColor, ShapeOptions};
 pub(crate) use light::ShapeLight;

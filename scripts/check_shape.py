@@ -281,8 +281,9 @@ def in_a_touch(domecast, truth, rest, constants, dome):
         e = errors(truth, truth / "faulty", dome)
         here = e["known"] & (e["polar"] <= 45) & (cv2.dilate(patch, np.ones((13, 13))) == 0)
         rms, own = np.sqrt(np.mean(e["off"][here] ** 2)), e["sd"][patch > 0]
-        check(f"a touch, {what}: beside it", rms <= 0.010 and np.nanmedian(own) > 1.2 * np.nanmedian(e["sd"][here]),
-              f"rms {rms:.4f} mm; sd {np.nanmedian(own):.3f} there, {np.nanmedian(e['sd'][here]):.3f} beside it")
+        within_it = np.mean((np.abs(e["off"]) <= 3 * e["sd"])[(patch > 0) & e["known"]])
+        check(f"a touch, {what}", rms <= 0.010 and within_it >= 0.95 and np.nanmedian(own) > 1.2 * np.nanmedian(e["sd"][here]),
+              f"rms {rms:.4f} mm beside it; {within_it:.2f} within 3 sd, {np.nanmedian(own):.3f} there, {np.nanmedian(e['sd'][here]):.3f} beside it")
     level = json.loads((truth.parent / "thumb24/report/light.json").read_text())["level_per_mw_mm2"]
     objects = PRESSES["thumb24"]["ball on the pole"](dome)
     lights = len(json.loads(constants.read_text())["light"]["leds"])

@@ -23,12 +23,18 @@ impl ShapeFromColor {
     #[inline]
     pub(super) fn read_cell(&self, cell: usize) -> CellReading {
         let nothing = CellReading::default();
-        let unlit = CellReading { tilt: Weighted::new(Vec3A::ZERO, 1.0), ..nothing };
         let (view, width) = (&self.view, self.cells.width);
         let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
         if !is_dome(cell) || self.covered[cell] {
             return nothing;
         }
+        // Where a channel is cut off there is light, so that the skin is not taken to be as at rest but as around.
+        let is_cut_off = self.levels[cell].is_known.min_element() <= 0.0;
+        let unlit = if is_cut_off {
+            nothing
+        } else {
+            CellReading { tilt: Weighted::new(Vec3A::ZERO, 1.0), ..nothing }
+        };
         let point = |cell: usize| self.points_mm[cell];
         let at = point(cell);
         let between = |before: usize, after: usize| match (is_dome(before), is_dome(after)) {

@@ -1,7 +1,7 @@
 //! From a spec to shards: which pairs each holds, and making one.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -35,12 +35,10 @@ pub struct Shard {
     pub pairs: u32,
 }
 
-type Kept = Arc<OnceLock<Result<Arc<BuiltSensor>, SimError>>>;
-
 /// Makes shards; keeps the sensors that it has built.
 pub struct Maker<'a> {
     dataset: &'a Dataset,
-    sensors: Mutex<BTreeMap<u32, Kept>>,
+    sensors: Mutex<BTreeMap<u32, Arc<BuiltSensor>>>,
 }
 
 /// Sensors that are kept at a time.
@@ -92,6 +90,11 @@ impl<'a> Maker<'a> {
         let at_once = PAIRS_AT_ONCE * rayon::current_num_threads().max(1);
         let mut done = 0;
         for pairs in all.chunks(at_once) {
+            // Before the pairs, which share them: the parts of a sensor are computed in parallel, and a task that waited for another's would
+            // keep that one's parts from being done.
+            for pair in pairs {
+                self.sensor(self.dataset.sensor_of(*pair))?;
+            }
             let made: Vec<Result<[Made; 2], SimError>> =
                 pairs.par_iter().map(|pair| self.pair(*pair)).collect();
             for (pair, made) in pairs.iter().zip(made) {
@@ -110,15 +113,17 @@ impl<'a> Maker<'a> {
     /// # Errors
     /// As [`Dataset::build_sensor`].
     pub fn sensor(&self, number: u32) -> Result<Arc<BuiltSensor>, SimError> {
-        let kept = {
-            // whoever died while it held the map left it whole
-            let mut sensors = self.sensors.lock().unwrap_or_else(PoisonError::into_inner);
-            while sensors.len() >= MAX_KEPT && !sensors.contains_key(&number) {
-                sensors.pop_first();
-            }
-            Arc::clone(sensors.entry(number).or_default())
-        };
-        kept.get_or_init(|| self.dataset.build_sensor(number).map(Arc::new)).clone()
+        // whoever died while it held the map left it whole
+        let kept = || self.sensors.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = kept().get(&number) {
+            return Ok(Arc::clone(found));
+        }
+        let built = Arc::new(self.dataset.build_sensor(number)?);
+        let mut sensors = kept();
+        while sensors.len() >= MAX_KEPT {
+            sensors.pop_first();
+        }
+        Ok(Arc::clone(sensors.entry(number).or_insert(built)))
     }
 
     /// Both videos of a pair, drawn again until both are sound.

@@ -10,7 +10,7 @@ use domecast_design::sections::{DesignFile, IndexRgb, IndexValue};
 use domecast_design::{Design, DesignError};
 use domecast_optics::numeric::SeededRandom;
 use domecast_sim::scene::SceneFile;
-use domecast_sim::{Plan, Scene, SimError, elastomer_of};
+use domecast_sim::{Plan, Renderer, Scene, SimError, elastomer_of};
 
 /// Streams of the sensors' random numbers.
 const STREAM_SENSOR: u64 = 1 << 40;
@@ -108,6 +108,8 @@ impl Dataset {
                 Some(Box::new(FullSensor { scene, plan, reader: FrameReader::new(&self.design)? }))
             }
         };
+        // its light is computed here, once, and not by each of its first videos side by side
+        Renderer::new(&scene, &plan)?;
         Ok(BuiltSensor { scene, plan, dome, own, full })
     }
 

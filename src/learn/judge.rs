@@ -26,11 +26,21 @@ impl Row {
     }
 }
 
-/// Runs a graph on videos.
+/// Runs a graph on videos, on all cores.
 ///
 /// # Errors
 /// The graph is none that the runtime takes: a fault of this program.
 pub fn outputs(graph: &Graph, set: &DataSet, videos: &[&Video]) -> Result<Vec<Row>, Problem> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let parts = videos.chunks(videos.len().div_ceil(threads).max(1));
+    std::thread::scope(|scope| {
+        let parts: Vec<_> = parts.map(|part| scope.spawn(|| outputs_of_part(graph, set, part))).collect();
+        let parts = parts.into_iter().map(|part| part.join().unwrap_or_else(|e| std::panic::resume_unwind(e)));
+        parts.collect::<Result<Vec<_>, _>>().map(|parts| parts.concat())
+    })
+}
+
+fn outputs_of_part(graph: &Graph, set: &DataSet, videos: &[&Video]) -> Result<Vec<Row>, Problem> {
     let mut network = Network::new(graph).map_err(|e| e.to_string())?;
     let (pixels, count) = (set.pixels(), set.readings.len());
     let mut picture = vec![0.0; pixels];

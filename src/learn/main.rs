@@ -45,6 +45,8 @@ fn setup(set: &DataSet, options: &Options, net: &Net) -> serde_json::Value {
         "epochs": options.epochs,
         "batch": options.batch,
         "rate": options.rate,
+        "optimizer": if options.sgd { "sgd" } else { "adamw" },
+        "device": if options.gpu { "gpu" } else { "cpu" },
         "seed": options.seed,
         "leak": format!("{:?}", options.leak),
         "videos": { "train": set.part(Split::Train).len(), "val": set.part(Split::Val).len(), "test": set.part(Split::Test).len() },

@@ -17,6 +17,8 @@ usage: domecast-learn DATASET --out DIR [OPTIONS]
   --epochs N            (default 20)
   --batch N             videos of a step (default 16)
   --rate X              largest learning rate (default 0.002; paper: 0.001)
+  --optimizer NAME      adamw, with a cosine of the rate, or sgd at one rate, as the paper (default: as the network's)
+  --device NAME         cpu (default), or gpu: a graphics card, in a build with `--features gpu`; there two runs differ in the last bits
   --seed N              of weights and order (default 1)
   --max-videos N        read the first N videos only
   --leak CHECK          before-contact or shuffled: a network that must fail
@@ -62,6 +64,10 @@ pub(crate) struct Options {
     pub batch: usize,
     /// Largest learning rate.
     pub rate: f64,
+    /// Plain gradient descent at one rate instead of AdamW.
+    pub sgd: bool,
+    /// On a graphics card.
+    pub gpu: bool,
     /// Of weights and order.
     pub seed: u64,
     /// Videos at most.
@@ -122,6 +128,8 @@ impl Options {
             epochs: 20,
             batch: 16,
             rate: 0.0,
+            sgd: false,
+            gpu: false,
             seed: 1,
             max_videos: None,
             leak: Leak::No,
@@ -129,7 +137,7 @@ impl Options {
             stop_after: None,
             quiet: false,
         };
-        let mut inputs = None;
+        let (mut inputs, mut sgd) = (None, None);
         let mut left = arguments.iter();
         while let Some(name) = left.next() {
             let mut value = || left.next().cloned().ok_or_else(|| format!("{name} needs a value"));
@@ -145,6 +153,17 @@ impl Options {
                 "--epochs" => options.epochs = number(name, &value()?, [1, 10_000])?,
                 "--batch" => options.batch = number(name, &value()?, [2, 1024])?,
                 "--rate" => options.rate = number(name, &value()?, [1e-6, 1.0])?,
+                "--optimizer" => match value()?.as_str() {
+                    "adamw" => sgd = Some(false),
+                    "sgd" => sgd = Some(true),
+                    other => return Err(format!("--optimizer {other}: allowed: adamw, sgd")),
+                },
+                "--device" => match value()?.as_str() {
+                    "cpu" => options.gpu = false,
+                    "gpu" if cfg!(feature = "gpu") => options.gpu = true,
+                    "gpu" => return Err("--device gpu: this build knows none; build with `--features gpu`".into()),
+                    other => return Err(format!("--device {other}: allowed: cpu, gpu")),
+                },
                 "--seed" => options.seed = number(name, &value()?, [0, u64::MAX])?,
                 "--max-videos" => options.max_videos = Some(number(name, &value()?, [16, usize::MAX])?),
                 "--stop-after" => options.stop_after = Some(number(name, &value()?, [1, 10_000])?),
@@ -167,8 +186,9 @@ impl Options {
         if options.paper {
             (options.dots, options.wrench) = (false, false);
         }
+        options.sgd = sgd.unwrap_or(options.paper);
         if options.rate == 0.0 {
-            options.rate = if options.paper { 0.001 } else { 0.002 };
+            options.rate = if options.sgd { 0.001 } else { 0.002 };
         }
         inputs.map_or(Ok(()), |list| options.inputs(&list))?;
         Ok(options)

@@ -7,6 +7,8 @@ use burn::grad_clipping::GradientClippingConfig;
 use burn::module::Module;
 use burn::optim::{AdamWConfig, GradientsParams, ModuleOptimizer, SgdConfig};
 use burn::store::ModuleRecord;
+#[cfg(feature = "gpu")]
+use burn::tensor::DeviceKind;
 use burn::tensor::activation::log_softmax;
 use burn::tensor::{Bytes, Device, Tensor, TensorData};
 use domecast_files::{OutputRules, StagedFolder};
@@ -154,12 +156,22 @@ fn loss(net: &Net, batch: Batch, states_modulus: bool) -> Tensor<1> {
 
 /// The rate of a step.
 fn rate(options: &Options, step: usize, steps: usize) -> f64 {
-    if options.paper {
+    if options.sgd {
         return options.rate;
     }
     let at = (step as f64 + 0.5) / steps as f64;
     let falling = 0.5 * (1.0 + (std::f64::consts::PI * (at - WARM_UP).max(0.0) / (1.0 - WARM_UP)).cos());
     options.rate * (at / WARM_UP).min(1.0) * (LAST_RATE + (1.0 - LAST_RATE) * falling)
+}
+
+/// What multiplies.
+fn device(options: &Options) -> Device {
+    #[cfg(feature = "gpu")]
+    if options.gpu {
+        return Device::wgpu(DeviceKind::DefaultDevice);
+    }
+    debug_assert!(!options.gpu, "refused with the arguments");
+    Device::flex()
 }
 
 /// Weights, the optimizer's state, and how far they are.
@@ -175,11 +187,11 @@ struct Trainer<'a> {
 
 impl<'a> Trainer<'a> {
     fn new(set: &'a DataSet, options: &'a Options, scales: &'a Scales) -> Self {
-        let device = Device::flex();
+        let device = device(options);
         device.seed(options.seed);
         let device = device.autodiff();
         let net = Net::new(options.paper, set.picture.is_some(), set.seen, set.classes.len(), &device);
-        let optimizer = if options.paper {
+        let optimizer = if options.sgd {
             SgdConfig::new().init()
         } else {
             let clipping = Some(GradientClippingConfig::Norm(MAX_GRADIENT));
@@ -198,7 +210,7 @@ impl<'a> Trainer<'a> {
     fn fingerprint(&self) -> String {
         let o = self.options;
         format!(
-            "set {} of {} videos {:?}; readings {}; paper {}; picture {:?}; epochs {}; batch {}; rate {}; seed {}; leak {:?}",
+            "set {} of {} videos {:?}; readings {}; paper {}; picture {:?}; epochs {}; batch {}; rate {}; sgd {}; gpu {}; seed {}; leak {:?}",
             self.set.name,
             self.set.videos.len(),
             [Split::Train, Split::Val, Split::Test].map(|split| self.set.part(split).len()),
@@ -208,6 +220,8 @@ impl<'a> Trainer<'a> {
             o.epochs,
             o.batch,
             o.rate,
+            o.sgd,
+            o.gpu,
             o.seed,
             o.leak
         )

@@ -128,12 +128,12 @@ pub struct Prepared {
 impl Prepared {
     /// Vector irradiance of each source on the undeformed dome.
     pub fn dome(&self, ways: &Ways) -> &Tables {
-        self.dome.get_or_init(|| dome_tables(ways))
+        kept(&self.dome, || dome_tables(ways))
     }
 
     /// The same on the shells inside it.
     pub fn shells(&self, ways: &Ways) -> &[Tables] {
-        self.shells.get_or_init(|| {
+        kept::<Vec<_>>(&self.shells, || {
             SHELLS
                 .iter()
                 .skip(1)
@@ -148,8 +148,18 @@ impl Prepared {
     pub fn rooms(&self, ways: &Ways) -> &[DomeRoom] {
         let underside = if ways.fresnel { Underside::Fresnel } else { Underside::Dark };
         let room = |optics| DomeRoom::new(optics, Rings::usual(ways.face()), underside);
-        self.rooms.get_or_init(|| ways.optics.par_iter().map(room).collect())
+        kept::<Vec<_>>(&self.rooms, || ways.optics.par_iter().map(room).collect())
     }
+}
+
+/// What a cell holds, computed when it is first asked for. Not by `get_or_init`: what computes in parallel takes up other tasks of the
+/// pool while it waits for its parts, and one that asks for the same cell would wait for itself. Here two compute the same.
+fn kept<T>(cell: &OnceLock<T>, compute: impl FnOnce() -> T) -> &T {
+    if let Some(found) = cell.get() {
+        return found;
+    }
+    let computed = compute();
+    cell.get_or_init(|| computed)
 }
 
 /// The tables for a key: text of the design and flags of the effects.

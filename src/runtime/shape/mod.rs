@@ -60,6 +60,7 @@ mod seen;
 mod system;
 mod volume;
 
+pub use colours::are_colours_judged;
 pub use contact::SkinContact;
 pub use error::ShapeError;
 pub use estimator::{ShapeFromColor, ShapeOptions};

@@ -17,7 +17,8 @@ use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
 use domecast_live::decode::Picture;
 use domecast_runtime::constants::Constants;
-use domecast_runtime::track::{CameraFrame, CameraTurn, Tracked, Tracker};
+use domecast_runtime::shape::are_colours_judged;
+use domecast_runtime::track::{CameraFrame, CameraTurn, Tracker};
 use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
 use rest_frame::RestFrame;
 use results::Results;
@@ -105,6 +106,14 @@ fn frame_of(picture: &Result<Picture, String>) -> Result<CameraFrame<'_>, String
     frame.map_err(|error| error.to_string())
 }
 
+/// Says once where the colours of raw frames stand in another order than `--raw` has them. Whether that is settled.
+fn tell_colours(output: &Output, constants: &Constants, tracker: &Tracker, frame: &CameraFrame<'_>) -> bool {
+    are_colours_judged(constants, tracker, frame).unwrap_or_else(|error| {
+        output.fault(&format!("frame {}: {}; {}", tracker.result().frame, error.problem, error.cure));
+        true
+    })
+}
+
 /// Tracks every frame that there is; a frame that cannot be read is reported and skipped.
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     arguments.note_what_is_gone(output);
@@ -123,6 +132,8 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     warn_without_key(output, arguments, &constants);
     warn_without_rest(output, arguments, &constants);
     let mut turn = None;
+    // A picture in a file says which of its colours is red.
+    let mut are_colours_told = arguments.raw.is_none();
     while let Some(mut next) = source.next_frame() {
         if arguments.tracker.camera_mirrored
             && let Ok(picture) = &mut next.picture
@@ -136,13 +147,17 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             tracker.stamp(time_s);
         }
         let began = Instant::now();
-        let tracked: &Tracked = match &picture {
-            Ok(frame) => tracker.track(next.number, frame),
+        match &picture {
+            Ok(frame) => {
+                tracker.track(next.number, frame);
+                are_colours_told = are_colours_told || tell_colours(output, &constants, &tracker, frame);
+            }
             Err(problem) => {
                 output.fault(&format!("frame {}: {problem}", next.number));
-                tracker.skip(next.number)
+                tracker.skip(next.number);
             }
-        };
+        }
+        let tracked = tracker.result();
         if let Ok(frame) = &picture {
             results.measure(frame, tracked)?;
         }

@@ -1,6 +1,7 @@
 //! `domecast track FRAMES --constants FILE`
 
 mod arguments;
+mod colours;
 mod hardness;
 mod pictures;
 mod rest_frame;
@@ -15,9 +16,9 @@ use std::time::Instant;
 
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
+use colours::ColourCheck;
 use domecast_live::decode::Picture;
 use domecast_runtime::constants::Constants;
-use domecast_runtime::shape::are_colours_judged;
 use domecast_runtime::track::{CameraFrame, CameraTurn, Tracker};
 use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
 use rest_frame::RestFrame;
@@ -106,14 +107,6 @@ fn frame_of(picture: &Result<Picture, String>) -> Result<CameraFrame<'_>, String
     frame.map_err(|error| error.to_string())
 }
 
-/// Says once where the colours of raw frames stand in another order than `--raw` has them. Whether that is settled.
-fn tell_colours(output: &Output, constants: &Constants, tracker: &Tracker, frame: &CameraFrame<'_>) -> bool {
-    are_colours_judged(constants, tracker, frame).unwrap_or_else(|error| {
-        output.fault(&format!("frame {}: {}; {}", tracker.result().frame, error.problem, error.cure));
-        true
-    })
-}
-
 /// Tracks every frame that there is; a frame that cannot be read is reported and skipped.
 pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     arguments.note_what_is_gone(output);
@@ -132,8 +125,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     warn_without_key(output, arguments, &constants);
     warn_without_rest(output, arguments, &constants);
     let mut turn = None;
-    // A picture in a file says which of its colours is red.
-    let mut are_colours_told = arguments.raw.is_none();
+    let mut colours = ColourCheck::new(arguments.raw.is_some());
     while let Some(mut next) = source.next_frame() {
         if arguments.tracker.camera_mirrored
             && let Ok(picture) = &mut next.picture
@@ -150,7 +142,6 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         match &picture {
             Ok(frame) => {
                 tracker.track(next.number, frame);
-                are_colours_told = are_colours_told || tell_colours(output, &constants, &tracker, frame);
             }
             Err(problem) => {
                 output.fault(&format!("frame {}: {problem}", next.number));
@@ -167,6 +158,9 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         if picture.is_ok() {
             tally.times.push(began.elapsed());
         }
+        if let Ok(picture) = &next.picture {
+            colours.step(output, &constants, &tracker, picture);
+        }
         turn = tracked.camera_turn.or(turn);
         *tally.counts.entry(tracked.status()).or_default() += 1;
         let encoded = next.encoded.as_deref();
@@ -174,6 +168,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         source.reuse(next.picture);
     }
     output.steps_done();
+    colours.end(output);
     if !tally.counts.is_empty() {
         results.end(output)?;
     }

@@ -114,7 +114,7 @@ impl PoseFinder {
         self.guess.or(self.pose)
     }
 
-    /// Whether the pose is one that only the dots can settle: two markers alone are found.
+    /// Whether the pose is one that only the dots can complete: two markers alone are found.
     pub fn wants_dots(&self) -> bool {
         self.guess.is_some()
     }

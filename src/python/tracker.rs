@@ -6,7 +6,7 @@ use std::sync::Arc;
 use domecast_design::FileKind;
 use domecast_runtime::constants::{Constants, ConstantsError};
 use domecast_runtime::shape::are_colours_judged;
-use domecast_runtime::track::{CameraFrame, Channel, Reference, Springs, TrackOptions, Tracked, Tracker};
+use domecast_runtime::track::{Channel, Reference, Springs, TrackOptions, Tracker};
 use glam::DVec3;
 use pyo3::prelude::*;
 

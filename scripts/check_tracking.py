@@ -11,6 +11,7 @@ camera. `domecast simulate` draws it and `domecast track` reads frames and const
 - every frame has an answer and is `ok`, and no dot that the camera sees whole is missing or taken for another (some in a
   thousand, on the edge of a shadow at the rim, may be withheld);
 - dots: rms and largest distance of the centroids, as shares of a dot's diameter;
+- raw frames with blue first, given as red first, are named; with their own name they give the lines of the pictures;
 - wrench, where the build promises one: each error within six of the standard deviations that the line itself states
   without the constants' tolerances (the drawn sensor is built as they say), and the mean of the squared ones not above four, so that neither the number nor its spread is wrong in silence.
 """
@@ -20,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 
+import cv2
 import numpy as np
 
 FRAMES = 21
@@ -106,6 +108,20 @@ def turned(vector):
     return np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * across @ across
 
 
+def check_raw(program, constants, frames, lines):
+    pictures = [cv2.imread(str(path)) for path in frames]
+    height, width = pictures[0].shape[:2]
+    said = {}
+    for given, order in (("rgb", "rgb"), ("bgr", "rgb"), ("bgr", "bgr")):
+        stream = b"".join(np.ascontiguousarray(p if given == "bgr" else p[..., ::-1]).tobytes() for p in pictures)
+        track = [program, "track", "-", "--raw", f"{width}x{height}:{order}", "--constants", constants]
+        done = subprocess.run(track, input=stream, capture_output=True)
+        is_same = [json.loads(line) for line in done.stdout.splitlines()] == lines
+        said[given, order] = is_same, b"red and blue swapped" in done.stderr
+    good = said["rgb", "rgb"] == (True, False) == said["bgr", "bgr"] and said["bgr", "rgb"][1]
+    check("raw colours in another order are named", good, "" if good else str(said))
+
+
 def compare(program, build, folder):
     scene = folder / "scene.json"
     scene.write_text(json.dumps(scene_of(build)))
@@ -135,6 +151,8 @@ def compare(program, build, folder):
              else np.allclose(turned(r["displacement"][3:]), np.array(line["pose"])[:3, :3], atol=1e-8))
         for r, line in zip(records, lines))
     check("binary records say what the lines say", same)
+
+    check_raw(program, constants, frames[:3], lines[:3])
 
     away, lost, wanted = [], 0, 0
     for line, true in zip(lines, truth):

@@ -73,7 +73,27 @@ def built(constants, rng):
         own["shear_modulus_mpa"] *= moduli
         own["elastic_modulus_mpa"] *= moduli
         springs.append(SpringLaw({"at_mm": c["springs"]["at_mm"], "law": own}))
-    return Sensor(c), lambda d: sum(spring.wrench(d) for spring in springs)
+    return Sensor(c), Springs(springs)
+
+
+class Springs:
+    """The wrench of a displacement, by springs one by one."""
+
+    def __init__(self, springs):
+        self.springs = springs
+
+    def __call__(self, d):
+        return sum(spring.wrench(d) for spring in self.springs)
+
+    def stiffer(self, factor):
+        """The same with the wire's moduli times a factor; displacements count from where they rested before."""
+        def one(spring):
+            made = copy.copy(spring)
+            for name in ("k", "twist", "bend", "shear"):
+                setattr(made, name, factor * getattr(spring, name))
+            made.rest_load = spring.at_rest()
+            return made
+        return Springs([one(spring) for spring in self.springs])
 
 
 def drifted(sensor, tolerances, rng):

@@ -1,7 +1,7 @@
 //! From a spec to shards: which pairs each holds, and making one.
 
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
@@ -40,9 +40,6 @@ pub struct Maker<'a> {
     dataset: &'a Dataset,
     sensors: Mutex<BTreeMap<u32, Arc<BuiltSensor>>>,
 }
-
-/// Sensors that are kept at a time.
-const MAX_KEPT: usize = 8;
 
 impl Dataset {
     /// Number of shards unless somebody says otherwise.
@@ -92,9 +89,9 @@ impl<'a> Maker<'a> {
         for pairs in all.chunks(at_once) {
             // Before the pairs, which share them: the parts of a sensor are computed in parallel, and a task that waited for another's would
             // keep that one's parts from being done.
-            for pair in pairs {
-                self.sensor(self.dataset.sensor_of(*pair))?;
-            }
+            let numbers: BTreeSet<u32> = pairs.iter().map(|pair| self.dataset.sensor_of(*pair)).collect();
+            self.kept().retain(|number, _| numbers.contains(number));
+            numbers.iter().try_for_each(|number| self.sensor(*number).map(|_| ()))?;
             let made: Vec<Result<[Made; 2], SimError>> =
                 pairs.par_iter().map(|pair| self.pair(*pair)).collect();
             for (pair, made) in pairs.iter().zip(made) {
@@ -113,17 +110,16 @@ impl<'a> Maker<'a> {
     /// # Errors
     /// As [`Dataset::build_sensor`].
     pub fn sensor(&self, number: u32) -> Result<Arc<BuiltSensor>, SimError> {
-        // whoever died while it held the map left it whole
-        let kept = || self.sensors.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = kept().get(&number) {
+        if let Some(found) = self.kept().get(&number) {
             return Ok(Arc::clone(found));
         }
         let built = Arc::new(self.dataset.build_sensor(number)?);
-        let mut sensors = kept();
-        while sensors.len() >= MAX_KEPT {
-            sensors.pop_first();
-        }
-        Ok(Arc::clone(sensors.entry(number).or_insert(built)))
+        Ok(Arc::clone(self.kept().entry(number).or_insert(built)))
+    }
+
+    fn kept(&self) -> MutexGuard<'_, BTreeMap<u32, Arc<BuiltSensor>>> {
+        // whoever died while it held the map left it whole
+        self.sensors.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Both videos of a pair, drawn again until both are sound.

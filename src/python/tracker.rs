@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use domecast_design::FileKind;
 use domecast_runtime::constants::{Constants, ConstantsError};
-use domecast_runtime::shape::{ShapeFromColor, ShapeOptions};
-use domecast_runtime::track::{CameraFrame, Channel, Reference, Springs, TrackOptions, Tracked, Tracker};
+use domecast_runtime::shape::are_colours_judged;
+use domecast_runtime::track::{Channel, Reference, Springs, TrackOptions, Tracker};
 use glam::DVec3;
 use pyo3::prelude::*;
 
@@ -107,30 +107,6 @@ impl PyTracker {
     }
 }
 
-/// Refuses a frame whose colours lie over the dome as the constants' light does only when two of them are swapped. Whether
-/// that could be judged.
-fn check_colours(
-    constants: &Constants,
-    tracker: &Tracker,
-    frame: &CameraFrame<'_>,
-    tracked: &Tracked,
-) -> Result<bool, Fault> {
-    if constants.light.is_none() || frame.channels() != 3 {
-        return Ok(true);
-    }
-    if !tracked.problems.is_empty() {
-        return Ok(false);
-    }
-    let shape = ShapeFromColor::new(constants, tracker, ShapeOptions::default());
-    match shape.and_then(|mut shape| shape.set_rest(frame, tracked)) {
-        Err(error) if error.swapped.is_some() => {
-            let cure = "say rgb=False for frames with blue first, as OpenCV has them, rgb=True for red first";
-            Err(domecast_design::DesignError::at("frame", "", error.problem, "").with_help(cure).into())
-        }
-        _ => Ok(true),
-    }
-}
-
 fn channel_of(name: &str) -> Result<Channel, Fault> {
     Ok(match name {
         "red" => Channel::Red,
@@ -213,7 +189,11 @@ impl PyTracker {
         let tracked = py.detach(|| {
             let tracked = self.tracker.track(number, &seen).clone();
             if !self.are_colours_checked {
-                self.are_colours_checked = check_colours(&self.constants, &self.tracker, &seen, &tracked)?;
+                let judged = are_colours_judged(&self.constants, &self.tracker, &seen);
+                self.are_colours_checked = judged.map_err(|error| {
+                    let cure = "say rgb=False for frames with blue first, as OpenCV has them, rgb=True for red first";
+                    domecast_design::DesignError::at("frame", "", error.problem, "").with_help(cure)
+                })?;
             }
             Ok::<_, Fault>(tracked)
         })?;

@@ -1,12 +1,14 @@
-//! Whether a frame's colours come in the order of the frame at rest.
+//! Whether a frame's colours come in the order of the constants' light, and of the frame at rest.
 
 use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::error::ShapeError;
-use super::estimator::ShapeFromColor;
+use super::estimator::{ShapeFromColor, ShapeOptions};
 use super::rest::{Seen, seen};
 use super::rows::share;
+use crate::constants::Constants;
+use crate::track::{CameraFrame, Tracker};
 
 /// Every seventh cell is asked, in as many parts.
 const STEP: usize = 7;
@@ -14,6 +16,31 @@ const PARTS: usize = 4;
 
 /// The part of their misfit that another order must leave to be taken for theirs.
 const OTHER_ORDER: f32 = 0.5;
+
+/// Refuses a frame whose colours lie over the dome as the constants' light does only when two of them are swapped; `tracker`
+/// has just followed it. `false` where this frame does not tell (it is not `ok`): ask with the next one. Takes some tenths of a
+/// second, so ask once.
+///
+/// # Errors
+/// [`ShapeError`] with the two colours in `swapped`.
+pub fn are_colours_judged(
+    constants: &Constants,
+    tracker: &Tracker,
+    frame: &CameraFrame<'_>,
+) -> Result<bool, ShapeError> {
+    if constants.light.is_none() || frame.channels() != 3 {
+        return Ok(true);
+    }
+    let tracked = tracker.result();
+    if !tracked.problems.is_empty() {
+        return Ok(false);
+    }
+    let shape = ShapeFromColor::new(constants, tracker, ShapeOptions::default());
+    match shape.and_then(|mut shape| shape.set_rest(frame, tracked)) {
+        Err(error) if error.swapped.is_some() => Err(error),
+        _ => Ok(true),
+    }
+}
 
 impl ShapeFromColor {
     /// Refuses a frame whose colours are those at rest only in another order: a touch changes some of the skin, never all of it so.

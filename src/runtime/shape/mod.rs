@@ -61,6 +61,7 @@ mod seen;
 mod system;
 mod volume;
 
+pub use colours::are_colours_judged;
 pub use contact::SkinContact;
 pub use curvature::ContactEdge;
 pub use error::ShapeError;

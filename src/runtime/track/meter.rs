@@ -72,8 +72,7 @@ impl WrenchMeter {
         self.seen.clear();
         for one in centroids.iter().filter(|c| c.centroid_px.is_finite() && c.sd_px.is_finite()) {
             if let Some(marker) = self.markers.iter().find(|marker| marker.id == one.id) {
-                let (centroid_px, sd_px) = (one.centroid_px, one.sd_px);
-                self.seen.push(MarkerSighting { marker: *marker, centroid_px, sd_px, random_sd_px: sd_px });
+                self.seen.push(MarkerSighting::new(*marker, one.centroid_px, [one.sd_px; 2]));
             }
         }
         let refined = refine(&mut self.optics, &self.seen, start)?;

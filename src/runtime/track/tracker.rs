@@ -144,14 +144,18 @@ impl Tracker {
             reach_px: model.dots.first().map_or(MARKER_REACH_PX, |d| MARKER_REACH * d.spacing_px),
         };
         self.pose.find(&marker_frame, model, &mut self.markers);
-        let optics = self.pose.optics();
-        let dots = self.dots.find(&DotFrame {
+        self.dots.find(&DotFrame {
             plane: &plane,
             mask: &model.mask,
             model,
-            optics,
-            pose: self.pose.last_pose(),
+            optics: self.pose.optics(),
+            pose: self.pose.dots_pose(),
         });
+        if self.pose.wants_dots() && self.dots.is_as_built() {
+            self.pose.find_with_dots(&marker_frame, model, &mut self.markers, self.dots.tracks());
+            self.dots.expect_at(self.pose.optics(), &model.dots);
+        }
+        let (optics, dots) = (self.pose.optics(), self.dots.found());
         let pose = self.pose.estimate();
         let wrench = self.wrench.at_pose(&pose, optics);
         let motion =

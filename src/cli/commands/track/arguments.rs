@@ -79,7 +79,7 @@ pub struct TrackArguments {
     /// A frame of the untouched sensor, which shape, forces on the skin and hardness are read against.
     #[arg(long, requires = "read_against_rest", value_name = "FRAME")]
     pub rest: Option<PathBuf>,
-    /// Raw frames of this size: WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb.
+    /// Raw frames of this size: WIDTHxHEIGHT:gray, WIDTHxHEIGHT:rgb or, blue first as OpenCV has them, WIDTHxHEIGHT:bgr.
     #[arg(long)]
     pub raw: Option<RawSize>,
     /// A file (or a pipe) with the time of each frame, s, a line each: lines have `time_s`, and frames that are missing by

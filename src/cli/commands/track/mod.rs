@@ -1,6 +1,7 @@
 //! `domecast track FRAMES --constants FILE`
 
 mod arguments;
+mod colours;
 mod hardness;
 mod pictures;
 mod rest_frame;
@@ -15,9 +16,10 @@ use std::time::Instant;
 
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
+use colours::ColourCheck;
 use domecast_live::decode::Picture;
 use domecast_runtime::constants::Constants;
-use domecast_runtime::track::{CameraFrame, CameraTurn, Tracked, Tracker};
+use domecast_runtime::track::{CameraFrame, CameraTurn, Tracker};
 use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
 use rest_frame::RestFrame;
 use results::Results;
@@ -123,6 +125,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     warn_without_key(output, arguments, &constants);
     warn_without_rest(output, arguments, &constants);
     let mut turn = None;
+    let mut colours = ColourCheck::new(arguments.raw.is_some());
     while let Some(mut next) = source.next_frame() {
         if arguments.tracker.camera_mirrored
             && let Ok(picture) = &mut next.picture
@@ -136,13 +139,16 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             tracker.stamp(time_s);
         }
         let began = Instant::now();
-        let tracked: &Tracked = match &picture {
-            Ok(frame) => tracker.track(next.number, frame),
+        match &picture {
+            Ok(frame) => {
+                tracker.track(next.number, frame);
+            }
             Err(problem) => {
                 output.fault(&format!("frame {}: {problem}", next.number));
-                tracker.skip(next.number)
+                tracker.skip(next.number);
             }
-        };
+        }
+        let tracked = tracker.result();
         if let Ok(frame) = &picture {
             results.measure(frame, tracked)?;
         }
@@ -152,6 +158,9 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         if picture.is_ok() {
             tally.times.push(began.elapsed());
         }
+        if let Ok(picture) = &next.picture {
+            colours.step(output, &constants, &tracker, picture);
+        }
         turn = tracked.camera_turn.or(turn);
         *tally.counts.entry(tracked.status()).or_default() += 1;
         let encoded = next.encoded.as_deref();
@@ -159,6 +168,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         source.reuse(next.picture);
     }
     output.steps_done();
+    colours.end(output);
     if !tally.counts.is_empty() {
         results.end(output)?;
     }

@@ -20,23 +20,25 @@ pub struct RawSize {
     width: usize,
     height: usize,
     channels: usize,
+    is_blue_first: bool,
 }
 
 impl FromStr for RawSize {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || "WIDTHxHEIGHT:gray or WIDTHxHEIGHT:rgb, such as 640x480:rgb".to_owned();
+        let wrong =
+            || "WIDTHxHEIGHT:gray, WIDTHxHEIGHT:rgb or WIDTHxHEIGHT:bgr, such as 640x480:rgb".to_owned();
         let (size, kind) = text.split_once(':').unwrap_or((text, "gray"));
         let (width, height) = size.split_once('x').ok_or_else(wrong)?;
         let number =
             |t: &str| t.parse::<usize>().ok().filter(|v| (1..=1 << 14).contains(v)).ok_or_else(wrong);
         let channels = match kind {
             "gray" | "grey" => 1,
-            "rgb" => 3,
+            "rgb" | "bgr" => 3,
             _ => return Err(wrong()),
         };
-        Ok(Self { width: number(width)?, height: number(height)?, channels })
+        Ok(Self { width: number(width)?, height: number(height)?, channels, is_blue_first: kind == "bgr" })
     }
 }
 
@@ -147,6 +149,9 @@ impl FrameSource {
                 bytes.clear();
                 bytes.reserve_exact(wanted);
                 let read = stream.take(wanted as u64).read_to_end(&mut bytes);
+                if size.is_blue_first {
+                    bytes.chunks_exact_mut(3).for_each(|pixel| pixel.swap(0, 2));
+                }
                 let picture = match read {
                     Ok(0) => return None,
                     Ok(n) if n == wanted => {

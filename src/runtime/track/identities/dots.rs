@@ -169,7 +169,7 @@ impl DotIdentities {
     }
 
     /// Finds the dots of the next frame.
-    pub fn find(&mut self, frame: &DotFrame<'_, '_>) -> DotsFound<'_> {
+    pub fn find(&mut self, frame: &DotFrame<'_, '_>) {
         let &DotFrame { plane, mask, model, optics, ref pose } = frame;
         let models = &model.dots;
         self.searched = false;
@@ -203,7 +203,25 @@ impl DotIdentities {
         let blobs = self.searched.then_some(self.false_dots.as_slice());
         self.vanished.judge(models, &mut self.dots.tracks, blobs, |at| level_at(plane, at));
         self.dots.tracks.iter_mut().for_each(DotTrack::remember);
-        self.now()
+    }
+
+    /// Each dot of the constants, in their order.
+    pub fn tracks(&self) -> &[DotTrack] {
+        &self.dots.tracks
+    }
+
+    /// Whether nothing tells that the numbers are other dots'.
+    pub fn is_as_built(&self) -> bool {
+        matches!(self.key.orientation(), Orientation::AsBuilt | Orientation::NoKey)
+    }
+
+    /// The pose was found with the dots themselves: where it puts each of them.
+    pub fn expect_at(&mut self, optics: &SensorOptics, models: &[DotModel]) {
+        for (track, model) in self.dots.tracks.iter_mut().zip(models) {
+            let at = optics.project(model.surface_mm).ok().map(|center| center + track.offset_px);
+            track.expected_px = track.expected_px.and(at);
+            track.displaced_px = track.off_px().or(track.displaced_px);
+        }
     }
 
     fn find_predicted(&mut self, frame: &DotFrame<'_, '_>) {
@@ -283,10 +301,11 @@ impl DotIdentities {
             track.motion_px = None;
         }
         self.forget_last();
-        self.now()
+        self.found()
     }
 
-    fn now(&self) -> DotsFound<'_> {
+    /// What was found in the last frame.
+    pub fn found(&self) -> DotsFound<'_> {
         DotsFound {
             tracks: &self.dots.tracks,
             searched: self.searched,

@@ -54,6 +54,11 @@ impl MarkerIdentities {
         self.discs.iter().all(Option::is_some)
     }
 
+    /// How many markers are found.
+    pub fn found(&self) -> usize {
+        self.discs.iter().flatten().count()
+    }
+
     /// No marker is found.
     pub fn clear(&mut self) {
         self.discs.fill(None);

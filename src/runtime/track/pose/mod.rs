@@ -3,9 +3,11 @@
 //! In: [`MarkerIdentities`](super::identities::MarkerIdentities). Out: [`PoseEstimate`]. Candidates that could be a
 //! marker each are assigned here, by the pose that explains them best.
 
+mod anywhere;
 mod finder;
 mod refine;
 mod residual_scale;
+mod with_dots;
 
 pub(super) use finder::{PoseEstimate, PoseFinder};
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! and a few steps of the same least squares on raw pixels do.
 
 use glam::DVec2;
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, Matrix6x2, Vector6};
 
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
@@ -18,6 +18,18 @@ pub(in crate::track) struct MarkerSighting {
     /// Its standard deviation on each axis, px, and the share of it that changes from frame to frame.
     pub sd_px: f64,
     pub random_sd_px: f64,
+    /// Motion (mm, rad about the rest frame's origin) of the pose by its centroid's, px, where the pose is not the least-squares one of
+    /// markers alone.
+    pub pull: Option<Matrix6x2<f64>>,
+    /// Whether it is a black dot, a point on the dome.
+    pub is_dot: bool,
+}
+
+impl MarkerSighting {
+    /// Of a white marker.
+    pub fn new(marker: Marker, centroid_px: DVec2, [sd_px, random_sd_px]: [f64; 2]) -> Self {
+        Self { marker, centroid_px, sd_px, random_sd_px, pull: None, is_dot: false }
+    }
 }
 
 /// A pose that fits the markers.
@@ -106,11 +118,8 @@ pub(in crate::track) mod tests {
         let (mut optics, markers) = sensor();
         let pose = Rigid::new(DMat3::from_rotation_x(0.05), DVec3::new(0.1, 0.0, -1.0));
         let moved = optics.at_pose(&pose).unwrap();
-        let sightings = markers.map(|marker| MarkerSighting {
-            marker,
-            centroid_px: marker.image(&moved).unwrap().centroid_px,
-            sd_px: 0.05,
-            random_sd_px: 0.01,
+        let sightings = markers.map(|marker| {
+            MarkerSighting::new(marker, marker.image(&moved).unwrap().centroid_px, [0.05, 0.01])
         });
         let found = refine(&mut optics, &sightings, &Rigid::identity()).unwrap();
         assert!(found.rms_px < 1e-6, "{}", found.rms_px);

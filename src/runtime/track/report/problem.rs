@@ -51,11 +51,14 @@ pub enum Problem {
     ThreeMarkers,
     /// A twentieth or more of the dots that should be seen are not.
     DotsLost,
+    /// The pose rests on two white markers and, for what they leave open, on the dots: a touch that moves many of them is in
+    /// its deviations. Graver than [`Problem::ThreeMarkers`]; its bit in records is the newest.
+    TwoMarkers,
 }
 
 impl Problem {
     /// All of them, the gravest first.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Unreadable,
         Self::WrongSize,
         Self::Dark,
@@ -76,6 +79,7 @@ impl Problem {
         Self::Frozen,
         Self::Gap,
         Self::ExposureJump,
+        Self::TwoMarkers,
         Self::ThreeMarkers,
         Self::DotsLost,
     ];
@@ -103,6 +107,7 @@ impl Problem {
             Self::Frozen => "frozen",
             Self::Gap => "gap",
             Self::ExposureJump => "exposure_jump",
+            Self::TwoMarkers => "two_markers",
             Self::ThreeMarkers => "three_markers",
             Self::DotsLost => "dots_lost",
         }

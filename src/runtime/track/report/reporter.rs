@@ -202,7 +202,9 @@ impl Reporter {
             self.result.pose = Some(refined.pose);
             self.result.pose_rms_px = Some(refined.rms_px);
             let sound = discs.iter().flatten().filter(|disc| disc.fault.is_none()).count();
-            self.problem_if(pose.seen.len() == 3 || sound < 3, Problem::ThreeMarkers);
+            let has_dots = pose.seen.iter().any(|one| one.is_dot);
+            self.problem_if(has_dots, Problem::TwoMarkers);
+            self.problem_if(!has_dots && (pose.seen.len() == 3 || sound < 3), Problem::ThreeMarkers);
         } else {
             self.problem(if are_all_found { Problem::MarkersDoNotFit } else { Problem::MarkersMissing });
         }

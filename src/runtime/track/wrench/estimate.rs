@@ -105,14 +105,8 @@ impl WrenchEstimator {
             && let Some(errors) = optics_errors.as_mut()
         {
             let markers = constants.markers().into_iter();
-            let seen: Vec<MarkerSighting> = markers
-                .map(|marker| MarkerSighting {
-                    marker,
-                    centroid_px: DVec2::ZERO,
-                    sd_px: 0.0,
-                    random_sd_px: 0.0,
-                })
-                .collect();
+            let seen: Vec<MarkerSighting> =
+                markers.map(|marker| MarkerSighting::new(marker, DVec2::ZERO, [0.0; 2])).collect();
             optics_at_rest = errors.at_pose(rest, &Rigid::identity(), &seen).map(<[_]>::to_vec);
         }
         let spring_errors = SpringErrors::new(constants)?;

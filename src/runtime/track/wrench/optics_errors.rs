@@ -82,11 +82,11 @@ impl OpticsErrors {
         seen: &[MarkerSighting],
     ) -> Option<&[Vector6<f64>]> {
         let mut normal = Matrix6::zeros();
-        for one in seen {
+        for one in seen.iter().filter(|one| one.pull.is_none()) {
             let by_pose = optics.project_with_motion(one.marker.position_mm).ok()?.by_pose;
             normal += by_pose.transpose() * by_pose;
         }
-        let inverse = normal.cholesky()?.inverse();
+        let inverse = normal.cholesky().map(|normal| normal.inverse());
         self.by_number.fill(Vector6::zeros());
         let camera = optics.rest_from_camera();
         // The optics' own camera stands still: the constants' at rest.
@@ -101,10 +101,17 @@ impl OpticsErrors {
         for one in seen {
             let at = one.marker.position_mm;
             let PixelMotion { pixel, by_pose, by_point } = optics.project_with_motion(at).ok()?;
-            let pull: Matrix2x6<f64> = by_pose * inverse;
+            let pull: Matrix2x6<f64> = match one.pull {
+                Some(pull) => pull.transpose(),
+                None => by_pose * inverse?,
+            };
             for Shifted { number, step, optics } in &self.shifted {
                 let moved = (optics.project(at).ok()? - pixel) / *step;
                 self.by_number[*number] += pull.transpose() * Vector2::new(moved.x, moved.y);
+            }
+            if one.is_dot {
+                // What its own place is off by is in the covariance of the picture.
+                continue;
             }
             let index = self.markers.iter().position(|id| *id == one.marker.id)?;
             for axis in 0..2 {

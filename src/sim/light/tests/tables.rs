@@ -65,6 +65,28 @@ fn the_table_of_direct_light_matches_closed_forms_to_a_thousandth() {
     }
 }
 
+/// What a task waits for takes up other tasks: one that waited for a table that it was itself computing would never end.
+#[test]
+fn tables_that_many_tasks_of_a_pool_ask_for_at_once_are_made() {
+    use rayon::prelude::*;
+    let optics = sensor(&[1.0], 1.0);
+    let ways = ways_of(&optics, emitter(DVec3::new(4.0, -3.0, -3.3), DVec3::new(-0.4, 0.3, 1.0), 1.0, 1.0));
+    let (done, ended) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build().unwrap();
+        let prepared = Prepared::default();
+        let nodes = |_| {
+            let [dome, shells] = [prepared.dome(&ways).sources.len(), prepared.shells(&ways).len()];
+            dome + shells + prepared.rooms(&ways).len()
+        };
+        let counts: Vec<usize> = pool.install(|| (0..64).into_par_iter().map(nodes).collect());
+        done.send(counts).unwrap();
+    });
+    let counts =
+        ended.recv_timeout(std::time::Duration::from_secs(240)).expect("the tasks wait for each other");
+    assert!(counts.iter().all(|count| *count == counts[0]));
+}
+
 #[test]
 fn moved_points_of_caps_and_cylinders_are_lit_as_the_closed_form_has_it() {
     let parts = FieldParts { falloff: true, albedo: None, moved: true };

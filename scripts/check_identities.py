@@ -282,7 +282,7 @@ def scenarios(build):
     press = [{"shift": (0, 0, -0.3)}, {"shift": (0.1, 0, -0.5), "turn": (0.01, 0, 0.01)}]
     yield plain("marker 2 hidden, pressed from the start", press, ["three_markers"], hidden=(2,))
 
-    bad = ["ok", "blurred", "no_marks", "markers_missing", "markers_do_not_fit", "dots_lost", "three_markers", "foreign_constants",
+    bad = ["ok", "blurred", "no_marks", "markers_missing", "markers_do_not_fit", "dots_lost", "three_markers", "two_markers", "foreign_constants",
            "key_unsure"]
 
     def blurred(at, way):

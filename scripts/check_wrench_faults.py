@@ -25,7 +25,7 @@ import numpy as np
 
 import check_faults as faults
 from check_identities import dent
-from check_wrench_sd import Bench, built, drifted, force_table, motion, optics_table, pose_of
+from check_wrench_sd import Bench, built, drifted, motion, pose_of
 
 SHARES = [(60, 75), (93, 98), (99, 100)]
 LIMITS = np.array([0.1] * 3 + [1.0] * 3)
@@ -141,14 +141,8 @@ def check(bench, build, given, rng):
         for k, (frame, kinds, w) in enumerate(sequence(later, warm, at, given.frames, rng)):
             cv2.imwrite(str(frames / f"frame_{k:04d}.png"), frame, [cv2.IMWRITE_PNG_COMPRESSION, 1])
             told.append((kinds, w))
-        paths = [folder / name for name in ("table.csv", "optics.json", "force.csv", "both.json")]
-        for path in paths:
-            path.unlink(missing_ok=True)
-        paths[0].write_text(optics_table(sensor, at, noise, rng))
-        paths[2].write_text(force_table(wrench, rng))
-        bench.run("calibrate-optics", paths[0], nominal, "--rest-frames", 4, "--out", paths[1])
-        bench.run("calibrate-force", paths[2], paths[1], "--motion-sd", "0,0", "--out", paths[3])
-        for name, used in zip(z, (nominal, paths[1], paths[3])):
+        sets = bench.calibrated(nominal, sensor, wrench, at, noise, rng)
+        for name, used in zip(z, sets):
             for k, (line, (kinds, w)) in enumerate(zip(bench.track(frames, used, "--temperature", warmth), told)):
                 statuses[line["status"]] = statuses.get(line["status"], 0) + 1
                 if line["wrench"] is None:

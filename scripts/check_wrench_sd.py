@@ -155,6 +155,17 @@ class Bench:
         self.run("track", frames, "--constants", constants, "--out", out, *options)
         return [json.loads(line) for line in out.read_text().splitlines()]
 
+    def calibrated(self, nominal, sensor, wrench, at, noise, rng):
+        """The constants of a sensor: as designed, with its optics calibrated, with its springs as well."""
+        paths = [self.folder / name for name in ("table.csv", "optics.json", "force.csv", "both.json")]
+        for path in paths:
+            path.unlink(missing_ok=True)
+        paths[0].write_text(optics_table(sensor, at, noise, rng))
+        paths[2].write_text(force_table(wrench, rng))
+        self.run("calibrate-optics", paths[0], nominal, "--rest-frames", 4, "--out", paths[1])
+        self.run("calibrate-force", paths[2], paths[1], "--motion-sd", "0,0", "--out", paths[3])
+        return nominal, paths[1], paths[3]
+
 
 def main():
     parser = argparse.ArgumentParser()
@@ -182,14 +193,8 @@ def main():
                 turn, shift = pose_of(d, at)
                 picture, _ = later.draw(turn, shift, hidden=hidden, noise=2.0, seed=2 * number + k)
                 cv2.imwrite(str(frames / f"frame_{k:04d}.png"), picture)
-            paths = [folder / name for name in ("table.csv", "optics.json", "force.csv", "both.json")]
-            for path in paths:
-                path.unlink(missing_ok=True)
-            paths[0].write_text(optics_table(sensor, at, noise, rng))
-            paths[2].write_text(force_table(wrench, rng))
-            bench.run("calibrate-optics", paths[0], nominal, "--rest-frames", 4, "--out", paths[1])
-            bench.run("calibrate-force", paths[2], paths[1], "--motion-sd", "0,0", "--out", paths[3])
-            for name, used in zip(z, (nominal, paths[1], paths[3])):
+            sets = bench.calibrated(nominal, sensor, wrench, at, noise, rng)
+            for name, used in zip(z, sets):
                 for line, d in zip(bench.track(frames, used), moved):
                     if line["wrench"] is not None:
                         z[name].append((np.array(line["wrench"]) - wrench(d)) / np.array(line["wrench_sd"]))

@@ -231,4 +231,5 @@ def main():
             judge_shape(program, folder, noise_levels)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -3,9 +3,10 @@
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
+use super::mistakes::CentroidMistake;
 use super::normal::{OwnBlock, Reduced};
-use super::plausibility::{examine_numbers, examine_observations, examine_residuals};
-use super::problem::Problem;
+use super::plausibility::{examine_numbers, examine_observations, examine_residuals, near_mistakes};
+use super::problem::{Problem, Seen};
 use super::types::{Kind, Observation, OpticsFit, OpticsFitError, Parameter};
 use crate::constants::{CalibrationPriors, Constants, OpticsUncertainty};
 use domecast_optics::SensorOptics;
@@ -13,6 +14,8 @@ use domecast_optics::numeric::{Rigid, rotation_from_vector};
 use domecast_optics::pose::Sighting;
 
 const MAX_STEPS: u32 = 60;
+/// A mistake is taken for one where the squares without it, in deviations, are less by this much: odds of e^12.5.
+const CLEARLY: f64 = 25.0;
 
 /// Fits the sensor to the observations; the first `at_rest` frames (one at least) are without load.
 ///
@@ -26,13 +29,10 @@ pub fn fit(
 ) -> Result<OpticsFit, OpticsFitError> {
     let problem = Problem::new(constants, observations, priors, at_rest)?;
     examine_observations(&problem, constants, priors)?;
-    let start = Solution {
-        x: vec![0.0; problem.numbers()],
-        poses: start_poses(&problem, priors)?,
-        rms_px: [0.0; 2],
-        iterations: 0,
-    };
-    let (solution, last) = solve(&problem, priors, start, observations)?;
+    let (solution, last) = solve(&problem, priors, observations)?;
+    if let Some(name) = better_explained(&problem, constants, priors, last.cost) {
+        return Err(OpticsFitError::Suspect(format!("looks like {name}")));
+    }
     let x = &solution.x;
     let open = || {
         OpticsFitError::Suspect(
@@ -51,6 +51,36 @@ pub fn fit(
         poses: problem.frames.iter().copied().zip(solution.poses).collect(),
         outliers: last.outliers,
     })
+}
+
+/// The mistake without which the centroids fit clearly better; of those that are too small to show before a fit.
+fn better_explained(
+    problem: &Problem,
+    constants: &Constants,
+    priors: &CalibrationPriors,
+    cost: f64,
+) -> Option<String> {
+    let optics = SensorOptics::new(&problem.nominal).ok()?;
+    let fitted = |mistake: CentroidMistake| {
+        let cured = |seen: &Seen| {
+            let mark = *seen.observation;
+            let (index, centroid_px) = mistake.taken_back(mark.kind, seen.index, mark.centroid_px)?;
+            let id = match mark.kind {
+                Kind::White => constants.white_markers.get(index)?.id,
+                Kind::Black => constants.black_dots.get(index)?.id,
+            };
+            Some(Observation { id, centroid_px, ..mark })
+        };
+        let observations: Vec<Observation> =
+            problem.seen.iter().flatten().map(cured).collect::<Option<_>>()?;
+        let other = Problem::new(constants, &observations, priors, problem.at_rest).ok()?;
+        let (_, last) = solve(&other, priors, &observations).ok()?;
+        // In the noise that is there, should it be more than is taken for it.
+        let variance = (last.cost / last.count.max(1) as f64).max(1.0);
+        (last.cost < cost - CLEARLY * variance).then_some((last.cost, mistake.name))
+    };
+    let better = near_mistakes(problem, constants, &optics, priors).into_iter().filter_map(fitted);
+    better.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
 }
 
 /// Every number but the dots', with its deviation before and after.
@@ -103,13 +133,19 @@ fn step_poses(poses: &[Rigid], blocks: &[Option<OwnBlock>], step: &DVector<f64>)
     poses.iter().zip(blocks).map(moved).collect()
 }
 
-/// Levenberg-Marquardt from a start, at most [`MAX_STEPS`] steps; the equations without damping come with the solution.
+/// Levenberg-Marquardt from nominal numbers, at most [`MAX_STEPS`] steps; the equations without damping come with the
+/// solution.
 fn solve(
     problem: &Problem,
     priors: &CalibrationPriors,
-    mut at: Solution,
     observations: &[Observation],
 ) -> Result<(Solution, Reduced), OpticsFitError> {
+    let mut at = Solution {
+        x: vec![0.0; problem.numbers()],
+        poses: start_poses(problem, priors)?,
+        rms_px: [0.0; 2],
+        iterations: 0,
+    };
     let hidden = || {
         let first = observations.first();
         OpticsFitError::NotVisible {

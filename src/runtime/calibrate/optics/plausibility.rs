@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use glam::DVec2;
 
-use super::mistakes::{centroid_mistakes, order_in_words, orders};
+use super::mistakes::{CentroidMistake, centroid_mistakes, order_in_words, orders};
 use super::problem::{Problem, Seen};
 use super::types::{Kind, OpticsFitError, Parameter};
 use crate::constants::{CalibrationPriors, Constants};
@@ -100,20 +100,13 @@ pub(super) fn examine_observations(
     let misses: Vec<(Kind, f64)> = at_rest.iter().map(|s| (s.observation.kind, miss(s))).collect();
     let (mean_px, far_part) = distance(&misses, far_px);
     if far_part > 0.0 {
-        let judged = centroid_mistakes(constants, &optics).into_iter().filter_map(|mistake| {
-            let cured = |s: &&Seen| {
-                let mark = s.observation;
-                let there = mistake.taken_back(mark.kind, s.index, mark.centroid_px);
-                let miss = |(index, at_px)| places.miss_px(mark.kind, index, at_px);
-                (mark.kind, there.map_or(f64::INFINITY, miss))
-            };
-            let (left_px, left) = distance(&at_rest.iter().map(cured).collect::<Vec<_>>(), far_px);
-            // A dot whose number is one off at the end of the list has no place.
-            (left <= MAX_LEFT.max(0.5 * far_part).min(0.25) && left_px < 0.6 * mean_px)
-                .then_some((left_px, mistake.name))
+        let rated = rate_mistakes(problem, constants, &optics, &places, far_px).into_iter();
+        // A dot whose number is one off at the end of the list has no place.
+        let better = rated.filter(|(_, left_px, left)| {
+            *left <= MAX_LEFT.max(0.5 * far_part).min(0.25) && *left_px < 0.6 * mean_px
         });
-        if let Some((_, name)) = judged.min_by(|a, b| a.0.total_cmp(&b.0)) {
-            return suspect(format!("looks like {name}"));
+        if let Some((mistake, ..)) = better.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            return suspect(format!("looks like {}", mistake.name));
         }
     }
     outside(problem)?;
@@ -133,6 +126,41 @@ pub(super) fn examine_observations(
         ));
     }
     swapped_later(problem, &optics, priors)
+}
+
+/// Each known mistake, with the mean distance of the marks at rest and the part of far ones that are left without it.
+fn rate_mistakes<'a>(
+    problem: &Problem,
+    constants: &'a Constants,
+    optics: &'a SensorOptics,
+    places: &RestPlaces,
+    far_px: f64,
+) -> Vec<(CentroidMistake<'a>, f64, f64)> {
+    let rate = |mistake: CentroidMistake<'a>| {
+        let cured = |s: &Seen| {
+            let mark = s.observation;
+            let there = mistake.taken_back(mark.kind, s.index, mark.centroid_px);
+            let miss = |(index, at_px)| places.miss_px(mark.kind, index, at_px);
+            (mark.kind, there.map_or(f64::INFINITY, miss))
+        };
+        let misses: Vec<_> = problem.seen.iter().take(problem.at_rest).flatten().map(cured).collect();
+        let (left_px, left) = distance(&misses, far_px);
+        (mistake, left_px, left)
+    };
+    centroid_mistakes(constants, optics).into_iter().map(rate).collect()
+}
+
+/// The mistakes that leave the marks at rest as near to their places as tolerances take them: only a fit tells whether
+/// one was made.
+pub(super) fn near_mistakes<'a>(
+    problem: &Problem,
+    constants: &'a Constants,
+    optics: &'a SensorOptics,
+    priors: &CalibrationPriors,
+) -> Vec<CentroidMistake<'a>> {
+    let places = RestPlaces::new(problem, optics);
+    let rated = rate_mistakes(problem, constants, optics, &places, FAR * problem.slack_px(priors));
+    rated.into_iter().filter(|(_, _, left)| *left <= MAX_LEFT).map(|(mistake, ..)| mistake).collect()
 }
 
 /// Marks outside of the image.

@@ -4,6 +4,7 @@
 - The tractions' sum is the tracked wrench, within 3 % and 0.02 N; without springs it is the contact's force as far as the modulus says.
 - The contact's point, normal and area against the truth's; what nothing touches has no contact.
 - The standard deviations at the dots: the truth lies within two of them for 90 of 100 dots where something touches, within three for 97.
+- Where dots are in three dimensions, along their rays within the stated deviations, across them within a few thousandths.
 - Two balls in contact at once.
 - With `--shape` beside it: sum, peak pressure, contact point and area of single balls, and two balls whose touches lie 2 mm apart, from
   frames with noise (2 levels) and without.
@@ -24,6 +25,8 @@ from scipy.ndimage import map_coordinates
 
 DESIGNS = pathlib.Path(__file__).resolve().parent.parent / "designs"
 ELEMENT_MM = 0.5
+# Dots that moved by less say nothing of depth, mm.
+MOVED_MM = 0.05
 # Peak pressure against the truth's, and how far the contact point may be off along the skin, with heights and dots together.
 MIN_PEAK, MAX_PEAK, POINT_MM = 0.9, 1.1, 0.1
 
@@ -63,6 +66,29 @@ def true_tractions(out, number, frame):
     found = np.stack([map_coordinates(traction[..., k], places, order=1, cval=np.nan) for k in range(3)], -1)
     found[np.isnan(pixels).any(-1)] = np.nan
     return found
+
+
+def judge_places(title, tracked, truth):
+    """Dots in three dimensions: off along their rays, over the stated deviations, and across."""
+    at_rest = {dot["id"]: np.array(dot["surface_mm"]) for dot in truth[0]["black_dots"]}
+    along, across, sds = [], [], []
+    for line, true in zip(tracked[1:], truth[1:]):
+        places = {dot["id"]: dot["surface_mm"] for dot in true["black_dots"]}
+        rays = {dot["id"]: dot["ray"] for dot in line["black_dots"]}
+        for dot in line["traction"]:
+            known = rays[dot["id"]] and places[dot["id"]]
+            if not known or np.linalg.norm(places[dot["id"]] - at_rest[dot["id"]]) < MOVED_MM:
+                continue
+            ray, off = np.array(rays[dot["id"]]), np.array(dot["surface_mm"]) - places[dot["id"]]
+            along.append(off @ ray)
+            across.append(np.linalg.norm(off - off @ ray * ray))
+            sds.append(dot["depth_sd_mm"])
+    along, across, sds = np.array(along), np.array(across), np.array(sds)
+    within = [100 * np.mean(np.abs(along) <= k * sds) for k in (1, 2, 3)]
+    print(f"{title}: places of {len(along)} dots that moved by {MOVED_MM} mm: along the ray {np.sqrt((along ** 2).mean()):.3f} mm rms, "
+          f"{np.abs(along).max():.3f} at most, within 1, 2, 3 sd {within[0]:.0f} {within[1]:.0f} {within[2]:.0f} %; across {np.sqrt((across ** 2).mean()):.4f} rms")
+    assert len(along) > 20 and within[0] >= 60 and within[1] >= 93 and within[2] >= 97, within
+    assert np.sqrt((across ** 2).mean()) < 0.1 * MOVED_MM, across.max()
 
 
 def judge(design, tracked, truth, out, has_springs):
@@ -206,6 +232,7 @@ def main():
                 places += [at(constants, size, polar, 40 + 130 * k, depth * radius) for depth in (-0.03, 0.06, 0.09)]
             tracked, truth, out = simulate(program, folder, f"{design}-balls", design, [ball("ball", size, places)], len(places))
             zs, rows = judge(design, tracked, truth, out, constants.get("springs") is not None)
+            judge_places(design, tracked, truth)
             all_zs.append(zs)
             within = [100 * np.mean(np.abs(zs) <= k) for k in (1, 2, 3)]
             print(f"{design}: loads {rows[:, 0].min():.2f} to {rows[:, 0].max():.2f} N; sum off by {100 * rows[:, 1].max():.1f} % at most; point "
@@ -222,6 +249,7 @@ def main():
         balls = [ball("a", r, pair(3, -0.3) + pair(3, 0.5)), ball("b", r, pair(-3, -0.3) + pair(-3, 0.5))]
         tracked, truth, out = simulate(program, folder, "two-balls", "thumb24", balls, 2)
         judge("two balls", tracked, truth, out, True)
+        judge_places("two balls", tracked, truth)
         dots = [(d["surface_mm"][0], np.linalg.norm(d["n_mm2"])) for d in tracked[1]["traction"] if abs(d["surface_mm"][1]) < 1.5]
         middle = np.mean([t for x, t in dots if abs(x) < 1.0])
         sides = [max(t for x, t in dots if sign * x > 1.0) for sign in (-1, 1)]

@@ -55,6 +55,7 @@ impl PyForces {
         for dot in &self.forces.dots {
             table.number(dot.id);
             table.triple(Some(dot.surface_mm));
+            table.one(Some(dot.depth_sd_mm));
             table.triple(Some(dot.traction_n_mm2));
             table.one(Some(dot.noise_sd_n_mm2));
             table.one(Some(dot.sd_n_mm2));

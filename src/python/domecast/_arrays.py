@@ -24,7 +24,7 @@ MARKER = np.dtype([
     ("id", "u4"), ("state", _NAME), ("image_px", "f8", 2), ("centroid_px", "f8", 2), ("sd_px", "f8"),
     ("residual_px", "f8", 2),
 ])
-TRACTION = np.dtype([("id", "u4"), ("surface_mm", "f8", 3), ("traction_n_mm2", "f8", 3), ("noise_sd_n_mm2", "f8"), ("sd_n_mm2", "f8")])
+TRACTION = np.dtype([("id", "u4"), ("surface_mm", "f8", 3), ("depth_sd_mm", "f8"), ("traction_n_mm2", "f8", 3), ("noise_sd_n_mm2", "f8"), ("sd_n_mm2", "f8")])
 
 
 class Frame(np.ndarray[Any, np.dtype[np.uint8]]):

@@ -109,7 +109,7 @@ class Tracker:
         check_colours: bool = True,
     ) -> Tracker:
         """The options are those of `domecast track`. `check_colours`: the first good frame whose colours fit the constants' light
-        only when two of them are swapped is refused."""
+        only in another order is refused."""
 
     def update(self, frame: Bytes, *, rgb: bool, time: float | None = None, number: int | None = None) -> Reading:
         """Takes the next frame in: uint8, (height, width, 3) or (height, width) of grey. `rgb`: red comes first; False: blue does,
@@ -202,7 +202,7 @@ class Shape:
         cls, sensor: Sensor, tracker: Tracker, *, cell_px: int = 2, max_passes: int = 2
     ) -> Shape: ...
     def set_rest(self, frame: Bytes, *, rgb: bool) -> None:
-        """Takes a frame of the untouched sensor. One whose colours fit only when two are swapped is refused."""
+        """Takes a frame of the untouched sensor. One whose colours fit only in another order is refused."""
 
     def update(self, frame: Bytes, reading: Reading, *, rgb: bool) -> ShapeMap:
         """Reads a frame's shape, with what the tracker says of the same frame."""
@@ -265,7 +265,7 @@ class Forces:
     def compliance_factor(self) -> float: ...
     @property
     def dots(self) -> Table:
-        """A structured array: id, surface_mm, traction_n_mm2, noise_sd_n_mm2, sd_n_mm2."""
+        """A structured array: id, surface_mm, depth_sd_mm, traction_n_mm2, noise_sd_n_mm2, sd_n_mm2."""
 
     @property
     def contact(self) -> tuple[Floats, Floats, Floats, Floats] | None:

@@ -14,15 +14,18 @@ use crate::track::{CameraFrame, Tracker};
 const STEP: usize = 7;
 const PARTS: usize = 4;
 
+/// Orders of three colours beside the one as it is; those of two that are swapped first.
+pub(super) const OTHER_ORDERS: [[usize; 3]; 5] = [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
+
 /// The part of their misfit that another order must leave to be taken for theirs.
 const OTHER_ORDER: f32 = 0.5;
 
-/// Refuses a frame whose colours lie over the dome as the constants' light does only when two of them are swapped; `tracker`
+/// Refuses a frame whose colours lie over the dome as the constants' light does only in another order; `tracker`
 /// has just followed it. `false` where this frame does not tell (it is not `ok`): ask with the next one. Takes some tenths of a
 /// second, so ask once.
 ///
 /// # Errors
-/// [`ShapeError`] with the two colours in `swapped`.
+/// [`ShapeError`] with the order that they are in, in `colour_order`.
 pub fn are_colours_judged(
     constants: &Constants,
     tracker: &Tracker,
@@ -37,7 +40,7 @@ pub fn are_colours_judged(
     }
     let shape = ShapeFromColor::new(constants, tracker, ShapeOptions::default());
     match shape.and_then(|mut shape| shape.set_rest(frame, tracked)) {
-        Err(error) if error.swapped.is_some() => Err(error),
+        Err(error) if error.colour_order.is_some() => Err(error),
         _ => Ok(true),
     }
 }
@@ -45,7 +48,6 @@ pub fn are_colours_judged(
 impl ShapeFromColor {
     /// Refuses a frame whose colours are those at rest only in another order: a touch changes some of the skin, never all of it so.
     pub(super) fn check_colours(&self) -> Result<(), ShapeError> {
-        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
         // Parts of the picture, so that their sums are the same for any number of threads.
         let mut parts = [[0.0_f32; 6]; PARTS];
         let count = self.cells.count();
@@ -55,7 +57,7 @@ impl ShapeFromColor {
                 seen(&self.levels, &self.covered, &self.view, &self.light, cells)
             {
                 let at_rest = self.gain[cell] * expected;
-                for (off, [r, g, b]) in off.iter_mut().zip(ORDERS) {
+                for (off, [r, g, b]) in off.iter_mut().zip(std::iter::once([0, 1, 2]).chain(OTHER_ORDERS)) {
                     let difference = (Vec3A::new(level[r], level[g], level[b]) - at_rest).abs();
                     *off += if difference.is_finite() { difference.element_sum() } else { 0.0 };
                 }

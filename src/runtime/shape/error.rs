@@ -11,18 +11,18 @@ pub struct ShapeError {
     pub problem: String,
     /// What to do.
     pub cure: &'static str,
-    /// Two colours of a frame that fit only when they are swapped.
-    pub swapped: Option<[&'static str; 2]>,
+    /// The order in which a frame has its colours, where it is not red, green, blue.
+    pub colour_order: Option<[&'static str; 3]>,
 }
 
 impl ShapeError {
     pub(super) fn new(field: &'static str, problem: impl Into<String>, cure: &'static str) -> Self {
-        Self { field, problem: problem.into(), cure, swapped: None }
+        Self { field, problem: problem.into(), cure, colour_order: None }
     }
 
-    /// The same fault, of two colours that fit only when they are swapped.
-    pub(super) fn of_swapped(mut self, colours: [&'static str; 2]) -> Self {
-        self.swapped = Some(colours);
+    /// The same fault, of colours that fit only in another order.
+    pub(super) fn of_other_order(mut self, colours: [&'static str; 3]) -> Self {
+        self.colour_order = Some(colours);
         self
     }
 }

@@ -4,6 +4,7 @@ use glam::{DVec2, Vec3A};
 use rayon::prelude::*;
 
 use super::cells::{Cells, View};
+use super::colours::OTHER_ORDERS;
 use super::error::ShapeError;
 use super::fill::{Pyramid, Weighted};
 use super::lattice::Lattice;
@@ -254,11 +255,17 @@ fn check(seen: &[Seen], medians: Vec3A) -> Result<(), ShapeError> {
     if own.iter().all(|r| *r > MIN_CORRELATION) {
         return Ok(());
     }
-    for (a, b) in [(0, 2), (0, 1), (1, 2)] {
-        if correlation(a, b) > MIN_CORRELATION && correlation(b, a) > MIN_CORRELATION {
-            let problem = format!("has {} and {} swapped against the constants' light", names[a], names[b]);
+    for order in OTHER_ORDERS {
+        if order.into_iter().enumerate().all(|(a, b)| correlation(a, b) > MIN_CORRELATION) {
+            let order = order.map(|c| names[c]);
+            let moved: Vec<&str> = (0..3).filter(|c| order[*c] != names[*c]).map(|c| names[c]).collect();
+            let what = match moved[..] {
+                [a, b] => format!("{a} and {b} swapped"),
+                _ => format!("its colours in the order {}", order.join(", ")),
+            };
             let cure = "give the frames in the order red, green, blue (--raw ..:rgb or :bgr), or mend the lights' wires";
-            return Err(ShapeError::new("rest", problem, cure).of_swapped([names[a], names[b]]));
+            return Err(ShapeError::new("rest", format!("has {what} against the constants' light"), cure)
+                .of_other_order(order));
         }
     }
     let worst = (0..3).min_by(|a, b| own[*a].total_cmp(&own[*b])).unwrap_or(0);

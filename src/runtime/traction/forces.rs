@@ -59,7 +59,9 @@ pub struct ForceDistribution {
     pub(super) columns: Vec<f64>,
     pub(super) wanted: Vec<f64>,
     /// Motion of dots and nodes by the forces so far, mm; the nodes' axes turned with the skin, and its stretch.
-    dots_moved_mm: Vec<DVec3>,
+    pub(super) dots_moved_mm: Vec<DVec3>,
+    /// By dot: its place on the deformed skin, and the deviation of its depth, mm.
+    pub(super) placed: Vec<(DVec3, f64)>,
     pub(super) nodes_moved_mm: Vec<DVec3>,
     pub(super) turned: Vec<DMat3>,
     pub(super) stretch: Vec<f64>,
@@ -74,7 +76,7 @@ pub struct ForceDistribution {
     pub(super) softness: f64,
     /// Whether the dots have moved by more than noise.
     pub(super) is_moved: bool,
-    result: LocalForces,
+    pub(super) result: LocalForces,
 }
 
 impl ForceDistribution {
@@ -127,6 +129,7 @@ impl ForceDistribution {
             columns: vec![0.0; AXES * n * max_rows],
             wanted: Vec::with_capacity(max_rows),
             dots_moved_mm: vec![DVec3::ZERO; dots.len()],
+            placed: Vec::with_capacity(dots.len()),
             nodes_moved_mm: vec![DVec3::ZERO; n],
             turned: model.nodes.iter().map(|node| node.axes).collect(),
             stretch: vec![1.0; n],
@@ -305,7 +308,13 @@ impl ForceDistribution {
         }
         // What the model leaves unexplained beyond the noise makes all less sure.
         self.posterior.widen((over / f64::from(count.max(1))).sqrt().max(1.0));
+        self.result.rms_px = (sum / f64::from(count.max(1))).sqrt();
+        self.result.compliance_factor = self.softness;
+        let springs_sd_n = self.reference_mm.and(tracked.wrench_sd).map(|sd| sd.force_n);
+        self.result.contact = self.contact(springs_sd_n);
+        self.place_dots(&tracked.black_dots);
         for (k, (dot, found)) in self.dots.iter().zip(&tracked.black_dots).enumerate() {
+            let (surface_mm, depth_sd_mm) = self.placed[k];
             let (mut traction, mut pressure, mut coarse) = (DVec3::ZERO, 0.0, 0.0);
             for (node, share) in self.model.about(dot.surface_mm) {
                 let own = DVec3::from_array([0, 1, 2].map(|axis| self.set.tractions[axis * n + node]));
@@ -320,15 +329,12 @@ impl ForceDistribution {
             }
             self.result.dots.push(DotTraction {
                 id: found.id,
-                surface_mm: dot.rest_mm + self.dots_moved_mm[k],
+                surface_mm,
+                depth_sd_mm,
                 traction_n_mm2: traction,
                 noise_sd_n_mm2: sd,
                 sd_n_mm2: sd.hypot(coarse.sqrt()),
             });
         }
-        self.result.rms_px = (sum / f64::from(count.max(1))).sqrt();
-        self.result.compliance_factor = self.softness;
-        let springs_sd_n = self.reference_mm.and(tracked.wrench_sd).map(|sd| sd.force_n);
-        self.result.contact = self.contact(springs_sd_n);
     }
 }

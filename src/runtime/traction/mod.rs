@@ -31,6 +31,7 @@
 //! | `heights` | a height map as heights of nodes, and which of them are touched |
 //! | `pressure` | pressures on a height map's grid |
 //! | `posterior` | what is left open |
+//! | `places` | dots in three dimensions |
 //! | `contact` | area, point, normal, force |
 
 mod active_set;
@@ -40,6 +41,7 @@ mod contact;
 mod forces;
 mod heights;
 mod model;
+mod places;
 mod posterior;
 mod pressure;
 mod pressure_room;

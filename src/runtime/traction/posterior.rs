@@ -23,6 +23,8 @@ pub(super) struct Posterior {
     /// By how much deviations are larger than the rows' own say.
     wider: f64,
     solved: Vec<f64>,
+    /// By dot: deviation of its depth by such a pressure, mm; likewise.
+    alone_mm: Vec<[f64; 2]>,
     /// By dot: deviation of a pressure about it that nothing else is near, N/mm2; where its place at rest was seen, and where it is
     /// the constants'.
     alone_n_mm2: Vec<[f64; 2]>,
@@ -32,7 +34,7 @@ impl Posterior {
     /// For dots at these places, whose images move so with them.
     pub fn new(model: &ElasticModel, dots: &[Dot]) -> Self {
         let n = model.nodes.len();
-        let alone = |dot: &Dot| {
+        let alone = |(number, dot): (usize, &Dot)| {
             // A smooth pressure about the dot, of height 1.
             let height = |k: usize| {
                 let q = model.nodes[k].at_mm.distance_squared(dot.surface_mm);
@@ -48,8 +50,11 @@ impl Posterior {
                     *seen += squares / (USUAL_DOT_SD_PX.powi(2) + place_sd_px.powi(2));
                 }
             }
-            seen.map(|seen| 1.0 / seen.sqrt())
+            let own: DVec3 = heights.iter().map(|(k, h)| model.dots_mm[k * dots.len() + number] * *h).sum();
+            let sds = seen.map(|seen| 1.0 / seen.sqrt());
+            (sds, sds.map(|sd| sd * dot.ray().dot(own).abs()))
         };
+        let (alone_n_mm2, alone_mm) = dots.iter().enumerate().map(alone).unzip();
         Self {
             nodes: Vec::with_capacity(MAX_NODES),
             place: vec![None; n],
@@ -57,7 +62,8 @@ impl Posterior {
             is_known: false,
             wider: 1.0,
             solved: Vec::with_capacity(MAX_NODES),
-            alone_n_mm2: dots.iter().map(alone).collect(),
+            alone_mm,
+            alone_n_mm2,
         }
     }
 
@@ -106,8 +112,24 @@ impl Posterior {
         if !any {
             return None;
         }
+        Some(self.sd_of_weights())
+    }
+
+    /// Of the pressures weighted as `solved` has them.
+    fn sd_of_weights(&mut self) -> f64 {
         forward(&self.factored, MAX_NODES, &mut self.solved);
-        Some(self.wider * self.solved.iter().map(|v| v * v).sum::<f64>().sqrt())
+        self.wider * self.solved.iter().map(|v| v * v).sum::<f64>().sqrt()
+    }
+
+    /// Deviation of a dot's depth, mm; `by_node`: what a pressure of 1 N/mm2 on a node moves it by along its ray, mm.
+    pub fn depth_sd_mm(&mut self, number: usize, rest_frames: u32, by_node: impl Fn(usize) -> f64) -> f64 {
+        let alone = self.alone_mm.get(number).map_or(0.0, |alone| alone[usize::from(rest_frames == 0)]);
+        if !self.is_known {
+            return alone;
+        }
+        self.solved.clear();
+        self.solved.extend(self.nodes.iter().map(|node| by_node(*node)));
+        self.sd_of_weights().max(alone)
     }
 
     /// Deviation of the pressure at a dot, N/mm2.

@@ -33,8 +33,11 @@ impl TractionStatus {
 pub struct DotTraction {
     /// The dot's number in the constants.
     pub id: u32,
-    /// Where the dot is on the deformed skin, sensor frame, mm: its depth along the camera's ray is the elastic model's.
+    /// Where the dot is on the deformed skin, sensor frame, mm: on the ray on which it is seen, as deep along that as the elastic
+    /// model has it.
     pub surface_mm: DVec3,
+    /// Standard deviation of that depth, mm.
+    pub depth_sd_mm: f64,
     /// Force on the skin over its area as it is now, sensor frame, N/mm2; pressure points inwards.
     pub traction_n_mm2: DVec3,
     /// Standard deviation of its normal part by the noise of the dots, N/mm2: what nodes and dots are too coarse to tell is not in it.

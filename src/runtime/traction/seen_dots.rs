@@ -13,7 +13,7 @@ use domecast_optics::numeric::Rigid;
 use domecast_springs::Wrench;
 
 /// What the elastic model may be off, as a part of each dot's motion: coarse elements and small strain.
-const MODEL_PART: f64 = 0.05;
+pub(super) const MODEL_PART: f64 = 0.05;
 /// Least standard deviation of a dot on each axis, px: what `track` is off by on clean frames, which its noise does not say.
 const MIN_DOT_SD_PX: f64 = 0.01;
 /// Dots whose motions' sum of squares is no more than so many deviations over that of noise have not moved.

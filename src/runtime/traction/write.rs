@@ -29,10 +29,10 @@ pub fn write_json_forces(
     for (i, dot) in forces.dots.iter().enumerate() {
         let comma = if i == 0 { "" } else { "," };
         let (at, traction) = (three(dot.surface_mm), three(dot.traction_n_mm2));
-        let (noise_sd, sd) = (dot.noise_sd_n_mm2, dot.sd_n_mm2);
+        let (depth_sd, noise_sd, sd) = (dot.depth_sd_mm, dot.noise_sd_n_mm2, dot.sd_n_mm2);
         write!(
             out,
-            "{comma}{{\"id\":{},\"surface_mm\":{at},\"n_mm2\":{traction},\"noise_sd\":{noise_sd:.6},\"sd\":{sd:.6}}}",
+            "{comma}{{\"id\":{},\"surface_mm\":{at},\"depth_sd_mm\":{depth_sd:.6},\"n_mm2\":{traction},\"noise_sd\":{noise_sd:.6},\"sd\":{sd:.6}}}",
             dot.id
         )?;
     }

@@ -1,6 +1,7 @@
 //! The law's inverse: the pose at which the springs balance a load.
 
-use nalgebra::{Matrix6, Vector6};
+use domecast_optics::numeric::symmetric_eigen;
+use nalgebra::{DMatrix, Matrix6, Vector6};
 
 use super::dual::jacobian;
 use super::load::Wrench;
@@ -106,7 +107,7 @@ impl Suspension {
         let reach = self.reach_mm();
         let scale = |i: usize| if i < 3 { 1.0 } else { 1.0 / reach };
         let symmetric =
-            Matrix6::from_fn(|i, j| 0.5 * (tangent[(i, j)] + tangent[(j, i)]) * scale(i) * scale(j));
-        symmetric.symmetric_eigenvalues().min()
+            DMatrix::from_fn(6, 6, |i, j| 0.5 * (tangent[(i, j)] + tangent[(j, i)]) * scale(i) * scale(j));
+        symmetric_eigen(symmetric).map_or(f64::NEG_INFINITY, |eigen| eigen.eigenvalues.min())
     }
 }

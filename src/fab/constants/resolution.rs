@@ -1,14 +1,14 @@
 //! What the sensor can resolve: centroid noise through the Jacobian of the refracting projection.
 
 use glam::DVec3;
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{DMatrix, Matrix6, Vector6};
 use serde::Serialize;
 
 use super::sight::markers_of;
 use domecast_design::Design;
 use domecast_design::settings::SAFETY;
 use domecast_optics::SensorOptics;
-use domecast_optics::numeric::Rigid;
+use domecast_optics::numeric::{Rigid, symmetric_eigen};
 use domecast_optics::pose::{Marker, displacement_from_motion};
 use domecast_runtime::constants::WRENCH_AXES;
 use domecast_springs::{Displacement, Suspension};
@@ -63,8 +63,8 @@ pub fn resolution_at(
     let scale = Vector6::from_fn(|i, _| if i < 3 { 1.0 } else { 1.0 / lever_mm });
     let back = transfer.try_inverse()?;
     let by_displacement = back.transpose() * normal * back;
-    let scaled = Matrix6::from_fn(|i, j| by_displacement[(i, j)] * scale[i] * scale[j]);
-    let values = scaled.symmetric_eigenvalues();
+    let scaled = DMatrix::from_fn(6, 6, |i, j| by_displacement[(i, j)] * scale[i] * scale[j]);
+    let values = symmetric_eigen(scaled)?.eigenvalues;
     let condition = (values.max() / values.min()).sqrt();
     let sd = |m: &Matrix6<f64>| -> [f64; 6] { std::array::from_fn(|i| m[(i, i)].max(0.0).sqrt()) };
     let wrench_sd = sd(&of_wrench);

@@ -23,6 +23,7 @@ mod random;
 mod rigid;
 mod roots;
 mod rotation;
+mod spectral;
 
 pub use batch::LengthMismatch;
 pub use polynomial::Polynomial;
@@ -30,6 +31,7 @@ pub use random::{SeededRandom, mix64};
 pub use rigid::{ROTATION_TOLERANCE, Rigid, RigidError};
 pub use roots::{MAX_ITERATIONS, Root, RootError, bracketed_newton};
 pub use rotation::{cross_matrix, rotation_from_vector, vector_from_rotation};
+pub use spectral::{pseudo_inverse, singular_values, symmetric_eigen};
 
 #[cfg(test)]
 mod tests;

@@ -208,3 +208,34 @@ fn noise_of_the_motions_does_not_shrink_the_stiffness() {
     let rms = f64::sqrt(squares / count);
     assert!((0.85..1.15).contains(&rms), "{rms}");
 }
+
+// One axis after the other: no two motions ever go together, and five of six rows hold an axis still, where noise of the
+// motions speaks against any stiffness.
+#[test]
+fn axes_that_move_one_after_the_other_are_all_found() {
+    let sd = [0.03, 0.03, 0.03, 0.003, 0.003, 0.003];
+    let size = [0.3, 0.3, 1.0, 0.04, 0.04, 0.04];
+    for (seed, is_read_with_noise) in (0..12).flat_map(|seed| [(seed, true), (seed, false)]) {
+        let mut random = SeededRandom::new(40 + seed);
+        let mut row = |k: usize| {
+            let wave = (f64::from(k as u32 % 25) / 24.0 * std::f64::consts::TAU).sin();
+            let moved: [f64; 6] = std::array::from_fn(|i| if i == k / 25 { size[i] * wave } else { 0.0 });
+            let load = truth() * Vector6::from(moved);
+            let mut noise = || if is_read_with_noise { random.normal() } else { 0.0 };
+            let displacement = std::array::from_fn(|i| moved[i] + sd[i] * noise());
+            let wrench = std::array::from_fn(|i| Some(load[i] + 0.02 * truth()[(i, i)] * size[i] * noise()));
+            let displacement_covariance = if is_read_with_noise {
+                Matrix6::zeros()
+            } else {
+                Matrix6::from_diagonal(&Vector6::from(sd.map(|v| 1e-4 * v * v)))
+            };
+            Pair { displacement, wrench, displacement_covariance }
+        };
+        let rows: Vec<Pair> = (0..150).map(&mut row).collect();
+        let found = fit(&rows, &truth(), &SIZES, MotionNoise::Stated).unwrap();
+        for i in 0..6 {
+            let part = found.stiffness[i][i] / truth()[(i, i)];
+            assert!((0.7..1.2).contains(&part), "{seed} {is_read_with_noise}: axis {i}: {part}");
+        }
+    }
+}

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use crate::constants::Constants;
 use crate::track::TrackError;
 use domecast_elastic::{Compliance, ElasticDome, SurfaceField};
+use domecast_optics::numeric::pseudo_inverse;
 
 /// Elements along the meridian: nodes a sixteenth of it apart, 1 mm on a dome of 10 mm radius.
 const ELEMENTS: usize = 16;
@@ -197,7 +198,7 @@ fn slopes(
         [1.0, x, y, x * x, x * y, y * y]
     };
     let matrix = DMatrix::from_fn(beside.len(), 6, |i, j| row(beside[i])[j]);
-    let inverse = matrix.pseudo_inverse(1e-9).unwrap_or_else(|_| DMatrix::zeros(6, beside.len()));
+    let inverse = pseudo_inverse(matrix, 1e-9).unwrap_or_else(|| DMatrix::zeros(6, beside.len()));
     beside.iter().enumerate().map(|(i, k)| (*k, inverse[(1, i)], inverse[(2, i)])).collect()
 }
 

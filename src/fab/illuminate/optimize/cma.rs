@@ -5,9 +5,9 @@
 //! constants given there and positive weights. Only the order of the points counts, so that what is not allowed needs no
 //! number, just a place behind what is.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
-use domecast_optics::numeric::SeededRandom;
+use domecast_optics::numeric::{SeededRandom, symmetric_eigen};
 
 /// A point of the space that is searched.
 pub type SearchPoint = DVector<f64>;
@@ -103,8 +103,10 @@ impl Cma {
 
     /// Takes a covariance, with its axes.
     fn reshape(&mut self, covariance: &DMatrix<f64>) {
-        self.covariance = 0.5 * (covariance + covariance.transpose());
-        let eigen = SymmetricEigen::new(self.covariance.clone());
+        let symmetric = 0.5 * (covariance + covariance.transpose());
+        // Where it has no axes, the last ones stay.
+        let Some(eigen) = symmetric_eigen(symmetric.clone()) else { return };
+        self.covariance = symmetric;
         let lengths = eigen.eigenvalues.map(|value| value.max(1e-20).sqrt());
         self.axes = &eigen.eigenvectors * DMatrix::from_diagonal(&lengths);
         let inverse = DMatrix::from_diagonal(&lengths.map(f64::recip));

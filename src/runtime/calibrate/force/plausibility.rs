@@ -23,6 +23,8 @@ const MIN_LEVER_MM: f64 = 3.0;
 const GEOMETRY_SD: f64 = 0.4;
 /// What an axis that does not follow counts.
 const MISS: f64 = 25.0;
+/// A table that follows the geometry had a mistake where the scatter without it is less than this part.
+const CLEARLY: f64 = 0.4;
 /// Rows that a hypothesis is judged by.
 const MAX_ROWS: usize = 400;
 /// Below this part of the travel a table hardly says anything: of two explanations the one with more is likelier.
@@ -93,6 +95,14 @@ impl Judgement {
         let idle = (USUAL_USE / used).ln().max(0.0);
         let score = sum / axes.len().max(1) as f64 + idle * idle + if is_in_reach { 0.0 } else { MISS };
         Self { axes, is_in_reach, score }
+    }
+
+    /// How the readings of these axes scatter about what they follow, in all; 1 for each that follows nothing.
+    fn scatter(&self, axes: &[usize]) -> f64 {
+        let part = |axis: &AxisJudgement| {
+            axis.following.filter(Following::is_clear).map_or(1.0, |f| (f.scatter / f.slope.abs()).min(1.0))
+        };
+        self.axes.iter().filter(|axis| axes.contains(&axis.axis)).map(part).sum()
     }
 
     fn is_explained(&self) -> bool {
@@ -243,8 +253,28 @@ pub fn examine_pairs(
     if !is_good {
         return suspect(axes_at_fault(pairs, &now));
     }
+    let other_order = || clearly_shifted(pairs, &reference, sizes, &now);
     mixed_units(pairs, &reference, sizes, &now, true)
+        .or_else(other_order)
         .map_or(Ok(()), |(_, name)| suspect(format!("looks like {name}")))
+}
+
+/// Rows that go together some rows off much more closely than as they stand: motions that are slow follow the geometry even so.
+fn clearly_shifted(
+    pairs: &[Pair],
+    reference: &SpringReference,
+    sizes: &[f64; 6],
+    now: &Judgement,
+) -> Option<(f64, String)> {
+    let all = [0, 1, 2, 3, 4, 5];
+    let most = CLEARLY * now.scatter(&all);
+    let judged = orders().into_iter().filter_map(|mistake| {
+        let judgement = Judgement::of(&mistake.taken_back(pairs), reference, sizes);
+        let scatter = judgement.scatter(&all);
+        let is_whole = judgement.axes.len() == now.axes.len();
+        (is_whole && judgement.is_explained() && scatter < most).then_some((scatter, mistake.name))
+    });
+    judged.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// A unit that only some of the rows have, in words: taking it back row by row leaves much less.
@@ -256,16 +286,17 @@ fn mixed_units(
     is_good: bool,
 ) -> Option<(f64, String)> {
     let scale = |axis: usize| now.axes.iter().find(|a| a.axis == axis).map(|a| a.expected_range);
-    // How far a row is from its predictions, in parts of the ranges; wild readings count once.
-    let miss = |pair: &Pair| {
-        let predicted = reference.wrench(&pair.displacement);
-        let part = |axis: usize| Some(((pair.wrench[axis]? - predicted[axis]).abs() / scale(axis)?).min(1.0));
-        (0..6).filter_map(part).sum::<f64>()
-    };
-    let before: Vec<f64> = pairs.iter().map(miss).collect();
-    let sum: f64 = before.iter().sum();
     let mut best: Option<(f64, String)> = None;
     for mistake in mistakes().iter().filter(|mistake| mistake.is_unit) {
+        let axes = mistake.axes();
+        // How far a row is from its predictions, in parts of the ranges; wild readings count once.
+        let miss = |pair: &Pair| {
+            let predicted = reference.wrench(&pair.displacement);
+            let part =
+                |axis: usize| Some(((pair.wrench[axis]? - predicted[axis]).abs() / scale(axis)?).min(1.0));
+            axes.iter().filter_map(|axis| part(*axis)).sum::<f64>()
+        };
+        let before: Vec<f64> = pairs.iter().map(miss).collect();
         let cured = mistake.taken_back(pairs);
         let better = |row: usize| miss(&cured[row]) < 0.5 * before[row] && before[row] > 0.1;
         let which: Vec<usize> = (0..pairs.len()).filter(|row| better(*row)).collect();
@@ -274,9 +305,8 @@ fn mixed_units(
         }
         let mut mixed = pairs.to_vec();
         which.iter().for_each(|row| mixed[*row] = cured[*row]);
-        let after: f64 = mixed.iter().map(miss).sum();
         let judgement = Judgement::of(&mixed, reference, sizes);
-        let is_clear = !is_good || after < 0.4 * sum;
+        let is_clear = !is_good || judgement.scatter(&axes) < CLEARLY * now.scatter(&axes);
         let is_best = best.as_ref().is_none_or(|(lowest, _)| judgement.score < *lowest);
         if is_clear && judgement.is_explained() && is_best {
             let name = format!("{} of {} rows in another unit: {}", which.len(), pairs.len(), mistake.name);

@@ -6,6 +6,7 @@
 //! (W. A. Fuller, *Measurement Error Models*, 1987, section 2.2); `c` keeps the biweight consistent, because a reading
 //! that is off weighs less.
 
+use domecast_optics::numeric::{pseudo_inverse, singular_values, symmetric_eigen};
 use nalgebra::{DMatrix, DVector};
 
 use super::types::{ForceModel, Pair};
@@ -19,8 +20,16 @@ const MAX_ROUNDS: usize = 60;
 const MIN_SINGULAR: f64 = 1e-3;
 /// `E[w(u) u^2] / E[w(u)]` of the biweight for normal noise: `(1 - 6/k^2 + 15/k^4) / (1 - 2/k^2 + 3/k^4)`.
 const NOISE_SHARE: f64 = 0.8284;
+/// A product of two motions counts from this part on of the product of their sizes: less is rounding.
+const MIN_TOGETHER: f64 = 1e-6;
 /// A direction of the terms must vary by more than this many times its noise to be determined.
 const MIN_VARIANCE_IN_NOISE: f64 = 1.0;
+
+/// Rows that move one axis scatter as the others do. Where they scatter by this many times that, they are no outliers: the coefficient
+/// is wrong, for the many rows that hold the axis still do not need it.
+const MAX_GROUP: f64 = 3.0;
+/// Such rows at least.
+const MIN_GROUP: usize = 6;
 
 /// The fit of one axis.
 pub(super) struct RobustFit {
@@ -57,17 +66,19 @@ impl Terms {
     fn new(pairs: &[Pair], axis: usize, rows: &[usize], model: ForceModel, moved: &[usize]) -> Self {
         let all: Vec<Vec<f64>> = rows.iter().map(|row| model.terms(&pairs[*row].displacement)).collect();
         let count = all.first().map_or(0, Vec::len);
-        // The offset stands at 6; a product term belongs to the axis that it multiplies.
+        let rms =
+            |term: usize| (all.iter().map(|t| t[term] * t[term]).sum::<f64>() / rows.len() as f64).sqrt();
+        // The offset stands at 6; a product term belongs to the axis that it multiplies, where the two ever move together.
         let belongs = |term: usize| match term {
             0..6 => moved.contains(&term),
             6 => true,
-            _ => moved.contains(&(term - 7)) && moved.contains(&2),
+            _ => {
+                let apart = rms(term - 7) * rms(2);
+                moved.contains(&(term - 7)) && moved.contains(&2) && rms(term) > MIN_TOGETHER * apart
+            }
         };
         let used: Vec<usize> = (0..count).filter(|term| belongs(*term)).collect();
-        let rms = |term: &usize| {
-            (all.iter().map(|t| t[*term] * t[*term]).sum::<f64>() / rows.len() as f64).sqrt().max(1e-300)
-        };
-        let scale: Vec<f64> = used.iter().map(rms).collect();
+        let scale: Vec<f64> = used.iter().map(|term| rms(*term).max(1e-300)).collect();
         let design = DMatrix::from_fn(rows.len(), used.len(), |i, j| all[i][used[j]] / scale[j]);
         let target = DVector::from_fn(rows.len(), |i, _| pairs[rows[i]].wrench[axis].unwrap_or(0.0));
         let noise_of = |row: &usize| {
@@ -80,6 +91,18 @@ impl Terms {
             rows.iter().all(|row| pairs[*row].displacement_covariance == nalgebra::Matrix6::zeros());
         let noise = if is_exact { Vec::new() } else { rows.iter().map(noise_of).collect() };
         Self { count, used, scale, design, target, noise }
+    }
+
+    /// The scatter beyond which a row is an outlier: that of all rows, or that of the rows that move one of the axes.
+    fn scatter(&self, left: &DVector<f64>, sd: f64) -> f64 {
+        let of_group = |term: usize| {
+            // Columns have a root mean square of one.
+            let is_moved = |row: &usize| self.design[(*row, term)].abs() > 1.0;
+            let mut sizes: Vec<f64> = (0..left.len()).filter(is_moved).map(|row| left[row].abs()).collect();
+            if sizes.len() < MIN_GROUP { 0.0 } else { MAD_TO_SD * median(&mut sizes) }
+        };
+        let largest = (0..self.used.len()).map(of_group).fold(0.0, f64::max);
+        if largest > MAX_GROUP * sd { largest } else { sd }
     }
 
     /// What noise adds to the normal matrix under these weights.
@@ -96,10 +119,7 @@ impl Terms {
         let weighted = DMatrix::from_fn(self.design.nrows(), width, |i, j| self.design[(i, j)] * weights[i]);
         let noise = self.noise_sum(|row| NOISE_SHARE * weights[row]);
         let normal = weighted.transpose() * &self.design - &noise;
-        if normal.iter().any(|v| !v.is_finite()) {
-            return None;
-        }
-        let eigen = normal.symmetric_eigen();
+        let eigen = symmetric_eigen(normal)?;
         let largest = eigen.eigenvalues.max();
         let mut inverse = DMatrix::zeros(width, width);
         let mut determined = vec![true; width];
@@ -126,7 +146,7 @@ impl Terms {
         let root = weights.map(f64::sqrt);
         let (height, width) = self.design.shape();
         let weighted = DMatrix::from_fn(height, width, |i, j| self.design[(i, j)] * root[i]);
-        let svd = weighted.clone().svd(false, true);
+        let svd = singular_values(weighted.clone())?;
         let v_t = svd.v_t.as_ref()?;
         let largest = svd.singular_values.max();
         let mut inverse = DMatrix::zeros(width, width);
@@ -162,7 +182,7 @@ impl Terms {
         let variance = (psi2 / freedom) / (slope / n).max(0.05).powi(2);
         let gram = self.design.transpose() * &self.design;
         let inverse = |matrix: DMatrix<f64>| {
-            matrix.pseudo_inverse(1e-12).unwrap_or_else(|_| DMatrix::zeros(width, width))
+            pseudo_inverse(matrix, 1e-12).unwrap_or_else(|| DMatrix::zeros(width, width))
         };
         if self.noise.is_empty() {
             return inverse(gram) * variance;
@@ -188,7 +208,7 @@ pub(super) fn robust(
     let width = terms.used.len();
     let mut weights = DVector::from_element(rows.len(), 1.0);
     let mut found = DVector::zeros(width);
-    let mut sd = 0.0;
+    let (mut sd, mut scatter) = (0.0, 0.0);
     let mut determined = vec![true; width];
     for round in 0..MAX_ROUNDS {
         let Some((next, flags)) = terms.solve(&weights) else { break };
@@ -196,19 +216,20 @@ pub(super) fn robust(
         let left = &terms.target - &terms.design * &next;
         let mut sizes: Vec<f64> = left.iter().map(|v| v.abs()).collect();
         sd = (MAD_TO_SD * median(&mut sizes)).max(1e-13 * terms.target.amax());
+        scatter = terms.scatter(&left, sd);
         // The first round's scale is that of plain least squares, which outliers widen: it only lets them go
         // more slowly.
         let change = (&next - &found).amax();
         found = next;
         weights = left.map(|r| {
-            let u = r / (TUKEY * sd.max(f64::MIN_POSITIVE));
+            let u = r / (TUKEY * scatter.max(f64::MIN_POSITIVE));
             if u.abs() < 1.0 { (1.0 - u * u).powi(2) } else { 0.0 }
         });
         if round > 3 && change <= 1e-10 * found.amax() {
             break;
         }
     }
-    let scaled = terms.covariance(&found, sd);
+    let scaled = terms.covariance(&found, scatter);
     let mut covariance = DMatrix::zeros(terms.count, terms.count);
     let mut coefficients = vec![0.0; terms.count];
     let mut half_widths = vec![None; terms.count];

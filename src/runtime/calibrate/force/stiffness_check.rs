@@ -1,6 +1,7 @@
 //! Whether a fitted 6x6 can be that of springs between two platforms.
 
-use nalgebra::{Matrix3, Matrix6};
+use domecast_optics::numeric::symmetric_eigen;
+use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::plausibility::MAX_FACTOR;
 use super::reference::SpringReference;
@@ -95,14 +96,12 @@ fn not_positive(stiffness: &Matrix6<f64>) -> Option<String> {
             stiffness[(i, i)]
         ));
     }
-    let scaled = Matrix6::from_fn(|i, j| {
+    let scaled = DMatrix::from_fn(6, 6, |i, j| {
         let size = (stiffness[(i, i)] * stiffness[(j, j)]).sqrt();
         0.5 * (stiffness[(i, j)] + stiffness[(j, i)]) / size
     });
-    if scaled.iter().any(|v| !v.is_finite()) {
-        return Some("the stiffness is not finite".into());
-    }
-    let smallest = scaled.symmetric_eigenvalues().min();
+    let Some(eigen) = symmetric_eigen(scaled) else { return Some("the stiffness is not finite".into()) };
+    let smallest = eigen.eigenvalues.min();
     (smallest < MIN_EIGENVALUE).then(|| {
         format!(
             "the stiffness is not positive definite (least eigenvalue {smallest:.3} of the 6x6 scaled to ones): the \

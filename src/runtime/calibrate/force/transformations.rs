@@ -181,6 +181,16 @@ impl Mistake {
         self.name != other.name && !changed(self).iter().zip(changed(other)).any(|(a, b)| *a && b)
     }
 
+    /// Axes of the wrench whose readings or predictions it changes.
+    pub fn axes(&self) -> Vec<usize> {
+        match &self.cure {
+            Cure::Scale(moves, loads) if moves.iter().all(|v| *v == 1.0) => {
+                (0..6).filter(|axis| loads[*axis] != 1.0).collect()
+            }
+            _ => (0..6).collect(),
+        }
+    }
+
     /// The table without the mistake.
     pub fn taken_back(&self, pairs: &[Pair]) -> Vec<Pair> {
         let with = |change: &dyn Fn(&mut Pair)| {

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::constants::{CameraConstants, shift_lens};
 use domecast_optics::camera::LensSpec;
+use domecast_optics::numeric::symmetric_eigen;
 
 /// fx, fy, cx, cy and the coefficients of the distortion, as independent numbers of deviation one: the columns of a root
 /// of their covariance. None where no covariance is known: then they hold as they are.
@@ -39,10 +40,10 @@ impl Intrinsics {
         // In units of each number's own deviation, so that pixels and coefficients are alike.
         let sd: Vec<f64> = (0..count).map(|i| matrix[(i, i)].sqrt()).collect();
         let unit = |i: usize, j: usize| if size(i, j) > 0.0 { matrix[(i, j)] / (sd[i] * sd[j]) } else { 0.0 };
-        let eigen = DMatrix::from_fn(count, count, |i, j| 0.5 * (unit(i, j) + unit(j, i))).symmetric_eigen();
-        if eigen.eigenvalues.min() < -1e-6 {
+        let eigen = symmetric_eigen(DMatrix::from_fn(count, count, |i, j| 0.5 * (unit(i, j) + unit(j, i))));
+        let Some(eigen) = eigen.filter(|eigen| eigen.eigenvalues.min() >= -1e-6) else {
             return fault("is not positive definite");
-        }
+        };
         let root = DMatrix::from_fn(count, count, |i, k| {
             sd[i] * eigen.eigenvectors[(i, k)] * eigen.eigenvalues[k].max(0.0).sqrt()
         });

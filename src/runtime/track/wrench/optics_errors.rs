@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, Matrix2x6, Matrix6, Vector2, Vector6};
 use crate::constants::{CalibrationPriors, Constants, body_numbers, shift_body, shift_lens};
 use crate::track::error::TrackError;
 use crate::track::pose::MarkerSighting;
-use domecast_optics::numeric::Rigid;
+use domecast_optics::numeric::{Rigid, symmetric_eigen};
 use domecast_optics::{OpticsSpec, PixelMotion, SensorOptics};
 
 /// A number is stepped by this part of its deviation: curvature and rounding are far below.
@@ -212,7 +212,7 @@ pub(super) fn root_of(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let size = sd[i] * sd[j];
         if size > 0.0 { 0.5 * (covariance[(i, j)] + covariance[(j, i)]) / size } else { 0.0 }
     };
-    let eigen = DMatrix::from_fn(count, count, unit).symmetric_eigen();
+    let eigen = symmetric_eigen(DMatrix::from_fn(count, count, unit))?;
     if eigen.eigenvalues.iter().any(|v| *v < -1e-6) {
         return None;
     }

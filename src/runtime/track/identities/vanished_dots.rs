@@ -4,6 +4,8 @@
 //! numbers, and little seems to have moved. But at its end a dot is gone, and where it was is bare skin with no other blob
 //! about. No touch does that. Whatever moved since the dot was last seen, as far as it hangs together with the gap, may have
 //! another one's number then, until the dot is seen again.
+//!
+//! Nor is a number sure that a dot got by a jump among dots that look like none: skin that is squeezed so hides whose place it is.
 
 use glam::DVec2;
 
@@ -21,6 +23,9 @@ const BLOB_REACH: f64 = 1.0;
 /// Bare skin is as bright as the ground of the dots around but for this part.
 const GROUND_PART: f64 = 0.05;
 
+/// A dot that jumped by more than this part of the spacing has its number from the dots beside it.
+const JUMP: f64 = 0.5;
+
 /// What is remembered of vanished dots; keeps its buffers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct VanishedDots {
@@ -28,6 +33,8 @@ pub(super) struct VanishedDots {
     last_off_px: Vec<Option<DVec2>>,
     is_gone: Vec<bool>,
     is_doubtful: Vec<bool>,
+    /// By dot: whether it jumped among dots that look like none, and those still do.
+    is_alone: Vec<bool>,
     stack: Vec<usize>,
 }
 
@@ -64,6 +71,7 @@ impl VanishedDots {
             last_off_px: vec![None; dots],
             is_gone: vec![false; dots],
             is_doubtful: vec![false; dots],
+            is_alone: vec![false; dots],
             stack: Vec::with_capacity(dots),
         }
     }
@@ -93,10 +101,11 @@ impl VanishedDots {
             self.is_doubtful.fill(false);
         }
         self.spread(models, tracks);
+        self.find_alone(models, tracks);
         for (index, track) in tracks.iter_mut().enumerate() {
             if let Some(off_px) = track.off_px() {
                 self.last_off_px[index] = Some(off_px);
-                if self.is_doubtful[index] {
+                if self.is_doubtful[index] || self.is_alone[index] {
                     track.fault.get_or_insert(MarkState::IdentityUnsure);
                 }
             }
@@ -122,11 +131,25 @@ impl VanishedDots {
         }
     }
 
+    /// Dots that jumped where half of the dots beside them, and more, look like none.
+    fn find_alone(&mut self, models: &[DotModel], tracks: &[DotTrack]) {
+        for (index, (model, track)) in models.iter().zip(tracks).enumerate() {
+            let Some(off_px) = track.off_px() else { continue };
+            let looks_wrong =
+                |other: &&usize| tracks[**other].fault.is_some_and(|f| f != MarkState::IdentityUnsure);
+            let wrong = model.neighbors.iter().filter(looks_wrong).count();
+            let last_px = self.last_off_px[index].unwrap_or(DVec2::ZERO);
+            let is_new = off_px.distance(last_px) > JUMP * model.spacing_px;
+            self.is_alone[index] = 2 * wrong >= model.neighbors.len() && (is_new || self.is_alone[index]);
+        }
+    }
+
     /// Forgets all frames.
     pub fn restart(&mut self) {
         self.last_off_px.fill(None);
         self.is_gone.fill(false);
         self.is_doubtful.fill(false);
+        self.is_alone.fill(false);
     }
 }
 

@@ -253,7 +253,7 @@ impl ShapeFromColor {
             self.find_points();
         }
         let sd_mm = |cell: usize, height_mm: f32| {
-            let ring_mm2 = self.volume.variance_mm2(self.deviations.away()[cell]);
+            let ring_mm2 = self.volume.variance_mm2(self.view.surface_mm[cell].z);
             (self.deviations.variance_mm2(cell, width, height_mm) + ring_mm2).sqrt()
         };
         let skin = Skin { view: &self.view, points_mm: &self.points_mm, dome: self.optics.dome() };

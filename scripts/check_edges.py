@@ -2,7 +2,7 @@
 
     python3 scripts/check_edges.py DOMECAST [--quick] [--keep FOLDER]
 
-Frames are those of `check_shape.py`: simulated without noise, noise and JPEG added here. The simulator's elements are half as large as there: a sharp
+Frames are those of `shape_frames.py`. The simulator's elements are half as large as for `check_shape.py`: a sharp
 edge's touch is no wider than they are.
 """
 import argparse
@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-import check_shape as shape
+import shape_frames as shape
 
 # What lies on (a rod's radius or a block's sharp edge, mm), its angle about the dome's radius there, place (polar, azimuth), depth.
 EDGES = {

@@ -95,13 +95,14 @@ impl Volume {
         // depth no linear volume knows.
         let bulge_mm = -sums.pressed_mm3 / sums.step_mm2;
         let unseen = (1.0 - sums.area_mm2 / self.dome.area_mm2()).max(0.0);
-        let off_mm = bulge_mm * (0.5 * self.lost + unseen + sums.deepest_mm / self.dome.radius_mm());
+        let off_mm = bulge_mm * (0.5 * self.lost + unseen + 0.5 * sums.deepest_mm / self.dome.radius_mm());
         let own_mm = HIDDEN_SLOPE * sums.hidden_mm3 / sums.area_mm2;
         let gain = own_mm * own_mm / (own_mm * own_mm + off_mm * off_mm);
         let step_mm = gain * (self.lost * sums.pressed_mm3 - sums.volume_mm3) / sums.step_mm2;
         self.step_sd_mm = (off_mm * gain.sqrt()).hypot(ROUND_PART * step_mm);
         for (row, span) in view.spans.iter().enumerate() {
-            for cell in row * cells.width + span.start..row * cells.width + span.end {
+            for column in span.clone() {
+                let cell = row * cells.width + column;
                 let cosine = view.ray[cell].dot(view.normal[cell]).max(MIN_COSINE);
                 // The solve goes on from here in the next frame.
                 moved_mm[cell] += step_mm * self.part(view.surface_mm[cell].z) / f64::from(cosine);

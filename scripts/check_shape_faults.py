@@ -58,7 +58,9 @@ def stains(domecast, work, design, constants, quick):
     """Stains of several colours and sizes on untouched skin, in the middle of a touch and beside it: their pixels, and those around, say so."""
     dome, (name, press) = dome_of(constants), TOUCHES[design]
     rest, touch = simulate(domecast, work / f"{design}-rest", design, None), simulate(domecast, work / f"{design}-{name}", design, press(dome))
-    still, frame = work / f"{design}-stained-rest.png", work / f"{design}-stained.png"
+    folder = work / f"{design}-stained"
+    folder.mkdir(exist_ok=True)
+    still, frame, shape = folder / "camera_rest.png", folder / "camera_frame.png", folder / "shape"
     cv2.imwrite(str(still), photograph(drawn(rest), 2))
     point = np.array(json.loads((touch / "truth.jsonl").read_text().splitlines()[0])["contact"]["point_mm"]) - [0, 0, dome["center_z"]]
     polar, azimuth = np.degrees([np.arccos(point[2] / np.linalg.norm(point)), np.arctan2(point[1], point[0])])
@@ -69,8 +71,8 @@ def stains(domecast, work, design, constants, quick):
             for radius in RADII[1 if quick else 0:]:
                 mask = away <= np.degrees(radius)
                 cv2.imwrite(str(frame), stained(picture, mask, parts))
-                line = track(domecast, frame, still, constants, work / f"{design}-stained")
-                e = errors(truth, work / f"{design}-stained", dome)
+                line = track(domecast, frame, still, constants, shape)
+                e = errors(truth, shape, dome)
                 here, near = e["known"] & (e["polar"] <= 60), cv2.dilate(mask.astype(np.uint8), np.ones((41, 41))) > 0
                 for where, pixels in (("in it", here & mask), ("around it", here & near & ~mask), ("away", here & ~near)):
                     if pixels.sum() > 20:
@@ -87,15 +89,15 @@ def lights_out(domecast, work, design, constants):
     """Each light out in turn, touched or not: named, and nothing said of the skin. Without the light of the markers there may be no pose."""
     dome, (_, press) = dome_of(constants), TOUCHES[design]
     level = json.loads((work / design / "report/light.json").read_text())["level_per_mw_mm2"]
-    still = work / f"{design}-stained-rest.png"
-    cv2.imwrite(str(still), photograph(drawn(simulate(domecast, work / f"{design}-rest", design, None)), 2))
+    still = photograph(drawn(simulate(domecast, work / f"{design}-rest", design, None)), 2)
     lights = len(json.loads(constants.read_text())["light"]["leds"])
     for light in range(lights):
         each, said = [float(k != light) for k in range(lights)], []
         for touched, objects in (("rest", None), ("held", press(dome))):
             dark = draw(domecast, work / f"{design}-dark{light}-{touched}", ROOT / f"designs/{design}.json", level, objects, 0.5 if design != "picam-r20" else 1.0, each)
             cv2.imwrite(str(dark / "camera_frame.png"), photograph(drawn(dark), 7))
-            line = track(domecast, dark / "camera_frame.png", still, constants, dark / "shape")
+            cv2.imwrite(str(dark / "camera_rest.png"), still)
+            line = track(domecast, dark / "camera_frame.png", dark / "camera_rest.png", constants, dark / "shape")
             height = np.load(dark / "shape/frame_0000.height.npy")
             said.append((line["shape"]["status"], line["shape"].get("lights_out"), line.get("contact"), np.isfinite(height).any()))
         named = ("light_out", [light], None, False), ("no_pose", None, None, False)

@@ -12,7 +12,10 @@
 //!
 //! How large errors are beside what the readings promise is seen at each size of block. They have two halves: one is the slope of some
 //! height and cannot be seen; the other, the curl, is the slope of nothing, and is what the least squares leave over. Noise and what
-//! JPEG makes of blocks have no direction of their own and give both alike. The middle one of all blocks counts: touches are few.
+//! JPEG makes of blocks have no direction of their own and give both alike. The middle one of all blocks counts: touches are few. A block
+//! of which far more is left over than chance has it counts for itself: a stain feigns slopes that are no surface's.
+//!
+//! A hole may hide what none around shows: as much of a touch as it is wide.
 
 use glam::Vec3A;
 use rayon::prelude::*;

@@ -16,6 +16,10 @@ const LOST: f64 = 3.0;
 /// presses on bonded domes of the contact's model, far from the touch.
 const RISE: f64 = 0.2;
 
+/// By how much the volume of a linear skin is off, part of what is pressed in, for a touch as deep as the radius: 0.3 under balls, 1.1 under a
+/// nut a twelfth of the radius deep.
+const SECOND_ORDER: f64 = 0.5;
+
 /// Slope that the skin may have where it is not read between rim and light, rad.
 const HIDDEN_SLOPE: f64 = 0.05;
 
@@ -91,11 +95,11 @@ impl Volume {
         if !(sums.step_mm2 > 0.0 && sums.volume_mm3.is_finite()) {
             return false;
         }
-        // Kalman's gain of one unknown. A touch raises the skin around by its volume over the dome's area; what is of second order in its
-        // depth no linear volume knows.
+        // Kalman's gain of one unknown. A touch raises the skin around by its volume over the dome's area.
         let bulge_mm = -sums.pressed_mm3 / sums.step_mm2;
         let unseen = (1.0 - sums.area_mm2 / self.dome.area_mm2()).max(0.0);
-        let off_mm = bulge_mm * (0.5 * self.lost + unseen + 0.5 * sums.deepest_mm / self.dome.radius_mm());
+        let off_mm =
+            bulge_mm * (0.5 * self.lost + unseen + SECOND_ORDER * sums.deepest_mm / self.dome.radius_mm());
         let own_mm = HIDDEN_SLOPE * sums.hidden_mm3 / sums.area_mm2;
         let gain = own_mm * own_mm / (own_mm * own_mm + off_mm * off_mm);
         let step_mm = gain * (self.lost * sums.pressed_mm3 - sums.volume_mm3) / sums.step_mm2;

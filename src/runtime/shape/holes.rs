@@ -21,9 +21,9 @@ impl Holes {
             list.clear();
             list.resize(cells.count(), 0.0);
         }
-        let most = (cells.width + cells.height) as f32;
+        let max_cells = (cells.width + cells.height) as f32;
         for cell in (0..cells.count()).filter(|cell| view.is_dome[*cell] && is_hole(*cell)) {
-            self.deep[cell] = most;
+            self.deep[cell] = max_cells;
         }
         for is_down in [true, false] {
             pass(&mut self.deep, cells, view, is_down, |own, next| own.min(next + 1.0));

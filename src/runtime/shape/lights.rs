@@ -1,6 +1,6 @@
 //! Whether a light has gone out since the frame at rest.
 //!
-//! What a light gives now is said by the places at which it gives the most of a colour's light, less what other lights of the colour have
+//! What a light gives now is said by the places at which it gives most of a colour's light, less what other lights of the colour have
 //! lost there. A touch changes some of those places, a light that is out changes them all: the middle one counts.
 
 use super::cells::View;
@@ -18,7 +18,7 @@ const MIN_PLACES: usize = 12;
 /// A light that has lost so much of what it gave at rest is out.
 const OUT: f32 = 0.5;
 
-/// Bound on the rounds in which lights of a colour are told apart.
+/// Bound on the rounds in which lights of a colour are distinguished.
 const MAX_ROUNDS: usize = 16;
 
 /// A place at which one light gives the most of a channel's light.
@@ -58,9 +58,9 @@ impl Lights {
                 let seen =
                     || ways.sources.iter().zip(&still).map(|(source, own)| own * source.seen_mw[channel]);
                 let sum: f64 = seen().sum();
-                let most =
-                    seen().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, most)| *most > 0.0);
-                if let Some((light, _)) = most {
+                let strongest =
+                    seen().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, seen)| *seen > 0.0);
+                if let Some((light, _)) = strongest {
                     lights.places.push(Place { cell, channel, light, gone: f32::NAN });
                     lights.shares.extend(seen().map(|own| (own / sum) as f32));
                 }

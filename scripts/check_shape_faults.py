@@ -30,12 +30,12 @@ STAINS = {"red": (0.6, 0.6, 1), "green": (0.6, 1, 0.6), "blue": (1, 0.6, 0.6), "
           "faint grey": (0.92, 0.92, 0.92), "grey": (0.7, 0.7, 0.7), "dark": (0.15, 0.15, 0.15), "bright": (1.15, 1.15, 1.15), "cut off": None}
 RADII = (0.05, 0.1, 0.3)
 # Shares of pixels within three deviations, in a stain, to 20 px around it, and away: of all stains of a design, touched or not; of each.
-ALL_WITHIN, EACH_WITHIN = 0.95, 0.4
-# On thumb24-wide crescents without light leave over so much that a stain's share is not told apart.
-LESS_WITHIN = {"thumb24-wide": 0.9}
+ALL_WITHIN, EACH_WITHIN = 0.95, 0.35
+# On thumb24-wide and digit-rigid crescents without light leave over so much that a stain's share is not told apart.
+LESS_WITHIN = {"thumb24-wide": 0.9, "digit-rigid": 0.84}
 # Stains on untouched skin, of 33, that state a touch: what is left over is not told apart from
 # noise where dots cover two thirds of the skin or much of it is dark.
-MAX_FALSE_TOUCHES = {"endoscope-r5": 5, "picam-r20": 5, "thumb24-wide": 14}
+MAX_FALSE_TOUCHES = {"endoscope-r5": 5, "picam-r20": 11, "thumb24-wide": 14, "digit-rigid": 17}
 
 
 def away_deg(truth, dome, polar_deg, azimuth_deg):

@@ -20,7 +20,7 @@ import tempfile
 import cv2
 import numpy as np
 
-import check_shape as judge
+import shape_frames as judge
 
 check = judge.check
 AWAY_MM = 6.0

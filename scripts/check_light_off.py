@@ -16,7 +16,7 @@ import tempfile
 import cv2
 import numpy as np
 
-import check_shape as judge
+import shape_frames as judge
 
 check = judge.check
 

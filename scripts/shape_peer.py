@@ -19,7 +19,8 @@ import numpy as np
 from scipy.fft import dstn, idstn
 from scipy.spatial import cKDTree
 
-import check_shape as judge
+import check_shape
+import shape_frames as judge
 
 # Presses of the ball: radius, depth (mm), polar angle and azimuth (degrees).
 BALLS = [(3, 0.3 + 0.05 * (k % 5), polar, 137.5 * k) for k, polar in enumerate([0, 8, 15, 20, 25, 30, 33, 37, 40, 44, 48, 52])]
@@ -145,7 +146,7 @@ def main():
             table.finish()
         ratios = {}
         for name, objects in judge.PRESSES[design].items():
-            judge.judge(domecast, work, design, name, objects(dome), dome, constants)
+            check_shape.judge(domecast, work, design, name, objects(dome), dome, constants)
             truth = work / f"{design}-{name.replace(' ', '-')}"
             ours = judge.errors(truth, truth / "shape", dome)
             for kind, table in tables.items():

@@ -213,7 +213,7 @@ class ShapeMap:
 
     @property
     def status(self) -> str:
-        """`ok`, `not_converged`, or `no_pose`."""
+        """`ok`, `not_converged`, `no_pose`, or `light_out`: a light is out that was on at rest, and nothing is known."""
 
     @property
     def height_mm(self) -> Floats32:

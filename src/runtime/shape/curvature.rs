@@ -6,8 +6,8 @@ use nalgebra::{SMatrix, SVector};
 /// Fewest cells that curvatures are fitted to.
 const MIN_FITTED: usize = 30;
 
-/// How far an edge's direction is off beside what its middle and the whole of it differ by, rad: a degree and a half, for the mask's ends are ragged.
-const EDGE_SD_RAD: f64 = 0.026;
+/// How far an edge's direction is off beside what its middle and the whole of it differ by, rad: 1.8 degrees (25 edges on five designs), for the mask's ends are ragged.
+const EDGE_SD_RAD: f64 = 0.0314;
 
 /// Deviation from which on a direction is none, rad.
 const MAX_EDGE_SD_RAD: f64 = 0.2;

@@ -12,18 +12,22 @@
 //!
 //! How large errors are beside what the readings promise is seen at each size of block. They have two halves: one is the slope of some
 //! height and cannot be seen; the other, the curl, is the slope of nothing, and is what the least squares leave over. Noise and what
-//! JPEG makes of blocks have no direction of their own and give both alike. The middle one of all blocks counts: touches are few.
+//! JPEG makes of blocks have no direction of their own and give both alike. The middle one of all blocks counts: touches are few. A block
+//! of which far more is left over than chance has it counts for itself: a stain feigns slopes that are no surface's.
+//!
+//! A hole may hide what none around shows: as much of a touch as it is wide.
 
 use glam::Vec3A;
 use rayon::prelude::*;
 
+use super::blocks::{BLOCK, MIN_BLOCKS, Size, tilt_around};
 use super::cells::{Cells, View};
-use super::normals::CellReading;
-use super::rows::share;
+use super::holes::Holes;
+use super::normals::{CellReading, FILLED_SD_RAD};
+use super::rows::{MIN_ROWS, share};
 
-/// Cells along the side of the smallest blocks, those of a camera's JPEG, which are doubled until one covers the picture, and for how
-/// many of the sizes what is left over is looked at: there are few larger ones.
-const BLOCK: usize = 4;
+/// Rows of blocks that a thread takes at once, at least, and for how many of the sizes what is left over is looked at: there are few larger
+/// ones.
 const MIN_STRIPS: usize = 6;
 const SEEN_LEVELS: usize = 2;
 
@@ -34,9 +38,6 @@ const REST_LEFT: [f32; SEEN_LEVELS] = [0.373, 0.644];
 /// The size from which on blocks say what share of them is holes: smaller ones may lie within one.
 const HOLE_LEVEL: usize = 2;
 
-/// Readings are taken to cover no less of a block.
-const MIN_COVERED: f32 = 0.1;
-
 /// Octaves from a cell to the smallest block.
 const FIRST_OCTAVES: f32 = 2.0;
 
@@ -44,12 +45,8 @@ const FIRST_OCTAVES: f32 = 2.0;
 /// own spectrum).
 const OWN_CELL: f32 = 0.546;
 
-/// Share of a block's cells that must be read for it to say what is left over, and how many such blocks there must be.
-const MIN_READ: f32 = 0.9;
-const MIN_BLOCKS: usize = 20;
-
-/// Middle one of the squares of a normal number.
-const CHI_MEDIAN: f32 = 0.455;
+/// What is left over in a block counts for itself from where one of so many pictures has a block of its size with as much by chance.
+const BY_CHANCE: f32 = 1000.0;
 
 /// Part of the depth: what reading at two shapes and cells of finite size leave under a touch (1 to 4 % without any noise, presses
 /// of balls, edges and nuts on three designs).
@@ -58,33 +55,11 @@ const DEPTH_PART: f32 = 0.02;
 /// Part of the slope of a hole that is filled in from around.
 const HOLE_PART: f32 = 0.25;
 
+/// Radius of the smallest touch, part of the dome's: a hole so wide may hide it.
+const TOUCH_PART: f32 = 0.1;
+
 /// Rounds of the walk: one more than the ways have turns back.
 const WALKS: usize = 3;
-
-/// Sums over a block's cells.
-#[derive(Debug, Clone, Copy, Default)]
-struct Block {
-    cells: f32,
-    read: f32,
-    /// Cells that are filled in from around, and those that are neither that nor read: without light.
-    holes: f32,
-    unlit: f32,
-    /// Logarithms of variances of a cell's step, mm^2: of those that are read, and of those that are not.
-    logs: f32,
-    other_logs: f32,
-    /// Variances of the steps across and down, where they are read, mm^2, and what is left between the cells, mm.
-    variances_mm2: [f32; 2],
-    left_mm: [f32; 2],
-    /// What an octave of waves as long as the block adds to a height's variance, times `2 pi / ln 2`, mm^2, once all are added.
-    variance_mm2: f32,
-}
-
-/// Blocks of a size.
-#[derive(Debug, Clone, Default)]
-struct Size {
-    columns: usize,
-    blocks: Vec<Block>,
-}
 
 /// Deviations of the cells' heights, kept between frames.
 #[derive(Debug, Clone, Default)]
@@ -95,8 +70,9 @@ pub(super) struct Deviations {
     noise_mm2: Vec<f32>,
     /// Cells without readings on the way from the rim, where the skin is bonded: on the shortest in these.
     away: Vec<f32>,
-    /// Slope of the skin in the holes over the dome's, times cells' size, mm; 0 beside them.
+    /// How far heights in the holes may be off by what is filled in, mm; 0 beside them.
     hole_mm: Vec<f32>,
+    holes: Holes,
 }
 
 impl Deviations {
@@ -109,16 +85,14 @@ impl Deviations {
         readings: &[CellReading],
         tilt: impl Fn(usize) -> Vec3A + Sync,
         left_mm: impl Fn(usize, usize) -> f32 + Sync,
+        radius_mm: f32,
     ) {
         let w = cells.width;
         let is_dome = |cell: usize| view.is_dome.get(cell).copied().unwrap_or(false);
         self.clear(w.div_ceil(BLOCK), cells.height.div_ceil(BLOCK));
-        self.hole_mm.clear();
-        self.hole_mm.resize(cells.count(), 0.0);
         let Some(Size { columns, blocks }) = self.sizes.first_mut() else { return };
-        let strips = blocks.par_chunks_mut(*columns).zip(self.hole_mm.par_chunks_mut(BLOCK * w));
-        let strips = strips.zip(view.spans.par_chunks(BLOCK)).enumerate().with_min_len(share(MIN_STRIPS));
-        strips.for_each(|(strip, ((blocks, hole_mm), spans))| {
+        let strips = blocks.par_chunks_mut(*columns).zip(view.spans.par_chunks(BLOCK));
+        strips.enumerate().with_min_len(share(MIN_STRIPS)).for_each(|(strip, (blocks, spans))| {
             let rows = spans.iter().enumerate();
             for (row, column) in rows.flat_map(|(row, span)| span.clone().map(move |column| (row, column))) {
                 let cell = (strip * BLOCK + row) * w + column;
@@ -134,27 +108,35 @@ impl Deviations {
                 }
                 let log = 0.5 * (variances_mm2[0] * variances_mm2[1]).max(1e-30).ln();
                 block.cells += 1.0;
+                let left_mm = [right, below].map(|next| left_mm(cell, next));
+                let is_unlit = |cell: usize| !readings[cell].is_read && !readings[cell].is_hole();
+                if ![cell, right, below].into_iter().any(is_unlit) {
+                    block.joined += 1.0;
+                    for (sum, left_mm) in block.all_left_mm.iter_mut().zip(left_mm) {
+                        *sum += left_mm;
+                    }
+                }
                 if [cell, right, below].into_iter().all(|cell| readings[cell].is_read) {
                     block.read += 1.0;
+                    let tilt = tilt(cell).length_squared();
+                    block.tilts += tilt - readings[cell].noise.iter().sum::<f32>();
+                    block.slopes_mm2 += tilt * view.surface_mm[right].distance_squared(view.surface_mm[cell]);
                     block.logs += log;
-                    for (k, next) in [right, below].into_iter().enumerate() {
+                    for k in [0, 1] {
                         block.variances_mm2[k] += variances_mm2[k];
-                        block.left_mm[k] += left_mm(cell, next);
+                        block.left_mm[k] += left_mm[k];
                     }
-                } else {
-                    let size_mm = view.surface_mm[right].distance(view.surface_mm[cell]);
-                    hole_mm[row * w + column] = HOLE_PART * tilt(cell).length() * size_mm;
-                    if !readings[cell].is_read {
-                        block.other_logs += log;
-                        let is_hole = readings[cell].tilt.weight() < 1.0;
-                        *(if is_hole { &mut block.holes } else { &mut block.unlit }) += 1.0;
-                    }
+                } else if !readings[cell].is_read {
+                    block.other_logs += log;
+                    *(if readings[cell].is_hole() { &mut block.holes } else { &mut block.unlit }) += 1.0;
                 }
             }
         });
         let factors = self.factors();
         self.find_variances(factors);
         self.add_noise();
+        self.holes.find(cells, view, |cell| readings[cell].is_hole());
+        self.bridge(view, w, radius_mm);
         self.walk_from_rim(cells, view, readings);
     }
 
@@ -208,11 +190,15 @@ impl Deviations {
                 let size = coarser.get(up.checked_sub(1)?)?;
                 size.blocks.get(((i / columns) >> up) * size.columns + ((i % columns) >> up))
             };
-            let factor = factors[k.min(SEEN_LEVELS)];
+            let usual = factors[k.min(SEEN_LEVELS)];
+            // Half of a sum of two squares of normal numbers.
+            let is_local = blocks.len() >= 2 * MIN_BLOCKS;
+            let far_more = if is_local { (BY_CHANCE * blocks.len() as f32).ln() } else { f32::INFINITY };
             let to_holes = HOLE_LEVEL.saturating_sub(smaller.len());
             for (i, block) in blocks.iter_mut().enumerate() {
                 let beyond = around(i, 1).map(|block| block.variance_mm2);
                 let covered = around(i, to_holes).unwrap_or(block).covered();
+                let factor = block.factor(usual, far_more);
                 block.variance_mm2 = block.octave_mm2(factor / covered, beyond);
             }
         }
@@ -238,6 +224,28 @@ impl Deviations {
             }
             self.noise_mm2.push(sum / std::f32::consts::TAU);
         }
+    }
+
+    /// How far heights in holes may be off: across a hole as narrow as a dot the skin's slope is what it is around but for a part; one as wide
+    /// as a touch may hide it.
+    fn bridge(&mut self, view: &View, width: usize, radius_mm: f32) {
+        self.hole_mm.clear();
+        self.hole_mm.resize(view.is_dome.len(), 0.0);
+        let (sizes, holes) = (&self.sizes, &self.holes);
+        let rows = self.hole_mm.par_chunks_mut(width).zip(&view.spans).enumerate();
+        rows.with_min_len(share(MIN_ROWS)).for_each(|(row, (hole_mm, span))| {
+            for column in span.clone() {
+                let cell = row * width + column;
+                let (deep, wide) = (holes.deep[cell], holes.wide[cell]);
+                let next = view.surface_mm.get(cell + 1).copied().unwrap_or_default();
+                if deep > 0.0 {
+                    let size_mm = next.distance(view.surface_mm[cell]).min(0.1 * radius_mm);
+                    let hidden = (wide * size_mm / (TOUCH_PART * radius_mm)).powi(2).min(1.0) * FILLED_SD_RAD;
+                    let around = tilt_around(sizes, column, row, wide);
+                    hole_mm[column] = deep * size_mm * hidden.hypot(HOLE_PART * around);
+                }
+            }
+        });
     }
 
     fn walk_from_rim(&mut self, cells: &Cells, view: &View, readings: &[CellReading]) {
@@ -296,62 +304,7 @@ impl Deviations {
     pub fn variance_mm2(&self, cell: usize, width: usize, height_mm: f32) -> f32 {
         let (row, column) = (cell / width / BLOCK, cell % width / BLOCK);
         let noise = self.noise_mm2.get(row * width.div_ceil(BLOCK) + column).copied().unwrap_or(0.0);
-        noise + (DEPTH_PART * height_mm).powi(2) + self.hole_mm[cell].powi(2) * BLOCK as f32
-    }
-}
-
-impl Size {
-    fn clear(&mut self, columns: usize, rows: usize) {
-        self.columns = columns;
-        self.blocks.clear();
-        self.blocks.resize(columns * rows, Block::default());
-    }
-
-    /// Squares of what blocks of so many cells leave over, over those that the readings promise: the middle one.
-    fn factor(&self, whole: f32, ratios: &mut Vec<f32>) -> Option<f32> {
-        ratios.clear();
-        for block in self.blocks.iter().filter(|block| block.read >= MIN_READ * whole) {
-            for (left, variance) in block.left_mm.into_iter().zip(block.variances_mm2) {
-                // Half of the errors is left over.
-                ratios.push(2.0 * left * left / variance.max(1e-30));
-            }
-        }
-        if ratios.len() < 2 * MIN_BLOCKS {
-            return None;
-        }
-        let middle = ratios.len() / 2;
-        Some(*ratios.select_nth_unstable_by(middle, f32::total_cmp).1 / CHI_MEDIAN)
-    }
-}
-
-impl Block {
-    /// Share of the block that is no hole.
-    fn covered(&self) -> f32 {
-        (1.0 - self.holes / self.cells.max(1.0)).max(MIN_COVERED)
-    }
-
-    /// What an octave adds: of readings with this factor; where there are none, as much as is open without light, or as `beyond` the holes.
-    fn octave_mm2(&self, factor: f32, beyond: Option<f32>) -> f32 {
-        let others = self.holes + self.unlit;
-        match beyond {
-            _ if self.read > 0.0 => (self.logs / self.read).exp() * factor,
-            Some(beyond) if self.unlit <= 0.0 => beyond,
-            _ if others > 0.0 => (self.other_logs / others).exp(),
-            _ => 0.0,
-        }
-    }
-
-    fn add(&mut self, other: &Self) {
-        self.cells += other.cells;
-        self.read += other.read;
-        self.logs += other.logs;
-        self.holes += other.holes;
-        self.unlit += other.unlit;
-        self.other_logs += other.other_logs;
-        for k in [0, 1] {
-            self.variances_mm2[k] += other.variances_mm2[k];
-            self.left_mm[k] += other.left_mm[k];
-        }
+        noise + (DEPTH_PART * height_mm).powi(2) + self.hole_mm[cell].powi(2)
     }
 }
 

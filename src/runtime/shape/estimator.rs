@@ -11,6 +11,7 @@ use super::fill::{Pyramid, Weighted};
 use super::lattice::Lattice;
 use super::levels::{self, Level};
 use super::light::ShapeLight;
+use super::lights::Lights;
 use super::map::{ShapeMap, Skin};
 use super::marks::Marks;
 use super::normals::{self, CellReading};
@@ -20,6 +21,7 @@ use super::system::{END_MM, Joint, SolveStatus, System};
 use super::volume::Volume;
 use crate::constants::Constants;
 use crate::track::{CameraFrame, Tracked, Tracker};
+use domecast_light::tables::Ways;
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 
@@ -67,6 +69,8 @@ pub struct ShapeFromColor {
     /// Constants without white markers are those of a rigid mount.
     is_rigid: bool,
     rest: Option<RestMap>,
+    ways: Ways,
+    pub(super) lights: Lights,
     volume: Volume,
     /// As it stood in the frame at rest.
     rest_seen: SensorOptics,
@@ -97,7 +101,7 @@ pub struct ShapeFromColor {
     /// Where it is.
     pub(super) points_mm: Vec<Vec3A>,
     last_mm: Vec<f64>,
-    map: ShapeMap,
+    pub(super) map: ShapeMap,
 }
 
 impl ShapeFromColor {
@@ -112,7 +116,7 @@ impl ShapeFromColor {
             }
         }
         let optics = tracker.optics().clone();
-        let light = ShapeLight::new(constants, &optics)?;
+        let (light, ways) = ShapeLight::new(constants, &optics)?;
         let cells = Cells::new(&optics, options.cell_px);
         let count = cells.count();
         Ok(Self {
@@ -121,6 +125,8 @@ impl ShapeFromColor {
             marks: Marks::new(constants, &optics),
             is_rigid: constants.white_markers.is_empty(),
             rest: None,
+            ways,
+            lights: Lights::default(),
             volume: Volume::new(&optics, constants.elastomer.map(|elastomer| elastomer.poisson_ratio)),
             rest_seen: optics.clone(),
             view: View::default(),
@@ -163,6 +169,8 @@ impl ShapeFromColor {
         let noise = self.noise / self.cells.px as f32;
         let (levels, covered) = (&self.levels, &self.covered);
         self.rest = Some(RestMap::measured(levels, covered, &self.cells, &self.view, &self.light, noise)?);
+        let is_bare = |cell: usize| self.view.is_dome[cell] && !self.covered[cell];
+        self.lights = Lights::at_rest(&self.ways, &self.view, is_bare);
         self.rest_seen = self.optics.clone();
         Ok(())
     }
@@ -222,6 +230,9 @@ impl ShapeFromColor {
         let (shifts, gain) = (&mut self.shifts, &mut self.gain);
         rest.at_pose(&self.cells, &self.view, &self.rest_seen, shifts, self.is_rigid, gain);
         self.check_colours()?;
+        if self.is_light_out() {
+            return Ok(());
+        }
         // Where the last frame's skin was hardly moved this one is read at rest: errors of the one would be read into the next and grow.
         self.last_mm.clone_from(&self.moved_mm);
         let min_mm = f64::from(MIN_DEPTH_MM);
@@ -253,7 +264,7 @@ impl ShapeFromColor {
             self.find_points();
         }
         let sd_mm = |cell: usize, height_mm: f32| {
-            let ring_mm2 = self.volume.variance_mm2(self.deviations.away()[cell]);
+            let ring_mm2 = self.volume.variance_mm2(self.view.surface_mm[cell].z);
             (self.deviations.variance_mm2(cell, width, height_mm) + ring_mm2).sqrt()
         };
         let skin = Skin { view: &self.view, points_mm: &self.points_mm, dome: self.optics.dome() };
@@ -342,7 +353,15 @@ impl ShapeFromColor {
             let normal = |i: usize| view.normal[i] + tilt[i].value();
             0.5 * (normal(cell) + normal(next)).dot(points_mm[next] - points_mm[cell])
         };
-        self.deviations.measure(&self.cells, view, &self.readings, |cell| tilt[cell].value(), left_mm);
+        let radius_mm = self.optics.dome().radius_mm() as f32;
+        self.deviations.measure(
+            &self.cells,
+            view,
+            &self.readings,
+            |cell| tilt[cell].value(),
+            left_mm,
+            radius_mm,
+        );
     }
 
     /// Finds the skin that is perpendicular to the normals.

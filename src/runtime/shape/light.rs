@@ -45,7 +45,8 @@ impl PointLight {
 }
 
 impl ShapeLight {
-    pub fn new(constants: &Constants, optics: &SensorOptics) -> Result<Self, ShapeError> {
+    /// With the lights' ways to the membrane.
+    pub fn new(constants: &Constants, optics: &SensorOptics) -> Result<(Self, Ways), ShapeError> {
         let Some(light) = &constants.light else {
             return Err(ShapeError::new("light", "is not in these constants", REBUILD));
         };
@@ -59,7 +60,7 @@ impl ShapeLight {
                 return Err(ShapeError::new("light.leds", problem, "give each colour a light"));
             }
         }
-        Ok(Self::with(light, optics, &ways, &Prepared::default()))
+        Ok((Self::with(light, optics, &ways, &Prepared::default()), ways))
     }
 
     /// The same with tables of these ways that the caller has.

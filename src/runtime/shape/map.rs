@@ -54,6 +54,8 @@ pub struct ShapeMap {
     pub contact: Option<SkinContact>,
     /// How the solve ended; `None` where the pose has no picture of the dome.
     pub status: Option<SolveStatus>,
+    /// Lights, by their place in the constants, that were on in the frame at rest and are out: then nothing is known.
+    pub lights_out: Vec<usize>,
     /// The same for each cell, before it is drawn.
     cell_mm: Vec<f32>,
     /// Pixels along a cell, cells across and down.
@@ -99,6 +101,7 @@ impl ShapeMap {
             is_touched: vec![false; pixels],
             contact: None,
             status: None,
+            lights_out: Vec::new(),
             cell_mm: vec![f32::NAN; cells.count()],
             cell_px: cells.px,
             cells_across: cells.width,
@@ -198,6 +201,7 @@ impl ShapeMap {
         self.drawn.fill(0..0);
         self.forget_cells();
         self.status = None;
+        self.lights_out.clear();
     }
 
     fn forget_cells(&mut self) {

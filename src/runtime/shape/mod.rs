@@ -36,6 +36,7 @@
 //! left of the brightness says how far to trust them. Depths follow from `n . X_u = 0` and `n . X_v = 0` with
 //! `X = X0 + d w` along the refracted ray, which is linear in `d` and its slopes.
 
+mod blocks;
 mod cells;
 mod colours;
 mod contact;
@@ -46,9 +47,11 @@ mod estimator;
 mod fill;
 mod fourier;
 mod grid;
+mod holes;
 mod lattice;
 mod levels;
 mod light;
+mod lights;
 mod look;
 mod map;
 mod marks;

@@ -45,6 +45,14 @@ impl Default for CellReading {
     }
 }
 
+impl CellReading {
+    /// Whether the cell is filled in from around.
+    #[inline]
+    pub fn is_hole(&self) -> bool {
+        !self.is_read && self.tilt.weight() < 1.0
+    }
+}
+
 /// Two unit tangents at a normal; the first as near to `along` as may be.
 #[inline]
 pub(super) fn tangents(normal: Vec3A, along: Vec3A) -> [Vec3A; 2] {

@@ -130,6 +130,7 @@ fn unfit(path: &Path, error: &ShapeError) -> Failure {
 /// The members of a JSON line that the shape adds, without what encloses them.
 pub fn shape_members(map: &ShapeMap, has_forces: bool) -> String {
     let mut shape = match &map.status {
+        None if !map.lights_out.is_empty() => json!({ "status": "light_out", "lights_out": map.lights_out }),
         None => json!({ "status": "no_pose" }),
         Some(solved) => json!({
             "status": if solved.is_converged { "ok" } else { "not_converged" },

@@ -1,11 +1,11 @@
-//! Whether a frame's colours come in the order of the constants' light, and of the frame at rest.
+//! Whether a frame's colours come in the order of the constants' light, and of the frame at rest, and from all the lights of that.
 
 use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::error::ShapeError;
 use super::estimator::{ShapeFromColor, ShapeOptions};
-use super::rest::{Seen, seen};
+use super::rest::{OTHER_ORDERS, Seen, seen};
 use super::rows::share;
 use crate::constants::Constants;
 use crate::track::{CameraFrame, Tracker};
@@ -13,9 +13,6 @@ use crate::track::{CameraFrame, Tracker};
 /// Every seventh cell is asked, in as many parts.
 const STEP: usize = 7;
 const PARTS: usize = 4;
-
-/// Orders of three colours beside the one as it is; those of two that are swapped first.
-pub(super) const OTHER_ORDERS: [[usize; 3]; 5] = [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
 
 /// The part of their misfit that another order must leave to be taken for theirs.
 const OTHER_ORDER: f32 = 0.5;
@@ -71,5 +68,21 @@ impl ShapeFromColor {
             return Err(ShapeError::new("frame", problem, cure));
         }
         Ok(())
+    }
+
+    /// Whether a light is out that was not at rest; then nothing is known of the skin.
+    pub(super) fn is_light_out(&mut self) -> bool {
+        let (view, light, gain, covered) = (&self.view, &self.light, &self.gain, &self.covered);
+        let is_bare = |cell: usize| view.is_dome[cell] && !covered[cell];
+        let at_rest = |cell: usize, channel: usize| {
+            (gain[cell] * light.passed(view.ray[cell].z) * light.still(view.place[cell]))[channel]
+        };
+        let mut out = std::mem::take(&mut self.map.lights_out);
+        self.lights.find_out(&self.levels, light.stray, is_bare, at_rest, &mut out);
+        if !out.is_empty() {
+            self.map.forget();
+        }
+        self.map.lights_out = out;
+        !self.map.lights_out.is_empty()
     }
 }

@@ -4,7 +4,6 @@
 //! lost there. A touch changes some of those places, a light that is out changes them all: the middle one counts.
 
 use super::cells::View;
-use super::estimator::ShapeFromColor;
 use super::levels::Level;
 use domecast_light::direct::EmitterRule;
 use domecast_light::tables::Ways;
@@ -107,23 +106,5 @@ impl Lights {
             }
         }
         out.extend((0..gone.len()).filter(|light| gone[*light] > OUT));
-    }
-}
-
-impl ShapeFromColor {
-    /// Whether a light is out that was not at rest; then nothing is known of the skin.
-    pub(super) fn is_light_out(&mut self) -> bool {
-        let (view, light, gain, covered) = (&self.view, &self.light, &self.gain, &self.covered);
-        let is_bare = |cell: usize| view.is_dome[cell] && !covered[cell];
-        let at_rest = |cell: usize, channel: usize| {
-            (gain[cell] * light.passed(view.ray[cell].z) * light.still(view.place[cell]))[channel]
-        };
-        let mut out = std::mem::take(&mut self.map.lights_out);
-        self.lights.find_out(&self.levels, light.stray, is_bare, at_rest, &mut out);
-        if !out.is_empty() {
-            self.map.forget();
-        }
-        self.map.lights_out = out;
-        !self.map.lights_out.is_empty()
     }
 }

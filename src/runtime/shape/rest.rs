@@ -4,7 +4,6 @@ use glam::{DVec2, Vec3A};
 use rayon::prelude::*;
 
 use super::cells::{Cells, View};
-use super::colours::OTHER_ORDERS;
 use super::error::ShapeError;
 use super::fill::{Pyramid, Weighted};
 use super::lattice::Lattice;
@@ -13,6 +12,8 @@ use super::light::ShapeLight;
 use super::rows::{MIN_ROWS, share};
 use domecast_optics::SensorOptics;
 
+/// Orders of three colours beside the one as it is; those of two that are swapped first.
+pub(super) const OTHER_ORDERS: [[usize; 3]; 5] = [[2, 1, 0], [1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]];
 /// Passes of a mean over three by three cells that smooth the ratio: noise goes, spots of the membrane stay.
 pub(super) const SMOOTHING: usize = 3;
 

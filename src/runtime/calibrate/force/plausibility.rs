@@ -267,12 +267,12 @@ fn clearly_shifted(
     now: &Judgement,
 ) -> Option<(f64, String)> {
     let all = [0, 1, 2, 3, 4, 5];
-    let most = CLEARLY * now.scatter(&all);
+    let max_scatter = CLEARLY * now.scatter(&all);
     let judged = orders().into_iter().filter_map(|mistake| {
         let judgement = Judgement::of(&mistake.taken_back(pairs), reference, sizes);
         let scatter = judgement.scatter(&all);
         let is_whole = judgement.axes.len() == now.axes.len();
-        (is_whole && judgement.is_explained() && scatter < most).then_some((scatter, mistake.name))
+        (is_whole && judgement.is_explained() && scatter < max_scatter).then_some((scatter, mistake.name))
     });
     judged.min_by(|a, b| a.0.total_cmp(&b.0))
 }

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod build;
+mod cache;
 mod calibrate;
 mod calibrate_force;
 mod calibrate_light;
@@ -283,12 +284,16 @@ fn note_old_names(output: &Output, arguments: &[OsString]) {
 ///
 /// Exit codes: 0 done, 1 the input is at fault, 2 usage, 3 our fault.
 pub fn run() -> ExitCode {
-    ExitCode::from(run_with(&std::env::args_os().collect::<Vec<_>>()))
+    ExitCode::from(run_as(&std::env::args_os().collect::<Vec<_>>(), Output::of_program))
 }
 
 /// [`run`] on arguments, the program's name first; returns the exit code. An interrupt (Ctrl-C) or a request to terminate ends
 /// the process from now on.
 pub fn run_with(given: &[OsString]) -> u8 {
+    run_as(given, std::convert::identity)
+}
+
+fn run_as(given: &[OsString], made: fn(Output) -> Output) -> u8 {
     let arguments = match Arguments::try_parse_from(given) {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -299,7 +304,7 @@ pub fn run_with(given: &[OsString]) -> u8 {
             return code;
         }
     };
-    let output = Output::new(arguments.json, arguments.quiet, arguments.force);
+    let output = made(Output::new(arguments.json, arguments.quiet, arguments.force));
     note_old_names(&output, given);
     domecast_files::tidy_on_signals();
     for note in domecast_files::recover(given.iter().skip(1).cloned()) {

@@ -105,6 +105,7 @@ pub struct Output {
     quiet: bool,
     progress: bool,
     force: bool,
+    is_program: bool,
     /// Where results and notes go instead of being printed.
     called: Option<Mutex<Called>>,
 }
@@ -113,7 +114,17 @@ impl Output {
     /// Progress shows only on a terminal.
     pub fn new(json: bool, quiet: bool, force: bool) -> Self {
         let progress = !json && !quiet && io::stderr().is_terminal();
-        Self { json, quiet, progress, force, called: None }
+        Self { json, quiet, progress, force, is_program: false, called: None }
+    }
+
+    /// The same of a process that is the program itself.
+    pub fn of_program(self) -> Self {
+        Self { is_program: true, ..self }
+    }
+
+    /// Whether the process is the program itself, and no other that calls it as a library.
+    pub fn is_program(&self) -> bool {
+        self.is_program
     }
 
     /// Prints nothing: results and notes are kept.

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
+use super::cache::cache;
 use super::output::{Failure, Output};
 use domecast_design::DesignError;
 use domecast_files::StagedFolder;
@@ -38,6 +39,10 @@ pub struct SimulateOptions {
     /// Seed of everything random, instead of the scene's.
     #[arg(long)]
     seed: Option<u64>,
+    /// Compute all tables of the light and the elastomer anew, and keep none. They are kept in the folder DOMECAST_CACHE,
+    /// else in `domecast` in XDG_CACHE_HOME or ~/.cache (at most 0.5 GB); frames are the same bytes.
+    #[arg(long)]
+    no_cache: bool,
 }
 
 /// Plans, renders, and prints what was left out.
@@ -55,6 +60,9 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
     scene.override_run(options.frames, options.seed).map_err(in_file)?;
     if options.depth {
         scene.write_depth();
+    }
+    if output.is_program() && !options.no_cache {
+        scene.set_cache(cache());
     }
     let out = options.out.clone().unwrap_or_else(|| PathBuf::from("output").join(scene.name()));
     // the plan may take a while: a place that is refused is refused before it

@@ -79,6 +79,14 @@ impl ShadedDome {
             albedo: used.interreflection.then(|| setup::mean_reflectance(scene)),
             moved: !scene.file().objects.is_empty(),
         };
+        if let Some(cache) = scene.cache() {
+            let (told, falloff) = (ways.told(), parts.falloff);
+            prepared.fill(
+                &ways,
+                (falloff, falloff && parts.moved, parts.albedo.is_some()),
+                &|name, count, make| cache.numbers(&format!("light's {name} {told}"), count, make),
+            );
+        }
         let field = LightField::new(&ways, &prepared, &parts);
         let exact = field.evaluations() * lights;
         let falloff_exact = exact.saturating_sub(lights);

@@ -4,8 +4,13 @@ use glam::{DVec2, DVec3};
 
 use super::forces::ForceDistribution;
 use super::model::Dot;
+use super::result::ContactEstimate;
 use super::seen_dots::MODEL_PART;
 use crate::track::DotResult;
+
+/// What a touch that comes out broader than it is may be deeper by under the same force, as a part of the depth found: where the camera looks
+/// along the pressure, areas come out up to eight times the true one, and depth goes as one over the radius.
+const BROAD_PART: f64 = 0.5;
 
 impl Dot {
     /// Unit direction in which its image does not move.
@@ -31,28 +36,22 @@ impl ForceDistribution {
     pub(super) fn place_dots(&mut self, found: &[DotResult]) {
         let d = self.dots.len();
         self.placed.clear();
-        // A touch of radius a comes out as one of sqrt(a^2 + c^2), c being as far as pressures are taken to be alike, and by so much less deep
-        // under the same force: the depth of Hertz' contact goes as 1 / a.
-        let (mut blurred_part, mut force_part) = (0.0, 0.0);
-        if let Some(contact) = &self.result.contact {
-            let square = self.model.correlation_mm.powi(2) * std::f64::consts::PI / contact.area_mm2;
-            blurred_part = 1.0 - (1.0 - square).max(0.0).sqrt();
-            force_part = contact.force_sd_n.length() / contact.force_n.length();
-        }
+        let touch = self.result.contact.as_ref();
+        let force_part = touch.map_or(0.0, |touch| touch.force_sd_n.length() / touch.force_n.length());
         for (k, (dot, found)) in self.dots.iter().zip(found).enumerate() {
             let moved_mm = self.dots_moved_mm[k];
             let ray = dot.ray();
             let by_node = |node: usize| self.softness * ray.dot(self.model.dots_mm[node * d + k]);
             let seen_sd_mm = self.posterior.depth_sd_mm(k, dot.rest_frames, by_node);
             let young_part = if self.reference_mm.is_none() { self.model.young_sd_part } else { 0.0 };
-            let (mut pressed, mut strain) = (0.0, 0.0);
-            for (node, share) in self.model.about(dot.surface_mm) {
-                let pressure = self.set.tractions[node];
-                pressed += if pressure > 0.0 { share } else { 0.0 };
-                strain += share * pressure / self.model.young_mpa;
-            }
-            let part =
-                MODEL_PART.hypot(young_part).hypot(force_part).hypot(strain).hypot(pressed * blurred_part);
+            let pressure = |(node, share): (usize, f64)| share * self.set.tractions[node];
+            let strain = self.model.about(dot.surface_mm).map(pressure).sum::<f64>() / self.model.young_mpa;
+            let is_under = |touch: &&ContactEstimate| {
+                let radius_mm = (touch.area_mm2 / std::f64::consts::PI).sqrt();
+                touch.point_mm.distance(dot.rest_mm + moved_mm) < radius_mm
+            };
+            let broad_part = touch.filter(is_under).map_or(0.0, |_| BROAD_PART);
+            let part = MODEL_PART.hypot(young_part).hypot(force_part).hypot(strain).hypot(broad_part);
             let model_sd_mm = part * ray.dot(moved_mm);
             // Pressures that nodes are too coarse for.
             let coarse = |node: &usize| {

@@ -37,7 +37,7 @@ impl Pace {
             && step_s < MIN_LATE_AT_FIRST * usual_s
             && usual_s < MIN_LATE_AT_FIRST * step_s
         {
-            // Stamps that jitter to and fro make one step short and the next one long.
+            // Stamps that jitter back and forth make one step short and the next one long.
             self.step_s = Some(0.5 * (usual_s + step_s));
             return false;
         }
@@ -66,7 +66,7 @@ mod tests {
         let mut pace = Pace::default();
         let late: Vec<bool> = [0.0, 0.5, 0.6, 0.7, 0.9].iter().map(|t| pace.is_late(Some(*t))).collect();
         assert_eq!(late, [false, false, false, false, true]);
-        // Stamps that jitter to and fro by 4 ms, and a frame that is missing right at first.
+        // Stamps that jitter back and forth by 4 ms, and a frame that is missing right at first.
         let mut pace = Pace::default();
         let stamps = (0..30).map(|k| f64::from(k) / 30.0 + if k % 2 == 0 { 0.004 } else { -0.004 });
         assert_eq!(stamps.filter(|t| pace.is_late(Some(*t))).count(), 0);

@@ -140,8 +140,10 @@ def main():
             mean = np.mean(shares, axis=0)
             every += shares
             check(f"{design}: sd from both sides", all(np.abs(mean - SHARES) <= DESIGN), shown(mean))
-    mean = np.mean(every, axis=0)
-    check("all: sd from both sides", all(np.abs(mean - SHARES) <= ALL), shown(mean))
+    if not arguments.quick:
+        # Of all designs: two of them, and a third of the objects, may be more careful.
+        mean = np.mean(every, axis=0)
+        check("all: sd from both sides", all(np.abs(mean - SHARES) <= ALL), shown(mean))
     sys.exit(1 if shape_frames.failed else 0)
 
 

@@ -19,8 +19,8 @@ use domecast_sim::SimError;
 const MAX_ATTEMPTS: u32 = 60;
 /// Videos of a shard unless somebody says how many shards there are.
 const USUAL_VIDEOS: u32 = 64;
-/// Pairs that are made between two reports of progress, for each thread.
-const PAIRS_AT_ONCE: usize = 2;
+/// Pairs that are made between two reports of progress, for each thread: enough of them that threads seldom wait for the slowest pair.
+const PAIRS_AT_ONCE: usize = 8;
 
 /// A shard: a range of pairs, in a file of its own.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -87,11 +87,11 @@ impl<'a> Maker<'a> {
         let at_once = PAIRS_AT_ONCE * rayon::current_num_threads().max(1);
         let mut done = 0;
         for pairs in all.chunks(at_once) {
-            // Before the pairs, which share them: the parts of a sensor are computed in parallel, and a task that waited for another's would
-            // keep that one's parts from being done.
+            // Before the pairs, which share them: the parts of a sensor are computed in parallel, and a pair that waited for a sensor would
+            // keep that one's parts from being done. Sensors do not wait for each other: none is asked for twice.
             let numbers: BTreeSet<u32> = pairs.iter().map(|pair| self.dataset.sensor_of(*pair)).collect();
             self.kept().retain(|number, _| numbers.contains(number));
-            numbers.iter().try_for_each(|number| self.sensor(*number).map(|_| ()))?;
+            numbers.par_iter().try_for_each(|number| self.sensor(*number).map(|_| ()))?;
             let made: Vec<Result<[Made; 2], SimError>> =
                 pairs.par_iter().map(|pair| self.pair(*pair)).collect();
             for (pair, made) in pairs.iter().zip(made) {

@@ -6,6 +6,8 @@
 //! hemisphere goes on outside its circle, at `sqrt(1 - z)`, which keeps areas equal there too (Archimedes), and both are
 //! drawn in to the disc. The disc lies in a square grid with some cells of padding all round.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use domecast_optics::DomeShape;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -153,6 +155,28 @@ impl DomeGrid {
         (0..self.nodes * self.nodes).into_par_iter().map(node).collect()
     }
 
+    /// A table over the grid with half as wide cells. Where the cubic through this grid's nodes and the straight line between them
+    /// differ too much, `value` is asked; elsewhere the cubic serves. Gives the number of times that it was asked besides.
+    pub fn halved_in_parallel<const K: usize>(
+        &self,
+        table: &[[f64; K]],
+        differ: impl Fn(&[f64; K], &[f64; K]) -> bool + Sync,
+        value: impl Fn(DVec3) -> [f64; K] + Sync,
+    ) -> (Self, Vec<[f64; K]>, u64) {
+        let half = Self::with_cells(2 * self.cells()).over(self.face);
+        let asked = AtomicU64::new(0);
+        let found = half.fill_in_parallel(|place| {
+            let at = self.coordinates(place);
+            let cubic = bicubic(self, table, at);
+            if !differ(&cubic, &bilinear(self, table, at)) {
+                return cubic;
+            }
+            asked.fetch_add(1, Ordering::Relaxed);
+            value(place)
+        });
+        (half, found, asked.into_inner())
+    }
+
     /// Azimuths at which the rim is asked for.
     fn azimuths(&self) -> usize {
         (std::f64::consts::TAU / self.cell()).ceil() as usize
@@ -196,6 +220,20 @@ fn beyond<const K: usize>(rim: &[[[f64; K]; 3]], place: DVec2, step: f64) -> [f6
 
 /// Bicubic look-up (Catmull and Rom's cubic, third order) in a table over a grid.
 pub fn bicubic<const K: usize>(grid: &DomeGrid, table: &[[f64; K]], at: DVec2) -> [f64; K] {
+    weighted(grid, table, at, weights)
+}
+
+/// Straight between the nodes around a place.
+fn bilinear<const K: usize>(grid: &DomeGrid, table: &[[f64; K]], at: DVec2) -> [f64; K] {
+    weighted(grid, table, at, |t| [0.0, 1.0 - t, t, 0.0])
+}
+
+fn weighted<const K: usize>(
+    grid: &DomeGrid,
+    table: &[[f64; K]],
+    at: DVec2,
+    weights: impl Fn(f64) -> [f64; 4],
+) -> [f64; K] {
     let last = grid.nodes as f64 - 1.0;
     let clamped = at.clamp(DVec2::ONE, DVec2::splat(last - 1.0 - 1e-9));
     let (column, row) = (clamped.x as usize, clamped.y as usize);

@@ -15,6 +15,10 @@ use domecast_optics::SensorOptics;
 
 /// Cells across the table on the dome; those on the shells inside it, where light is smoother, have fewer.
 const DOME_CELLS: usize = 60;
+/// How often the cells on a shadow's edge are halved, and the part of a light's largest irradiance by which a cubic and a straight
+/// line differ there: a quarter of a level of 8 bits.
+const HALVINGS: usize = 2;
+const BENT: f64 = 1e-3;
 /// Cells across the tables on the shells.
 pub const SHELL_CELLS: usize = 36;
 
@@ -170,7 +174,12 @@ pub fn prepared(key: &str) -> Arc<Prepared> {
 
 fn dome_tables(ways: &Ways) -> Tables {
     let rule = EmitterRule::default();
-    let made = tables(ways, 1.0, DomeGrid::with_cells(DOME_CELLS).over(ways.face()));
+    let made: Vec<_> =
+        ways.sources.iter().map(|source| dome_table(ways, source, DOME_CELLS, HALVINGS, &rule)).collect();
+    let grid = made.first().map_or(DomeGrid::with_cells(DOME_CELLS).over(ways.face()), |(grid, ..)| *grid);
+    let evaluations = made.iter().map(|(.., asked)| *asked).max().unwrap_or(0) + PROBES as u64;
+    let sources = made.into_iter().map(|(_, table, _)| table).collect();
+    let made = Tables { grid, sources, error: 0.0, evaluations };
     let off = |(source, table): (&Source, &Vec<Node>)| {
         let probes = (0..PROBES).into_par_iter().map(|i| {
             let direction = probe(ways.face(), i);
@@ -183,7 +192,7 @@ fn dome_tables(ways: &Ways) -> Tables {
         off / largest
     };
     let error = ways.sources.iter().zip(&made.sources).map(off).fold(0.0, f64::max);
-    Tables { error, evaluations: made.evaluations + PROBES as u64, ..made }
+    Tables { error, ..made }
 }
 
 /// Vector irradiance of each source on the sphere of a part of the dome's radius.
@@ -194,10 +203,34 @@ fn tables(ways: &Ways, part: f64, grid: DomeGrid) -> Tables {
 }
 
 fn table(ways: &Ways, source: &Source, part: f64, grid: &DomeGrid, rule: &EmitterRule) -> Vec<Node> {
-    grid.fill_in_parallel(|direction| {
-        let flux = ways.flux(source, ways.point(direction, part), rule);
-        flux.extend(flux.dot(grid.face.normal(direction)).max(0.0)).to_array()
-    })
+    grid.fill_in_parallel(|place| node(ways, source, part, place, rule))
+}
+
+fn node(ways: &Ways, source: &Source, part: f64, place: DVec3, rule: &EmitterRule) -> Node {
+    let flux = ways.flux(source, ways.point(place, part), rule);
+    flux.extend(flux.dot(ways.face().normal(place)).max(0.0)).to_array()
+}
+
+/// The table of one light on the dome, and how often it was computed; cells on the edges of shadows are halved.
+fn dome_table(
+    ways: &Ways,
+    source: &Source,
+    cells: usize,
+    halvings: usize,
+    rule: &EmitterRule,
+) -> (DomeGrid, Vec<Node>, u64) {
+    let mut grid = DomeGrid::with_cells(cells).over(ways.face());
+    let mut found = table(ways, source, 1.0, &grid, rule);
+    let mut evaluations = grid.evaluations();
+    let largest = found.iter().map(|node| node[3]).fold(0.0, f64::max);
+    for _ in 0..halvings {
+        let differ = |cubic: &Node, line: &Node| (cubic[3] - line[3]).abs() > BENT * largest;
+        let (half, values, asked) =
+            grid.halved_in_parallel(&found, differ, |place| node(ways, source, 1.0, place, rule));
+        (grid, found) = (half, values);
+        evaluations += asked;
+    }
+    (grid, found, evaluations)
 }
 
 /// The tables of one light: on the dome, then on the shells inside it.
@@ -210,8 +243,13 @@ impl SourceTables {
     pub fn new(ways: &Ways, source: &Source, coarser: usize) -> Self {
         let rule = EmitterRule::default();
         let of = |(shell, part): (usize, &f64)| {
-            let cells = if shell == 0 { DOME_CELLS } else { SHELL_CELLS };
-            let grid = DomeGrid::with_cells(cells / coarser.max(1)).over(ways.face());
+            let coarser = coarser.max(1);
+            if shell == 0 {
+                let halvings = if coarser == 1 { HALVINGS } else { 0 };
+                let (grid, table, _) = dome_table(ways, source, DOME_CELLS / coarser, halvings, &rule);
+                return (grid, table);
+            }
+            let grid = DomeGrid::with_cells(SHELL_CELLS / coarser).over(ways.face());
             (grid, table(ways, source, ways.shell(*part), &grid, &rule))
         };
         Self(SHELLS.iter().enumerate().map(of).collect())

@@ -3,7 +3,8 @@
 mod common;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use common::domecast;
 use serde_json::{Value, json};
@@ -180,4 +181,57 @@ fn what_a_lossy_code_does_is_measured_and_told() {
     let output = domecast(&["simulate", "scene.json", "--out", "out"], folder.path());
     let text = String::from_utf8(output.stdout).expect("UTF-8");
     assert!(text.contains("the tolerance holds before it") && text.contains("JPEG changes"), "{text}");
+}
+
+/// The bytes of all that a command writes, with a cache of its own.
+fn drawn(folder: &Path, cache: &Path, more: &[&str]) -> Vec<(String, Vec<u8>)> {
+    let arguments = [&["simulate", "scene.json", "--out", "out", "--force"], more].concat();
+    let run = Command::new(env!("CARGO_BIN_EXE_domecast"))
+        .args(arguments)
+        .env("DOMECAST_CACHE", cache)
+        .current_dir(folder)
+        .output()
+        .expect("it runs");
+    assert_eq!(run.status.code(), Some(0), "{}", String::from_utf8_lossy(&run.stderr));
+    let out = folder.join("out");
+    let mut names: Vec<String> = domecast::build::list_files(&out).expect("listed");
+    names.sort();
+    names.into_iter().map(|name| (name.clone(), fs::read(out.join(name)).expect("read"))).collect()
+}
+
+#[test]
+fn frames_are_the_same_bytes_with_a_cache_without_one_and_with_one_that_is_damaged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let lit = |scene: &mut Value| {
+        scene["light"] = json!({ "leds": { "level_per_mw_mm2": 285, "crosstalk": 0.08 } });
+        scene["contact"] = json!({ "level": "linear" });
+        scene["frames"]["count"] = json!(2);
+    };
+    write(folder.path(), &scene(lit));
+    let cache = folder.path().join("deep/cache");
+    let entries = || -> Vec<PathBuf> {
+        let mut listed: Vec<_> =
+            fs::read_dir(&cache).expect("a cache").map(|e| e.expect("one").path()).collect();
+        listed.sort();
+        listed
+    };
+    let alone = drawn(folder.path(), &cache, &["--no-cache"]);
+    assert!(!cache.exists(), "--no-cache keeps nothing");
+    assert!(drawn(folder.path(), &cache, &["--threads", "1"]) == alone, "the first time");
+    let kept = entries();
+    assert!(kept.len() >= 4, "{kept:?}");
+    let whole: Vec<Vec<u8>> = kept.iter().map(|path| fs::read(path).expect("read")).collect();
+    assert!(drawn(folder.path(), &cache, &[]) == alone, "from the cache");
+    for path in &kept {
+        let mut bytes = fs::read(path).expect("read");
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 4;
+        fs::write(path, bytes).expect("written");
+    }
+    assert!(drawn(folder.path(), &cache, &["--threads", "3"]) == alone, "damaged");
+    assert_eq!(entries(), kept);
+    let again: Vec<Vec<u8>> = kept.iter().map(|path| fs::read(path).expect("read")).collect();
+    assert!(again == whole, "what was damaged is made anew");
+    // where it cannot be
+    assert!(drawn(folder.path(), &folder.path().join("scene.json"), &[]) == alone, "no folder");
 }

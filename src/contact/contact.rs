@@ -70,6 +70,14 @@ impl Contact {
         Ok(Self { elastomer, prepared, ..self.clone() })
     }
 
+    /// What its level computes once, of the linear one.
+    pub fn compliance(&self) -> Option<&Compliance> {
+        match &self.prepared {
+            Prepared::Compliance(compliance) => Some(compliance),
+            Prepared::Nothing => None,
+        }
+    }
+
     /// The same dome with other tables.
     pub(crate) fn with_prepared(&self, prepared: Prepared) -> Self {
         Self { prepared, ..self.clone() }

@@ -32,6 +32,8 @@ pub struct Compliance {
 /// What is known of the dome so far.
 #[derive(Debug)]
 struct Tables {
+    /// The dome and its elements, as text.
+    of: String,
     grid: Grid,
     body: BondedBody,
     hats: Vec<Vec<(usize, f64)>>,
@@ -67,6 +69,7 @@ impl Compliance {
         let grid = Grid::new(elastomer.dome, elements);
         let last = (0..grid.elements).map(|ring| grid.harmonics(ring)).max().unwrap_or(1);
         let tables = Tables {
+            of: format!("{elastomer:?} {elements}"),
             body: BondedBody::new(elastomer, elements)?,
             hats: (0..grid.elements).map(|ring| grid.hat(ring)).collect(),
             harmonics: (0..last).map(|_| OnceLock::new()).collect(),
@@ -87,6 +90,48 @@ impl Compliance {
             _ => Ok(()),
         };
         (0..self.grid.harmonics(ring)).into_par_iter().try_for_each(solved)
+    }
+
+    /// All that its numbers depend on, as text.
+    pub fn key(&self) -> &str {
+        &self.tables.of
+    }
+
+    /// How many harmonics are solved.
+    pub fn solved(&self) -> usize {
+        self.tables.harmonics.iter().filter(|one| matches!(one.get(), Some(Ok(_)))).count()
+    }
+
+    /// The harmonics that are solved, as plain numbers: of each its own, then its columns one after the other, then what the rings see.
+    pub fn numbers(&self) -> Vec<f64> {
+        let mut numbers = Vec::new();
+        for (m, one) in self.tables.harmonics.iter().enumerate() {
+            if let Some(Ok(harmonic)) = one.get() {
+                numbers.push(m as f64);
+                numbers.extend(harmonic.columns.iter().flatten().chain(&harmonic.own));
+            }
+        }
+        numbers
+    }
+
+    /// Takes harmonics as solved, from [`Compliance::numbers`] of the same dome; what does not fit is left out.
+    pub fn take(&self, mut numbers: &[f64]) {
+        let tables = &self.tables;
+        while let Some((m, rest)) = numbers.split_first() {
+            let m = *m as usize;
+            let first_ring = first_ring(&self.grid, m);
+            let columns = AXES * (self.grid.elements - first_ring);
+            let height = AXES * surface_nodes(&self.grid);
+            let (Some(cell), Some((values, rest))) =
+                (tables.harmonics.get(m), rest.split_at_checked(columns * height))
+            else {
+                return;
+            };
+            let Some((own, rest)) = rest.split_at_checked(columns * columns) else { return };
+            let columns = values.chunks_exact(height).map(<[f64]>::to_vec).collect();
+            let _ = cell.set(Ok(Harmonic { first_ring, columns, own: own.to_vec() }));
+            numbers = rest;
+        }
     }
 
     /// The same of a dome that yields `factor` times as much.
@@ -168,6 +213,16 @@ fn ring_load(
     }
 }
 
+/// The first ring that a harmonic reaches; as many as there are where none does.
+fn first_ring(grid: &Grid, m: usize) -> usize {
+    (0..grid.elements).find(|ring| grid.harmonics(*ring) > m).unwrap_or(grid.elements)
+}
+
+/// Nodes of the mesh on the surface.
+fn surface_nodes(grid: &Grid) -> usize {
+    2 * grid.elements + 1
+}
+
 /// Solves one harmonic: the surface's response to every ring that has a hat, and the rings' own, hats included.
 pub(crate) fn harmonic(
     grid: &Grid,
@@ -175,7 +230,7 @@ pub(crate) fn harmonic(
     hats: &[Vec<(usize, f64)>],
     m: usize,
 ) -> Result<Harmonic, FactorError> {
-    let first_ring = (0..hats.len()).find(|ring| grid.harmonics(*ring) > m).unwrap_or(hats.len());
+    let first_ring = first_ring(grid, m);
     // Rings between that do not reach this harmonic have zero columns, and are rare.
     let rings = hats.len() - first_ring;
     let loads: Vec<Vec<((usize, usize), f64)>> = (0..AXES * rings)
@@ -195,7 +250,7 @@ pub(crate) fn harmonic(
         }
     }
     body.solve(m, &mut rhs)?;
-    let surface = 2 * grid.elements + 1;
+    let surface = surface_nodes(grid);
     let mut columns = Vec::with_capacity(AXES * rings);
     for column in 0..AXES * rings {
         let mut values = Vec::with_capacity(AXES * surface);

@@ -32,6 +32,7 @@
 //! ```
 
 mod arrays;
+mod cache;
 mod error;
 mod listing;
 mod marker;
@@ -47,6 +48,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 pub use arrays::{npy_f32, npy_u8, ply, png_u16};
+pub use cache::Cache;
 pub use error::{ForeignEntries, WriteError};
 pub use marker::{MARKER_NAME, list_files, marked_files};
 pub use place::OutputRules;

@@ -77,6 +77,20 @@ impl Lobe {
         Self { table, flux }
     }
 
+    /// Numbers of [`Lobe::numbers`].
+    pub const NUMBERS: usize = TABLE + 2;
+
+    /// All that it is: its flux, and the intensities of its table.
+    pub fn numbers(&self) -> Vec<f64> {
+        std::iter::once(self.flux).chain(self.table.iter().copied()).collect()
+    }
+
+    /// The lobe of such numbers, [`Lobe::NUMBERS`] of them.
+    pub fn of_numbers(numbers: &[f64]) -> Option<Self> {
+        let (flux, table) = numbers.split_first()?;
+        (numbers.len() == Self::NUMBERS).then(|| Self { table: table.to_vec(), flux: *flux })
+    }
+
     /// Intensity in a direction with this cosine to the axis, 1/sr; nothing goes backwards.
     #[inline]
     pub fn per_sr(&self, cos: f64) -> f64 {

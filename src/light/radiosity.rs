@@ -57,6 +57,11 @@ impl Rings {
     pub fn count(&self) -> usize {
         self.rings * self.patches
     }
+
+    /// Numbers of [`DomeRoom::mirror`].
+    pub fn mirror_len(&self) -> usize {
+        self.rings * self.count()
+    }
 }
 
 /// The dome as a room that lights itself, for one colour.
@@ -105,8 +110,7 @@ impl DomeRoom {
     /// Computes how the underside mirrors the dome.
     pub fn new(optics: &SensorOptics, rings: Rings, underside: Underside) -> Self {
         let dome = *optics.dome();
-        let mut mirror = vec![0.0; rings.rings * rings.rings * rings.patches];
-        let of_sphere = if rings.face.has_wall() { 0.0 } else { dome.height_mm() / dome.radius_mm() };
+        let mut mirror = vec![0.0; rings.mirror_len()];
         if underside != Underside::Dark {
             for to in 0..rings.rings {
                 let target = rings.place(to, 0);
@@ -126,7 +130,20 @@ impl DomeRoom {
         if rings.face.has_wall() {
             add_straight(rings, &dome, &mut mirror);
         }
-        Self { rings, dome, straight: of_sphere, mirror }
+        Self::of(optics, rings, mirror)
+    }
+
+    /// The same of what was computed before: [`DomeRoom::mirror`] of the same dome and rings.
+    pub fn of(optics: &SensorOptics, rings: Rings, mirror: Vec<f64>) -> Self {
+        let dome = *optics.dome();
+        let straight = if rings.face.has_wall() { 0.0 } else { dome.height_mm() / dome.radius_mm() };
+        Self { rings, dome, straight, mirror }
+    }
+
+    /// What patches give each other over the underside, and straight where the face has a wall: for each ring, each ring that gives,
+    /// and each turn between two patches, the irradiance for an exitance of one.
+    pub fn mirror(&self) -> &[f64] {
+        &self.mirror
     }
 
     /// The patches.

@@ -69,6 +69,14 @@ impl Ways {
         light.vector_irradiance(&source.emitter, point_mm, rule)
     }
 
+    /// All that the tables depend on, as text.
+    pub fn key(&self) -> String {
+        let mut of_one = self.clone();
+        // Tables are for a flux of one.
+        of_one.sources.iter_mut().for_each(|source| source.seen_mw = [0.0; 3]);
+        format!("{of_one:?}")
+    }
+
     /// Radius of the dome, mm.
     pub fn radius_mm(&self) -> f64 {
         self.optics[1].dome_radius_mm()
@@ -137,22 +145,62 @@ impl Prepared {
 
     /// The same on the shells inside it.
     pub fn shells(&self, ways: &Ways) -> &[Tables] {
-        kept::<Vec<_>>(&self.shells, || {
-            SHELLS
-                .iter()
-                .skip(1)
-                .map(|&part| {
-                    tables(ways, ways.shell(part), DomeGrid::with_cells(SHELL_CELLS).over(ways.face()))
-                })
-                .collect()
-        })
+        kept::<Vec<_>>(&self.shells, || shell_tables(ways))
     }
 
     /// The dome as a room, for each channel.
     pub fn rooms(&self, ways: &Ways) -> &[DomeRoom] {
-        let underside = if ways.fresnel { Underside::Fresnel } else { Underside::Dark };
-        let room = |optics| DomeRoom::new(optics, Rings::usual(ways.face()), underside);
-        kept::<Vec<_>>(&self.rooms, || ways.optics.par_iter().map(room).collect())
+        kept::<Vec<_>>(&self.rooms, || rooms(ways))
+    }
+
+    /// Takes what a field of some parts needs as plain numbers from elsewhere: `numbers` is given a table's name, how many numbers it
+    /// has, and what makes them.
+    pub fn fill(
+        &self,
+        ways: &Ways,
+        (dome, shells, room): (bool, bool, bool),
+        numbers: &dyn Fn(&str, usize, &dyn Fn() -> Vec<f64>) -> Vec<f64>,
+    ) {
+        let grid = |cells| DomeGrid::with_cells(cells).over(ways.face());
+        let count = |grid: &DomeGrid| 2 + ways.sources.len() * grid.nodes.pow(2) * 4;
+        if dome && self.dome.get().is_none() {
+            let grid = grid(DOME_CELLS << HALVINGS);
+            let all = numbers("dome", count(&grid), &|| dome_tables(ways).numbers());
+            let _ = self.dome.set(Tables::of_numbers(grid, &all));
+        }
+        if shells && self.shells.get().is_none() {
+            let (grid, inside) = (grid(SHELL_CELLS), SHELLS.len() - 1);
+            let made = || shell_tables(ways).iter().flat_map(Tables::numbers).collect();
+            let all = numbers("shells", inside * count(&grid), &made);
+            let each = all.chunks_exact(count(&grid)).map(|one| Tables::of_numbers(grid, one));
+            let _ = self.shells.set(each.collect());
+        }
+        if room && self.rooms.get().is_none() {
+            let rings = Rings::usual(ways.face());
+            let made = || rooms(ways).iter().flat_map(|room| room.mirror().iter().copied()).collect();
+            let all = numbers("rooms", ways.optics.len() * rings.mirror_len(), &made);
+            let each = all.chunks_exact(rings.mirror_len()).zip(&ways.optics);
+            let _ =
+                self.rooms.set(each.map(|(one, optics)| DomeRoom::of(optics, rings, one.to_vec())).collect());
+        }
+    }
+}
+
+impl Tables {
+    fn numbers(&self) -> Vec<f64> {
+        let values = self.sources.iter().flatten().flatten().copied();
+        [self.error, self.evaluations as f64].into_iter().chain(values).collect()
+    }
+
+    fn of_numbers(grid: DomeGrid, numbers: &[f64]) -> Self {
+        let (about, values) = numbers.split_at(numbers.len().min(2));
+        let nodes: Vec<Node> = values.as_chunks::<4>().0.to_vec();
+        Self {
+            grid,
+            sources: nodes.chunks_exact(grid.nodes.pow(2)).map(<[Node]>::to_vec).collect(),
+            error: about.first().copied().unwrap_or(0.0),
+            evaluations: about.get(1).map_or(0, |count| *count as u64),
+        }
     }
 }
 
@@ -172,11 +220,24 @@ pub fn prepared(key: &str) -> Arc<Prepared> {
     SHELF.get(key)
 }
 
+fn shell_tables(ways: &Ways) -> Vec<Tables> {
+    let grid = DomeGrid::with_cells(SHELL_CELLS).over(ways.face());
+    SHELLS.iter().skip(1).map(|&part| tables(ways, ways.shell(part), grid)).collect()
+}
+
+fn rooms(ways: &Ways) -> Vec<DomeRoom> {
+    let underside = if ways.fresnel { Underside::Fresnel } else { Underside::Dark };
+    let room = |optics| DomeRoom::new(optics, Rings::usual(ways.face()), underside);
+    ways.optics.par_iter().map(room).collect()
+}
+
 fn dome_tables(ways: &Ways) -> Tables {
     let rule = EmitterRule::default();
     let made: Vec<_> =
         ways.sources.iter().map(|source| dome_table(ways, source, DOME_CELLS, HALVINGS, &rule)).collect();
-    let grid = made.first().map_or(DomeGrid::with_cells(DOME_CELLS).over(ways.face()), |(grid, ..)| *grid);
+    let grid = made
+        .first()
+        .map_or(DomeGrid::with_cells(DOME_CELLS << HALVINGS).over(ways.face()), |(grid, ..)| *grid);
     let evaluations = made.iter().map(|(.., asked)| *asked).max().unwrap_or(0) + PROBES as u64;
     let sources = made.into_iter().map(|(_, table, _)| table).collect();
     let made = Tables { grid, sources, error: 0.0, evaluations };

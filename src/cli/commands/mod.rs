@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod build;
+mod cache;
 mod calibrate;
 mod calibrate_force;
 mod calibrate_light;
@@ -34,6 +35,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+use domecast_files::Cache;
 use output::{Failure, Output};
 
 pub use output::{CallError, Called};
@@ -283,12 +285,16 @@ fn note_old_names(output: &Output, arguments: &[OsString]) {
 ///
 /// Exit codes: 0 done, 1 the input is at fault, 2 usage, 3 our fault.
 pub fn run() -> ExitCode {
-    ExitCode::from(run_with(&std::env::args_os().collect::<Vec<_>>()))
+    ExitCode::from(run_as(&std::env::args_os().collect::<Vec<_>>(), cache::of_program))
 }
 
 /// [`run`] on arguments, the program's name first; returns the exit code. An interrupt (Ctrl-C) or a request to terminate ends
 /// the process from now on.
 pub fn run_with(given: &[OsString]) -> u8 {
+    run_as(given, || None)
+}
+
+fn run_as(given: &[OsString], cache: fn() -> Option<Cache>) -> u8 {
     let arguments = match Arguments::try_parse_from(given) {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -299,7 +305,7 @@ pub fn run_with(given: &[OsString]) -> u8 {
             return code;
         }
     };
-    let output = Output::new(arguments.json, arguments.quiet, arguments.force);
+    let output = Output::new(arguments.json, arguments.quiet, arguments.force).with_cache(cache);
     note_old_names(&output, given);
     domecast_files::tidy_on_signals();
     for note in domecast_files::recover(given.iter().skip(1).cloned()) {

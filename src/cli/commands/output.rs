@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use serde_json::{Value, json};
 
 use domecast_design::DesignError;
-use domecast_files::{OutputRules, WriteError};
+use domecast_files::{Cache, OutputRules, WriteError};
 
 /// Why a command did not do what it was asked for.
 #[derive(Debug)]
@@ -105,6 +105,8 @@ pub struct Output {
     quiet: bool,
     progress: bool,
     force: bool,
+    /// Gives the cache of tables, where the process has one.
+    cache: fn() -> Option<Cache>,
     /// Where results and notes go instead of being printed.
     called: Option<Mutex<Called>>,
 }
@@ -113,7 +115,17 @@ impl Output {
     /// Progress shows only on a terminal.
     pub fn new(json: bool, quiet: bool, force: bool) -> Self {
         let progress = !json && !quiet && io::stderr().is_terminal();
-        Self { json, quiet, progress, force, called: None }
+        Self { json, quiet, progress, force, cache: || None, called: None }
+    }
+
+    /// The same with a cache of tables: of a process that is the program itself, and no other that calls it as a library.
+    pub fn with_cache(self, cache: fn() -> Option<Cache>) -> Self {
+        Self { cache, ..self }
+    }
+
+    /// The cache of tables, if there is one.
+    pub fn cache(&self) -> Option<Cache> {
+        (self.cache)()
     }
 
     /// Prints nothing: results and notes are kept.

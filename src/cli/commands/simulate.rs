@@ -38,6 +38,10 @@ pub struct SimulateOptions {
     /// Seed of everything random, instead of the scene's.
     #[arg(long)]
     seed: Option<u64>,
+    /// Compute all tables of the light and the elastomer anew, and keep none. They are kept in the folder DOMECAST_CACHE,
+    /// else in `domecast` in XDG_CACHE_HOME or ~/.cache (at most 0.5 GB); frames are the same bytes.
+    #[arg(long)]
+    no_cache: bool,
 }
 
 /// Plans, renders, and prints what was left out.
@@ -56,6 +60,7 @@ pub fn run(output: &Output, path: &Path, options: &SimulateOptions) -> Result<()
     if options.depth {
         scene.write_depth();
     }
+    scene.set_cache((!options.no_cache).then(|| output.cache()).flatten());
     let out = options.out.clone().unwrap_or_else(|| PathBuf::from("output").join(scene.name()));
     // the plan may take a while: a place that is refused is refused before it
     let staged = match options.explain {

@@ -72,7 +72,7 @@ impl TiltStudy {
         let curve = |kind: &super::optimize::DiffuserKind| -> Result<TiltCurve, DesignError> {
             let mut leds = design.sections().leds.clone();
             leds.diffuser = kind.diffuser;
-            let lobe = setup::lobe(&leds);
+            let lobe = setup::lobe(&leds, None);
             let point = |tilt_deg: f64| -> Result<Option<TiltPoint>, DesignError> {
                 let mut leds = leds.clone();
                 leds.tilt_deg = tilt_deg;

@@ -35,6 +35,8 @@ pub struct Stepper<'a> {
     scene: &'a Scene,
     contact: Contact,
     px_per_mm: f64,
+    /// Harmonics of the dome that were solved when this was made.
+    stored: usize,
     last: Last,
     /// What a slow gel remembers.
     gel: Option<GelMemory>,
@@ -65,6 +67,11 @@ pub(crate) struct SolvedFrames {
     last: Last,
 }
 
+/// Under what a dome's harmonics are kept.
+fn stored_key(dome: &str) -> String {
+    format!("dome's harmonics {dome}")
+}
+
 impl SolvedFrames {
     /// Solves some frames, in order.
     ///
@@ -78,6 +85,7 @@ impl SolvedFrames {
             let touch = stepper.next(*number, scene.time_s(*number), &mut work)?;
             frames.push((*number, touch, work));
         }
+        stepper.store();
         Ok(Self { level, contact: stepper.contact, frames, last: stepper.last })
     }
 
@@ -143,10 +151,27 @@ impl<'a> Stepper<'a> {
         Ok(Self::free(scene, contact, Some(gel)))
     }
 
-    /// Before anything touches.
+    /// Before anything touches, with what the scene's cache has of the dome.
     fn free(scene: &'a Scene, contact: Contact, gel: Option<GelMemory>) -> Self {
         let px_per_mm = largest_px_per_mm(scene);
-        Self { scene, contact, px_per_mm, last: Last::Free, gel, known: None, placed: None }
+        let mut stored = 0;
+        if let (Some(cache), Some(compliance)) = (scene.cache(), contact.compliance()) {
+            if compliance.solved() == 0 {
+                compliance.take(&cache.get(&stored_key(compliance.key())).unwrap_or_default());
+            }
+            stored = compliance.solved();
+        }
+        Self { stored, scene, contact, px_per_mm, last: Last::Free, gel, known: None, placed: None }
+    }
+
+    /// Puts what was solved of the dome since it was made into the scene's cache, if there is one.
+    pub(crate) fn store(&mut self) {
+        if let (Some(cache), Some(compliance)) = (self.scene.cache(), self.contact.compliance())
+            && compliance.solved() > self.stored
+        {
+            cache.put(&stored_key(compliance.key()), &compliance.numbers());
+            self.stored = compliance.solved();
+        }
     }
 
     /// From now on holds the objects at these poses, `rest_from_object`, whatever their paths say; `None`: away from the dome.

@@ -18,6 +18,7 @@ use domecast_design::parts;
 use domecast_design::parts::Measures;
 use domecast_design::sections::{LedColor, LedsSection};
 use domecast_design::{Design, DesignError};
+use domecast_files::Cache;
 use domecast_optics::{ColorChannel, SensorOptics};
 
 /// Channels of the camera.
@@ -88,27 +89,37 @@ pub fn emitter_tops_mm(leds: &LedsSection) -> Vec<f64> {
 pub fn sources(scene: &Scene, used: &LightUse) -> Result<Vec<Source>, SimError> {
     let leds = &scene.design().sections().leds;
     if used.diffuser {
-        return sources_of(scene, leds, &lobe(leds));
+        return sources_of(scene, leds, &lobe(leds, scene.cache()));
     }
     let bare = LedsSection { diffuser: None, ..leds.clone() };
-    sources_of(scene, &bare, &lobe(&bare))
+    sources_of(scene, &bare, &lobe(&bare, None))
 }
 
 /// What one of the lights sends into each direction, behind its diffuser where it has one.
-pub fn lobe(leds: &LedsSection) -> Lobe {
+pub fn lobe(leds: &LedsSection, cache: Option<&Cache>) -> Lobe {
     static SHELF: Shelf<OnceLock<Lobe>> = Shelf::new();
-    let kept = SHELF.get(&format!("{} {:?}", leds.lobe_exponent, leds.diffuser));
+    let key = format!("{} {:?}", leds.lobe_exponent, leds.diffuser);
+    let kept = SHELF.get(&key);
     if let Some(found) = kept.get() {
         return found.clone();
     }
     let bare = Lobe::cosine_power(leds.lobe_exponent);
     let made = match leds.diffuser {
         None => bare,
-        Some(tape) => bare.behind(&Diffuser {
-            lambert_fraction: tape.lambert_fraction,
-            lobe_width_rad: tape.lobe_width_deg.to_radians(),
-            transmittance: tape.transmittance,
-        }),
+        Some(tape) => {
+            let behind = || {
+                bare.behind(&Diffuser {
+                    lambert_fraction: tape.lambert_fraction,
+                    lobe_width_rad: tape.lobe_width_deg.to_radians(),
+                    transmittance: tape.transmittance,
+                })
+            };
+            let known = cache.and_then(|cache| {
+                let key = format!("light's lobe {key}");
+                Lobe::of_numbers(&cache.numbers(&key, Lobe::NUMBERS, || behind().numbers()))
+            });
+            known.unwrap_or_else(behind)
+        }
     };
     kept.get_or_init(|| made).clone()
 }

@@ -59,6 +59,24 @@ pub struct ShadedDome {
     markers: Vec<(DVec3, [f32; 3])>,
 }
 
+/// Counts what the light's effects cost, of so many exact evaluations.
+fn count(work: &mut Work, used: &LightUse, exact: u64, lights: u64) {
+    work.add(EffectName::DirectLight, EXACT_UNITS * lights);
+    work.add(EffectName::Falloff, EXACT_UNITS * exact.saturating_sub(lights));
+    if used.platform_shadow {
+        work.add(EffectName::PlatformShadow, SHADOW_UNITS * exact);
+    }
+    if used.fresnel {
+        work.add(EffectName::Fresnel, FRESNEL_UNITS * exact);
+    }
+    if used.diffuser {
+        work.add(EffectName::Diffuser, DIFFUSER_UNITS);
+    }
+    if used.interreflection {
+        work.add(EffectName::Interreflection, ROOM_UNITS);
+    }
+}
+
 impl ShadedDome {
     /// Computes the light of a scene.
     ///
@@ -79,23 +97,16 @@ impl ShadedDome {
             albedo: used.interreflection.then(|| setup::mean_reflectance(scene)),
             moved: !scene.file().objects.is_empty(),
         };
+        if let Some(cache) = scene.cache() {
+            let (key, falloff) = (ways.key(), parts.falloff);
+            prepared.fill(
+                &ways,
+                (falloff, falloff && parts.moved, parts.albedo.is_some()),
+                &|name, count, make| cache.numbers(&format!("light's {name} {key}"), count, make),
+            );
+        }
         let field = LightField::new(&ways, &prepared, &parts);
-        let exact = field.evaluations() * lights;
-        let falloff_exact = exact.saturating_sub(lights);
-        work.add(EffectName::DirectLight, EXACT_UNITS * lights);
-        work.add(EffectName::Falloff, EXACT_UNITS * falloff_exact);
-        if used.platform_shadow {
-            work.add(EffectName::PlatformShadow, SHADOW_UNITS * exact);
-        }
-        if used.fresnel {
-            work.add(EffectName::Fresnel, FRESNEL_UNITS * exact);
-        }
-        if used.diffuser {
-            work.add(EffectName::Diffuser, DIFFUSER_UNITS);
-        }
-        if used.interreflection {
-            work.add(EffectName::Interreflection, ROOM_UNITS);
-        }
+        count(work, used, field.evaluations() * lights, lights);
 
         let sections = design.sections();
         let reflectance = sections.elastomer.membrane_reflectance.to_array();

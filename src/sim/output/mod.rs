@@ -26,7 +26,7 @@ use domecast_files::{OutputRules, StagedFolder};
 
 use crate::SimError;
 use crate::contact::between::Around;
-use crate::contact::stepper::Touch;
+use crate::contact::stepper::{Stepper, Touch};
 use crate::output::drawn::{Drawn, Scratch};
 use crate::output::in_order::{InOrder, Ready};
 use crate::output::render::Renderer;
@@ -169,6 +169,7 @@ fn draw_all(
         Ok(())
     });
     drop(send);
+    stepper.iter_mut().for_each(Stepper::store);
     wait(state.begun.load(Ordering::Acquire));
     solved.map(|()| work)
 }

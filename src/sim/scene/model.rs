@@ -7,6 +7,7 @@ use crate::SimError;
 use crate::effect_name::{EffectChoice, EffectName};
 use domecast_design::layout::Layout;
 use domecast_design::{Design, DesignError};
+use domecast_files::Cache;
 use domecast_optics::SensorOptics;
 use domecast_optics::pose::Marker;
 use domecast_springs::Suspension;
@@ -44,6 +45,7 @@ pub struct Scene {
     pub(super) motion: Motion,
     pub(super) objects: Vec<SceneObject>,
     pub(super) kept: OnceLock<Arc<dyn Any + Send + Sync>>,
+    pub(super) cache: Option<Cache>,
 }
 
 impl Scene {
@@ -69,6 +71,17 @@ impl Scene {
         }
         self.file.seed = seed.unwrap_or(self.file.seed);
         Ok(())
+    }
+
+    /// Keeps tables that take long in a cache from now on, and takes them from there; what is drawn stays the same. Without it
+    /// nothing is read or written.
+    pub fn set_cache(&mut self, cache: Option<Cache>) {
+        self.cache = cache;
+    }
+
+    /// Where tables that take long are kept, if anywhere.
+    pub(crate) fn cache(&self) -> Option<&Cache> {
+        self.cache.as_ref()
     }
 
     /// Writes what each pixel sees ([`crate::output::DepthMaps`]), whatever the file says.

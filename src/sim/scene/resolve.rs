@@ -129,6 +129,7 @@ pub(super) fn happening(file: SceneFile, folder: &Path, sensor: Sensor) -> Resul
         motion,
         objects,
         kept: OnceLock::new(),
+        cache: None,
     })
 }
 

@@ -136,7 +136,7 @@ impl<'a> Search<'a> {
         let lobe = |kind: DiffuserKind| {
             let mut leds = leds.clone();
             leds.diffuser = kind.diffuser;
-            (kind, setup::lobe(&leds))
+            (kind, setup::lobe(&leds, None))
         };
         let found = FoundLights {
             best: None,

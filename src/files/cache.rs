@@ -19,6 +19,8 @@ const CHECKSUM: usize = 32;
 const MAX_ENTRY_BYTES: u64 = 100_000_000;
 /// Beyond this the entries that were not used for longest go.
 const MAX_BYTES: u64 = 500_000_000;
+/// Bytes of the program that are read at a time.
+const BLOCK: usize = 1 << 17;
 const ENDING: &str = "table";
 /// Begins the names of files that are being written.
 const DRAFT: &str = "draft-";
@@ -34,9 +36,19 @@ pub struct Cache {
 impl Cache {
     /// A cache in a folder, which is made with the first entry. `computed_by` is what tells one program from another that computes
     /// other numbers: its own bytes, and of the processor what its results may depend on.
-    pub fn new(folder: &Path, computed_by: &[u8]) -> Self {
-        let computed_by = Sha256::digest(computed_by).into();
-        Self { folder: folder.to_owned(), computed_by, max_bytes: MAX_BYTES }
+    ///
+    /// # Errors
+    /// `computed_by` cannot be read.
+    pub fn new(folder: &Path, mut computed_by: impl Read) -> std::io::Result<Self> {
+        let (mut hash, mut block) = (Sha256::new(), vec![0; BLOCK]);
+        loop {
+            let count = computed_by.read(&mut block)?;
+            if count == 0 {
+                let computed_by = hash.finalize().into();
+                return Ok(Self { folder: folder.to_owned(), computed_by, max_bytes: MAX_BYTES });
+            }
+            hash.update(&block[..count]);
+        }
     }
 
     /// The numbers of a key, which says all that they depend on; `None` where there is no whole entry.
@@ -150,6 +162,10 @@ fn read(bytes: &[u8], hash: &[u8; 32]) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
 
+    fn of(folder: &Path, computed_by: &str) -> Cache {
+        Cache::new(folder, computed_by.as_bytes()).expect("text is read")
+    }
+
     fn only(cache: &Cache) -> PathBuf {
         let listed: Vec<PathBuf> = fs::read_dir(&cache.folder).unwrap().map(|e| e.unwrap().path()).collect();
         assert_eq!(listed.len(), 1, "{listed:?}");
@@ -159,14 +175,14 @@ mod tests {
     #[test]
     fn numbers_come_back_to_the_bit_and_only_to_their_key_and_program() {
         let place = tempfile::tempdir().unwrap();
-        let cache = Cache::new(&place.path().join("deep/cache"), b"one");
+        let cache = of(&place.path().join("deep/cache"), "one");
         let numbers = [0.1, -0.0, f64::MIN_POSITIVE / 8.0, f64::INFINITY, 1e300];
         assert_eq!(cache.get("key"), None);
         cache.put("key", &numbers);
         let found = cache.get("key").unwrap();
         assert!(found.iter().zip(numbers).all(|(a, b)| a.to_bits() == b.to_bits()));
         assert_eq!(cache.get("key "), None);
-        assert_eq!(Cache::new(&cache.folder, b"two").get("key"), None);
+        assert_eq!(of(&cache.folder, "two").get("key"), None);
         assert_eq!(cache.numbers("key", 5, || unreachable!()).len(), 5);
         assert_eq!(cache.numbers("key", 1, || vec![2.0]), [2.0]);
         assert_eq!(cache.get("key").unwrap(), [2.0]);
@@ -177,7 +193,7 @@ mod tests {
     #[test]
     fn no_damaged_or_foreign_entry_is_trusted_and_all_are_made_anew() {
         let place = tempfile::tempdir().unwrap();
-        let cache = Cache::new(place.path(), b"");
+        let cache = of(place.path(), "");
         let numbers = [1.0, 2.0, 3.0];
         cache.put("key", &numbers);
         let path = only(&cache);
@@ -225,7 +241,7 @@ mod tests {
         let file = place.path().join("file");
         fs::write(&file, "mine").unwrap();
         for folder in [file.clone(), file.join("below"), PathBuf::from("\0")] {
-            assert_eq!(Cache::new(&folder, b"").numbers("key", 1, || vec![4.0]), [4.0]);
+            assert_eq!(of(&folder, "").numbers("key", 1, || vec![4.0]), [4.0]);
         }
         assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
     }
@@ -233,7 +249,7 @@ mod tests {
     #[test]
     fn what_was_not_used_for_longest_goes_and_nothing_of_others() {
         let place = tempfile::tempdir().unwrap();
-        let cache = Cache { max_bytes: 1000, ..Cache::new(place.path(), b"") };
+        let cache = Cache { max_bytes: 1000, ..of(place.path(), "") };
         fs::write(place.path().join("notes.txt"), [0; 5000]).unwrap();
         let aged = |key: &str, seconds: u64| {
             let path = cache.path(&cache.hash(key));
@@ -254,7 +270,7 @@ mod tests {
     #[test]
     fn many_may_write_the_same_entry_at_once() {
         let place = tempfile::tempdir().unwrap();
-        let cache = Cache::new(place.path(), b"");
+        let cache = of(place.path(), "");
         std::thread::scope(|threads| {
             for _ in 0..8 {
                 threads.spawn(|| {

@@ -1,6 +1,8 @@
 //! Where the program keeps tables from run to run.
 
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::io::Read;
+use std::path::PathBuf;
 
 use domecast_files::Cache;
 
@@ -12,15 +14,12 @@ pub fn of_program() -> Option<Cache> {
     let user = || folder("XDG_CACHE_HOME").filter(|path| path.is_absolute());
     let home = || folder("HOME").map(|home| home.join(".cache"));
     let place = folder("DOMECAST_CACHE").or_else(|| Some(user().or_else(home)?.join("domecast")))?;
-    let mut computed_by = program()?;
-    computed_by.extend_from_slice(processor().as_bytes());
-    Some(Cache::new(&place, &computed_by))
+    Cache::new(&place, program()?.chain(processor().as_bytes())).ok()
 }
 
-/// The running program's bytes, also where its file was replaced since it began.
-fn program() -> Option<Vec<u8>> {
-    let running = Path::new("/proc/self/exe");
-    std::fs::read(running).or_else(|_| std::fs::read(std::env::current_exe()?)).ok()
+/// The running program, also where its file was replaced since it began.
+fn program() -> Option<File> {
+    File::open("/proc/self/exe").or_else(|_| File::open(std::env::current_exe()?)).ok()
 }
 
 /// What of the processor chooses between ways to compute: last digits differ with it.

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 import shape_frames
-from shape_frames import PRESSES, ROOT, ball, built_constants, check, dome_of, draw, drawn, errors, photograph, simulate, track
+from shape_frames import PRESSES, ROOT, ball, built_constants, check, dome_of, draw, drawn, errors, photograph, run, simulate, track
 
 # A press of each design, and its name among the frames.
 TOUCHES = {
@@ -33,6 +33,9 @@ RADII = (0.05, 0.1, 0.3)
 ALL_WITHIN, EACH_WITHIN = 0.95, 0.35
 # On thumb24-wide and digit-rigid crescents without light leave over so much that a stain's share is not told apart.
 LESS_WITHIN = {"thumb24-wide": 0.9, "digit-rigid": 0.84}
+# Weaker lights: the largest rms to 60 degrees, mm, and the share of pixels within three deviations. Both of picam-r20's lights of a
+# colour light much the same skin; on thumb24-wide heights add up over crescents without light. These record what is.
+WEAKER = {"digit-rigid": (0.04, 0.88), "picam-r20": (0.09, 0.9), "thumb24-wide": (0.1, 0.5)}
 # Stains on untouched skin, of 33, that state a touch: what is left over is not told apart from
 # noise where dots cover two thirds of the skin or much of it is dark.
 MAX_FALSE_TOUCHES = {"endoscope-r5": 5, "picam-r20": 11, "thumb24-wide": 14, "digit-rigid": 17}
@@ -105,6 +108,29 @@ def lights_out(domecast, work, design, constants):
             said.append((line["shape"]["status"], line["shape"].get("lights_out"), line.get("contact"), np.isfinite(height).any()))
         named = ("light_out", [light], None, False), ("no_pose", None, None, False)
         check(f"{design}: light {light} out", all(one in named for one in said), " | ".join(f"{status} {which or ''}" for status, which, *_ in said))
+
+
+def weaker_lights(domecast, work, design, constants):
+    """One light at four fifths, all at nine tenths, untouched and then held: what the lights give is taken out of the frames."""
+    dome, (_, press) = dome_of(constants), TOUCHES[design]
+    level = json.loads((work / design / "report/light.json").read_text())["level_per_mw_mm2"]
+    lights, power = len(json.loads(constants.read_text())["light"]["leds"]), 0.5 if design != "picam-r20" else 1.0
+    max_rms_mm, min_share = WEAKER.get(design, (0.02, 0.9))
+    for what, each in (("light-0-at-80", [0.8] + [1.0] * (lights - 1)), ("all-at-90", [0.9] * lights)):
+        folder = work / f"{design}-{what}"
+        folder.mkdir(exist_ok=True)
+        cv2.imwrite(str(folder / "rest.png"), photograph(drawn(simulate(domecast, work / f"{design}-rest", design, None)), 2))
+        dims = []
+        for touched, objects in (("rest", None), ("held", press(dome))):
+            dims.append(draw(domecast, work / f"{design}-{what}-{touched}", ROOT / f"designs/{design}.json", level, objects, power, each))
+            cv2.imwrite(str(folder / f"{touched}-dim.png"), photograph(drawn(dims[-1]), 7))
+        lines = run(domecast, "track", folder / "rest-dim.png", folder / "held-dim.png", "--constants", constants, "--shape", folder / "shape", "--rest", folder / "rest.png", "--force")
+        for number, (truth, line) in enumerate(zip(dims, lines.splitlines())):
+            e = errors(truth, folder / "shape", dome, number)
+            here = e["known"] & (e["polar"] <= 60)
+            rms, share = np.sqrt(np.mean(e["off"][here] ** 2)), np.mean(np.abs(e["off"][here]) <= 3 * e["sd"][here])
+            said = " ".join(f"{gain:.2f}" for gain in json.loads(line)["shape"]["light_gain"])
+            check(f"{design}: {what}, {'held' if number else 'untouched'}", rms <= max_rms_mm and share >= min_share, f"rms {rms:.4f} mm to 60 deg, {share:.2f} within 3 sd, gains {said}")
 
 
 def in_a_touch(domecast, truth, rest, constants, dome):
@@ -196,6 +222,7 @@ def main():
             if design == "thumb24":
                 faults(arguments.domecast, work, dome_of(constants), constants)
             lights_out(arguments.domecast, work, design, constants)
+            weaker_lights(arguments.domecast, work, design, constants)
             stains(arguments.domecast, work, design, constants, arguments.quick)
     sys.exit(1 if shape_frames.failed else 0)
 

@@ -47,12 +47,7 @@ impl PyShapeMap {
 impl PyShapeMap {
     #[getter]
     fn status(&self) -> &'static str {
-        match &self.map.status {
-            None if !self.map.lights_out.is_empty() => "light_out",
-            None => "no_pose",
-            Some(solved) if solved.is_converged => "ok",
-            Some(_) => "not_converged",
-        }
+        self.map.status_name()
     }
 
     #[getter]

@@ -170,7 +170,7 @@ impl ShapeFromColor {
         let (levels, covered) = (&self.levels, &self.covered);
         self.rest = Some(RestMap::measured(levels, covered, &self.cells, &self.view, &self.light, noise)?);
         let is_bare = |cell: usize| self.view.is_dome[cell] && !self.covered[cell];
-        self.lights = Lights::at_rest(&self.ways, &self.view, is_bare);
+        self.lights = Lights::at_rest(&self.ways, &self.cells, &self.view, &self.levels, tracked, is_bare);
         self.rest_seen = self.optics.clone();
         Ok(())
     }
@@ -233,6 +233,15 @@ impl ShapeFromColor {
         if self.is_light_out() {
             return Ok(());
         }
+        self.lights.take_out(
+            &self.cells,
+            &self.view,
+            tracked,
+            self.optics.dome().radius_mm(),
+            &mut self.gain,
+        );
+        self.map.light_gain.clear();
+        self.map.light_gain.extend(self.lights.gains());
         // Where the last frame's skin was hardly moved this one is read at rest: errors of the one would be read into the next and grow.
         self.last_mm.clone_from(&self.moved_mm);
         let min_mm = f64::from(MIN_DEPTH_MM);

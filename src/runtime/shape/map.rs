@@ -56,6 +56,8 @@ pub struct ShapeMap {
     pub status: Option<SolveStatus>,
     /// Lights, by their place in the constants, that were on in the frame at rest and are out: then nothing is known.
     pub lights_out: Vec<usize>,
+    /// What each light of the constants gives, parts of what it gave in the frame at rest.
+    pub light_gain: Vec<f32>,
     /// The same for each cell, before it is drawn.
     cell_mm: Vec<f32>,
     /// Pixels along a cell, cells across and down.
@@ -102,6 +104,7 @@ impl ShapeMap {
             contact: None,
             status: None,
             lights_out: Vec::new(),
+            light_gain: Vec::new(),
             cell_mm: vec![f32::NAN; cells.count()],
             cell_px: cells.px,
             cells_across: cells.width,
@@ -192,6 +195,16 @@ impl ShapeMap {
         }
     }
 
+    /// How the reading ended: `ok`, `not_converged`, `no_pose`, or `light_out` where a light is out that was on at rest.
+    pub fn status_name(&self) -> &'static str {
+        match &self.status {
+            None if !self.lights_out.is_empty() => "light_out",
+            None => "no_pose",
+            Some(solved) if solved.is_converged => "ok",
+            Some(_) => "not_converged",
+        }
+    }
+
     /// Nothing is known.
     pub(super) fn forget(&mut self) {
         self.height_mm.fill(f32::NAN);
@@ -202,6 +215,7 @@ impl ShapeMap {
         self.forget_cells();
         self.status = None;
         self.lights_out.clear();
+        self.light_gain.clear();
     }
 
     fn forget_cells(&mut self) {

@@ -129,14 +129,17 @@ fn unfit(path: &Path, error: &ShapeError) -> Failure {
 
 /// The members of a JSON line that the shape adds, without what encloses them.
 pub fn shape_members(map: &ShapeMap, has_forces: bool) -> String {
-    let mut shape = match &map.status {
-        None if !map.lights_out.is_empty() => json!({ "status": "light_out", "lights_out": map.lights_out }),
-        None => json!({ "status": "no_pose" }),
-        Some(solved) => json!({
-            "status": if solved.is_converged { "ok" } else { "not_converged" },
-            "rounds": solved.rounds, "residual": solved.residual, "last_step_mm": solved.last_step_mm,
-        }),
-    };
+    let mut shape = json!({ "status": map.status_name() });
+    if !map.lights_out.is_empty() {
+        shape["lights_out"] = json!(map.lights_out);
+    }
+    if let Some(solved) = &map.status {
+        shape["rounds"] = json!(solved.rounds);
+        shape["residual"] = json!(solved.residual);
+        shape["last_step_mm"] = json!(solved.last_step_mm);
+        shape["light_gain"] =
+            map.light_gain.iter().map(|gain| (f64::from(*gain) * 1e4).round() / 1e4).collect();
+    }
     let round = |v: f64| (v * 1e6).round() / 1e6;
     let point = |at: glam::DVec3| at.to_array().map(round);
     let contact = map.contact.as_ref().map(|contact| {

@@ -129,6 +129,9 @@ pub struct Tables {
     pub evaluations: u64,
 }
 
+/// Gives the numbers of a table by its name, how many it has, and what makes them.
+pub type Numbers<'a> = dyn Fn(&str, usize, &dyn Fn() -> Vec<f64>) -> Vec<f64> + 'a;
+
 /// All that is computed once for a design and a choice of effects.
 #[derive(Debug, Default)]
 pub struct Prepared {
@@ -155,12 +158,7 @@ impl Prepared {
 
     /// Takes what a field of some parts needs as plain numbers from elsewhere: `numbers` is given a table's name, how many numbers it
     /// has, and what makes them.
-    pub fn fill(
-        &self,
-        ways: &Ways,
-        (dome, shells, room): (bool, bool, bool),
-        numbers: &dyn Fn(&str, usize, &dyn Fn() -> Vec<f64>) -> Vec<f64>,
-    ) {
+    pub fn fill(&self, ways: &Ways, (dome, shells, room): (bool, bool, bool), numbers: &Numbers<'_>) {
         let grid = |cells| DomeGrid::with_cells(cells).over(ways.face());
         let count = |grid: &DomeGrid| 2 + ways.sources.len() * grid.nodes.pow(2) * 4;
         if dome && self.dome.get().is_none() {

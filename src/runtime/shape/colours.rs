@@ -8,7 +8,7 @@ use super::estimator::{ShapeFromColor, ShapeOptions};
 use super::rest::{OTHER_ORDERS, Seen, seen};
 use super::rows::share;
 use crate::constants::Constants;
-use crate::track::{CameraFrame, Tracker};
+use crate::track::{CameraFrame, Tracked, Tracker};
 
 /// Every seventh cell is asked, in as many parts.
 const STEP: usize = 7;
@@ -84,5 +84,13 @@ impl ShapeFromColor {
         }
         self.map.lights_out = out;
         !self.map.lights_out.is_empty()
+    }
+
+    /// Takes out of the gain what the lights have lost.
+    pub(super) fn take_out_lights(&mut self, tracked: &Tracked) {
+        let radius_mm = self.optics.dome().radius_mm();
+        self.lights.take_out(&self.cells, &self.view, tracked, radius_mm, &mut self.gain);
+        self.map.light_gain.clear();
+        self.map.light_gain.extend(self.lights.gains());
     }
 }

@@ -233,15 +233,7 @@ impl ShapeFromColor {
         if self.is_light_out() {
             return Ok(());
         }
-        self.lights.take_out(
-            &self.cells,
-            &self.view,
-            tracked,
-            self.optics.dome().radius_mm(),
-            &mut self.gain,
-        );
-        self.map.light_gain.clear();
-        self.map.light_gain.extend(self.lights.gains());
+        self.take_out_lights(tracked);
         // Where the last frame's skin was hardly moved this one is read at rest: errors of the one would be read into the next and grow.
         self.last_mm.clone_from(&self.moved_mm);
         let min_mm = f64::from(MIN_DEPTH_MM);

@@ -91,16 +91,22 @@ def stains(domecast, work, design, constants, quick):
     check(f"{design}: stains state no touch", false_touches <= MAX_FALSE_TOUCHES.get(design, 1), f"{false_touches} of {count}")
 
 
+def under_lights(domecast, work, design, name, objects, each):
+    """A scene whose lights give these parts of what they gave at rest."""
+    level = json.loads((work / design / "report/light.json").read_text())["level_per_mw_mm2"]
+    power = 0.5 if design != "picam-r20" else 1.0
+    return draw(domecast, work / f"{design}-{name}", ROOT / f"designs/{design}.json", level, objects, power, each)
+
+
 def lights_out(domecast, work, design, constants):
     """Each light out in turn, touched or not: named, and nothing said of the skin. Without the light of the markers there may be no pose."""
     dome, (_, press) = dome_of(constants), TOUCHES[design]
-    level = json.loads((work / design / "report/light.json").read_text())["level_per_mw_mm2"]
     still = photograph(drawn(simulate(domecast, work / f"{design}-rest", design, None)), 2)
     lights = len(json.loads(constants.read_text())["light"]["leds"])
     for light in range(lights):
         each, said = [float(k != light) for k in range(lights)], []
         for touched, objects in (("rest", None), ("held", press(dome))):
-            dark = draw(domecast, work / f"{design}-dark{light}-{touched}", ROOT / f"designs/{design}.json", level, objects, 0.5 if design != "picam-r20" else 1.0, each)
+            dark = under_lights(domecast, work, design, f"dark{light}-{touched}", objects, each)
             cv2.imwrite(str(dark / "camera_frame.png"), photograph(drawn(dark), 7))
             cv2.imwrite(str(dark / "camera_rest.png"), still)
             line = track(domecast, dark / "camera_frame.png", dark / "camera_rest.png", constants, dark / "shape")
@@ -113,8 +119,7 @@ def lights_out(domecast, work, design, constants):
 def weaker_lights(domecast, work, design, constants):
     """One light at four fifths, all at nine tenths, untouched and then held: what the lights give is taken out of the frames."""
     dome, (_, press) = dome_of(constants), TOUCHES[design]
-    level = json.loads((work / design / "report/light.json").read_text())["level_per_mw_mm2"]
-    lights, power = len(json.loads(constants.read_text())["light"]["leds"]), 0.5 if design != "picam-r20" else 1.0
+    lights = len(json.loads(constants.read_text())["light"]["leds"])
     max_rms_mm, min_share = WEAKER.get(design, (0.02, 0.9))
     for what, each in (("light-0-at-80", [0.8] + [1.0] * (lights - 1)), ("all-at-90", [0.9] * lights)):
         folder = work / f"{design}-{what}"
@@ -122,7 +127,7 @@ def weaker_lights(domecast, work, design, constants):
         cv2.imwrite(str(folder / "rest.png"), photograph(drawn(simulate(domecast, work / f"{design}-rest", design, None)), 2))
         dims = []
         for touched, objects in (("rest", None), ("held", press(dome))):
-            dims.append(draw(domecast, work / f"{design}-{what}-{touched}", ROOT / f"designs/{design}.json", level, objects, power, each))
+            dims.append(under_lights(domecast, work, design, f"{what}-{touched}", objects, each))
             cv2.imwrite(str(folder / f"{touched}-dim.png"), photograph(drawn(dims[-1]), 7))
         lines = run(domecast, "track", folder / "rest-dim.png", folder / "held-dim.png", "--constants", constants, "--shape", folder / "shape", "--rest", folder / "rest.png", "--force")
         for number, (truth, line) in enumerate(zip(dims, lines.splitlines())):

@@ -9,31 +9,23 @@ the hash of the weights. Needs torch, torchvision and a CUDA card, which nothing
 """
 import argparse
 import hashlib
-import io
 import json
 import pathlib
-import tarfile
 import time
 
 import numpy as np
 import torch
 import torchvision
 
+from check_dataset import read_set
+
 
 def read(folder):
     """Pictures and labels of each split."""
-    index, splits = json.loads((folder / "dataset.json").read_text()), {"train": [], "val": [], "test": []}
-    for shard in index["shards"]:
-        videos = {}
-        with tarfile.open(folder / shard["file"]) as tar:
-            for member in tar:
-                key, _, name = member.name.partition(".")
-                if name in ("frames.npy", "rest.npy", "json"):
-                    videos.setdefault(key, {})[name] = tar.extractfile(member).read()
-        for _, video in sorted(videos.items()):
-            frames, rest = (np.load(io.BytesIO(video[name])).astype(np.int16) for name in ("frames.npy", "rest.npy"))
-            label = json.loads(video["json"])
-            splits[label["split"]].append(((frames - rest).transpose(0, 3, 1, 2), label["label"]))
+    splits = {"train": [], "val": [], "test": []}
+    for _, video in sorted(read_set(folder)[1].items()):
+        picture = video["frames.npy"].astype(np.int16) - video["rest.npy"]
+        splits[video["json"]["split"]].append((picture.transpose(0, 3, 1, 2), video["json"]["label"]))
     stacked = {name: (np.stack([x for x, _ in videos]), [y for _, y in videos]) for name, videos in splits.items()}
     return {name: (torch.from_numpy(x).cuda(), torch.tensor(y).cuda()) for name, (x, y) in stacked.items()}
 

@@ -31,7 +31,7 @@ const MIN_LEVEL: f32 = 20.0 / 255.0;
 const OUT: f32 = 0.5;
 
 /// Where no light changed by more than the first part, nothing is taken out, where one did by more than the second, all is: estimates of
-/// lights that did not change lie up to 0.005 from 1 on untouched skin, on five designs; a stain of 0.3 of the radius makes some 0.01.
+/// lights that did not change lie up to 0.005 from 1 on untouched skin, on five designs.
 const CHANGED: [f32; 2] = [0.015, 0.03];
 
 /// Motion of the middle dot since the frame at rest, part of the dome's radius, below which the skin is at rest.

@@ -67,13 +67,13 @@ pub struct ShapeFromColor {
     rest_optics: SensorOptics,
     pub(super) optics: SensorOptics,
     /// Constants without white markers are those of a rigid mount.
-    is_rigid: bool,
-    rest: Option<RestMap>,
+    pub(super) is_rigid: bool,
+    pub(super) rest: Option<RestMap>,
     ways: Ways,
     pub(super) lights: Lights,
     volume: Volume,
     /// As it stood in the frame at rest.
-    rest_seen: SensorOptics,
+    pub(super) rest_seen: SensorOptics,
     pub(super) view: View,
     pub(super) levels: Vec<Level>,
     pub(super) covered: Vec<bool>,
@@ -85,7 +85,7 @@ pub struct ShapeFromColor {
     turn_per_mm: Vec<Vec3A>,
     turns: Lattice,
     /// By how many cells a place of the dome is seen beside where it was at rest.
-    shifts: Lattice,
+    pub(super) shifts: Lattice,
     readings: Vec<CellReading>,
     /// How far each cell had moved when it was read, mm, and whether it is to be read again.
     read_mm: Vec<f64>,

@@ -34,8 +34,10 @@ const OUT: f32 = 0.5;
 /// lights that did not change lie up to 0.005 from 1 on untouched skin, on five designs.
 const CHANGED: [f32; 2] = [0.015, 0.03];
 
-/// Motion of the middle dot since the frame at rest, part of the dome's radius, below which the skin is at rest.
-const STILL: f64 = 1e-3;
+/// Motion of a dot since the frame at rest, part of the dome's radius, below which it lies as there: noise of two levels moves all of a
+/// design's dots but one by up to 0.0017. So does a skin at rest, a hundredth of whose dots (at least one) may be astray.
+const STILL: f64 = 2e-3;
+const ASTRAY: usize = 100;
 
 /// Bound on the rounds in which lights of a colour are distinguished, and the change, a part, that ends them.
 const MAX_ROUNDS: usize = 64;
@@ -169,15 +171,17 @@ impl Lights {
         }
     }
 
-    /// Whether the dots lie as in the frame at rest.
+    /// Whether the dots lie as in the frame at rest: a touch moves those round it alone.
     fn is_still(&mut self, tracked: &Tracked, radius_mm: f64) -> bool {
         let moved = tracked.black_dots.iter().zip(&self.dots_mm);
         let moved = moved.filter_map(|(now, rest)| Some((now.displacement_mm? - (*rest)?).length() as f32));
         self.room.clear();
         self.room.extend(moved);
-        let middle = self.room.len() / 2;
-        self.room.len() >= MIN_PLACES
-            && f64::from(*self.room.select_nth_unstable_by(middle, f32::total_cmp).1) < STILL * radius_mm
+        if self.room.len() < MIN_PLACES {
+            return false;
+        }
+        let largest = self.room.len() - 1 - (self.room.len() / ASTRAY).max(1);
+        f64::from(*self.room.select_nth_unstable_by(largest, f32::total_cmp).1) < STILL * radius_mm
     }
 
     /// Finds what each light gives, and those that are out; `at_rest` is the level of a cell's channel in the frame at rest, without stray light.

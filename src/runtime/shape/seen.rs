@@ -64,12 +64,18 @@ impl ShapeFromColor {
         let of = |channel: usize| &views[channel];
         let is_seen = |cell: usize| (0..3).all(|c| of(c).is_dome.get(cell).copied().unwrap_or(false));
         let is_bare = |cell: &usize| view.is_dome[*cell] && !self.covered[*cell] && is_seen(*cell);
+        // The lights count as they were at rest: whether they still are is asked of these cells.
+        let mut gain = Vec::new();
+        if let Some(rest) = self.rest.as_ref().filter(|_| !self.gain.is_empty()) {
+            let shifts = &mut self.shifts.clone();
+            rest.at_pose(&self.cells, view, &self.rest_seen, shifts, self.is_rigid, &mut gain);
+        }
         let bare = (0..self.cells.count().min(view.is_dome.len())).filter(is_bare);
         bare.map(|cell| {
             let by_own = |f: &dyn Fn(usize) -> f32| DVec3::from_array([0, 1, 2].map(|c| f64::from(f(c))));
             let passed = by_own(&|c| self.light.passed(of(c).ray[cell].z)[c]);
             let still = by_own(&|c| self.light.still(of(c).place[cell])[c]);
-            let gain = self.gain.get(cell).map_or(DVec3::ZERO, |gain| gain.as_dvec3());
+            let gain = gain.get(cell).map_or(DVec3::ZERO, |gain| gain.as_dvec3());
             let own = self.light.passed(view.ray[cell].z) * self.light.still(view.place[cell]);
             let level = &self.levels[cell];
             SeenCell {

@@ -278,13 +278,8 @@ fn mirrored(
     }
     let channel = optics.channel();
     // From the dome down, without the air that stands first.
-    let mut down: Vec<f64> = optics.layers().iter().skip(1).rev().map(|l| l.index_for(channel)).collect();
-    let mut back: Vec<f64> = down.iter().rev().copied().collect();
-    if point_mm.z <= 0.0 {
-        back.pop();
-    }
-    if down.is_empty() {
-        down.push(1.0);
-    }
-    (value * fresnel::returned(&down, &back, tube.snell_invariant), tube.tangent)
+    let down: Vec<f64> = optics.layers().iter().skip(1).rev().map(|l| l.index_for(channel)).collect();
+    // Beside the dome it has come to the sheet's top.
+    let share = if point_mm.z > 0.0 { fresnel::returned } else { fresnel::turned };
+    (value * share(&down, tube.snell_invariant), tube.tangent)
 }

@@ -246,8 +246,27 @@ fn fresnel_splits_without_loss_and_stops_at_the_critical_angle() {
     let (up, down) = (fresnel::transmitted(1.0, 1.5, 0.7), fresnel::transmitted(1.5, 1.0, 0.7));
     assert!((up[0] - down[0]).abs() < 1e-14 && (up[1] - down[1]).abs() < 1e-14);
     assert_eq!(fresnel::transmitted(1.5, 1.0, 1.2), [0.0; 2]);
-    assert_eq!(fresnel::returned(&[1.41, 1.41], &[1.41, 1.41], 1.1), 1.0);
-    assert!((fresnel::returned(&[1.5], &[1.5], 0.0) - 0.04).abs() < 1e-12);
+    for share in [fresnel::returned, fresnel::turned] {
+        assert_eq!(share(&[1.41, 1.41], 1.1), 1.0);
+        assert!((share(&[1.5], 0.0) - 0.04).abs() < 1e-12);
+    }
+    // What does not leave comes back, after any number of turns: a slow sum over them.
+    let (indices, momentum) = ([1.41, 1.494], 0.9);
+    let mut slow = 0.0;
+    let [upper, lower] =
+        [(indices[0], indices[1]), (indices[1], 1.0)].map(|(a, b)| fresnel::transmitted(a, b, momentum));
+    for k in 0..2 {
+        let (mut inside, mut back) = (upper[k], 1.0 - upper[k]);
+        for _ in 0..200 {
+            inside *= 1.0 - lower[k];
+            back += inside * upper[k];
+            inside *= 1.0 - upper[k];
+        }
+        slow += 0.5 * back;
+    }
+    assert!((fresnel::returned(&indices, momentum) / slow - 1.0).abs() < 1e-12, "{slow}");
+    // Along the sheet the upper face throws back much, and nothing of it is lost.
+    assert!(fresnel::turned(&indices, 1.39) < 0.9 && fresnel::returned(&indices, 1.39) == 1.0);
 }
 
 #[test]

@@ -7,6 +7,7 @@ Frames are those of `shape_frames.py`. A fault is drawn into the frame alone, be
 import argparse
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -15,7 +16,7 @@ import cv2
 import numpy as np
 
 import shape_frames
-from shape_frames import PRESSES, ROOT, ball, built_constants, check, dome_of, draw, drawn, errors, photograph, run, simulate, track
+from shape_frames import PRESSES, ROOT, ball, built_constants, check, dome_of, draw, drawn, errors, photograph, run, shown, simulate, track, within
 
 # A press of each design, and its name among the frames.
 TOUCHES = {
@@ -30,15 +31,14 @@ STAINS = {"red": (0.6, 0.6, 1), "green": (0.6, 1, 0.6), "blue": (1, 0.6, 0.6), "
           "faint grey": (0.92, 0.92, 0.92), "grey": (0.7, 0.7, 0.7), "dark": (0.15, 0.15, 0.15), "bright": (1.15, 1.15, 1.15), "cut off": None}
 RADII = (0.05, 0.1, 0.3)
 # Shares of pixels within three deviations, in a stain, to 20 px around it, and away: of all stains of a design, touched or not; of each.
-ALL_WITHIN, EACH_WITHIN = 0.95, 0.35
+ALL_WITHIN, EACH_WITHIN = 0.95, 0.33
 # On thumb24-wide and digit-rigid crescents without light leave over so much that a stain's share is not told apart.
-LESS_WITHIN = {"thumb24-wide": 0.89, "digit-rigid": 0.84}
-# Weaker lights: the largest rms to 60 degrees, mm, and the share of pixels within three deviations. Both of picam-r20's lights of a
-# colour light much the same skin; on thumb24-wide heights add up over crescents without light. These record what is.
-WEAKER = {"digit-rigid": (0.04, 0.88), "picam-r20": (0.09, 0.9), "thumb24-wide": (0.1, 0.5)}
+LESS_WITHIN = {"thumb24-wide": 0.88, "digit-rigid": 0.84, "picam-r20": 0.94}
+# Weaker lights: the largest rms to 60 degrees, mm, and the least share of pixels within three deviations.
+WEAKER = (0.02, 0.9)
 # Stains on untouched skin, of 33, that state a touch: what is left over is not told apart from
 # noise where dots cover two thirds of the skin or much of it is dark.
-MAX_FALSE_TOUCHES = {"endoscope-r5": 5, "picam-r20": 13, "thumb24-wide": 14, "digit-rigid": 17}
+MAX_FALSE_TOUCHES = {"thumb24": 2, "endoscope-r5": 5, "picam-r20": 13, "thumb24-wide": 14, "digit-rigid": 17}
 
 
 def away_deg(truth, dome, polar_deg, azimuth_deg):
@@ -117,11 +117,11 @@ def lights_out(domecast, work, design, constants):
 
 
 def weaker_lights(domecast, work, design, constants):
-    """One light at four fifths, all at nine tenths, untouched and then held: what the lights give is taken out of the frames."""
+    """One light at four fifths, all at nine tenths and at 98.5 %, untouched and then held: what the lights give is taken out."""
     dome, (_, press) = dome_of(constants), TOUCHES[design]
     lights = len(json.loads(constants.read_text())["light"]["leds"])
-    max_rms_mm, min_share = WEAKER.get(design, (0.02, 0.9))
-    for what, each in (("light-0-at-80", [0.8] + [1.0] * (lights - 1)), ("all-at-90", [0.9] * lights)):
+    max_rms_mm, min_share = WEAKER
+    for what, each in (("light-0-at-80", [0.8] + [1.0] * (lights - 1)), ("all-at-90", [0.9] * lights), ("all-at-0985", [0.985] * lights)):
         folder = work / f"{design}-{what}"
         folder.mkdir(exist_ok=True)
         cv2.imwrite(str(folder / "rest.png"), photograph(drawn(simulate(domecast, work / f"{design}-rest", design, None)), 2))
@@ -210,6 +210,34 @@ def faults(domecast, work, dome, constants):
     refused("constants without light", "light is not in", "--constants", truth / "old.json", "--rest", truth / "swapped.png")
 
 
+def opposite_lights(domecast, work):
+    """Between lights of one colour that stand opposite each other colours say nothing of slopes: `build` warns, heights say so."""
+    name = "thumb24-opposite"
+    design, file = json.loads((ROOT / "designs/thumb24.json").read_text()), work / f"{name}.json"
+    design["name"] = name
+    for k, light in enumerate(design["leds"]["list"]):
+        light["color"] = ("red", "green", "blue")[k % 3]
+    file.write_text(json.dumps(design))
+    shutil.rmtree(work / name, ignore_errors=True)
+    done = subprocess.run([domecast, "build", file, "--out", work / name], capture_output=True, text=True)
+    warned = [line for line in (done.stdout + done.stderr).splitlines() if "leds.list" in line]
+    check("opposite lights: build warns of the pole", done.returncode == 0 and len(warned) == 1, " ".join(warned)[:60])
+    constants = work / name / "constants/constants.json"
+    dome, level = dome_of(constants), json.loads((work / name / "report/light.json").read_text())["level_per_mw_mm2"]
+    rest = work / f"{name}-rest.png"
+    cv2.imwrite(str(rest), photograph(drawn(draw(domecast, work / f"{name}-rest", file, level, None)), 2))
+    for radius, polar, azimuth, depth in ((5, 0, 0, 0.6), (3, 20, 40, 0.5)):
+        truth = draw(domecast, work / f"{name}-{polar}", file, level, ball(radius, polar, azimuth, depth, dome))
+        frame = truth / "camera_frame.png"
+        cv2.imwrite(str(frame), photograph(drawn(truth), 7))
+        track(domecast, frame, rest, constants, truth / "shape")
+        e = errors(truth, truth / "shape", dome)
+        sds = np.abs(e["off"] / e["sd"])[e["known"] & (e["polar"] <= 60)]
+        touch = np.abs(e["off"] / e["sd"])[e["known"] & (away_deg(truth, dome, polar, azimuth) <= 8)]
+        check(f"opposite lights: touched at {polar} deg", np.mean(sds <= 3) >= 0.97 and np.mean(touch <= 3) >= 0.95,
+              f"{np.nanmax(np.abs(e['off'][e['polar'] <= 60])):.3f} mm off at most; {shown(within(sds))}, in the touch {shown(within(touch))}")
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("domecast", type=pathlib.Path)
@@ -226,6 +254,7 @@ def main():
             constants = built_constants(arguments.domecast, work, design)
             if design == "thumb24":
                 faults(arguments.domecast, work, dome_of(constants), constants)
+                opposite_lights(arguments.domecast, work)
             lights_out(arguments.domecast, work, design, constants)
             weaker_lights(arguments.domecast, work, design, constants)
             stains(arguments.domecast, work, design, constants, arguments.quick)

@@ -62,6 +62,24 @@ pub fn normal_error_rad(levels: &DMat3, normal: DVec3) -> Option<f64> {
     error.is_finite().then_some(error)
 }
 
+/// How well the brightness of the membrane is known beside the frame at rest, a part: what a touch changes of the light that the
+/// dome gives itself (a third of all) and what JPEG leaves of brightness.
+pub const BRIGHTNESS_SD: f64 = 0.03;
+
+/// As [`normal_error_rad`] by as many colors as there are, where brightness is known to [`BRIGHTNESS_SD`] beside a frame at rest, as
+/// `track --shape` reads normals; `None` where a direction cannot be distinguished.
+pub fn slope_error_rad(levels: &DMat3, normal: DVec3) -> Option<f64> {
+    let (first, second) = normal.any_orthonormal_pair();
+    let [j1, j2, whole] = [first, second, normal].map(|way| levels.mul_vec3(way));
+    // The brightness, with what is known of it, put into the slopes' equations (Schur's complement).
+    let bright = 1.0 / (whole.length_squared() + 1.0 / (BRIGHTNESS_SD * BRIGHTNESS_SD));
+    let entry = |a: DVec3, b: DVec3| a.dot(b) - a.dot(whole) * whole.dot(b) * bright;
+    let (a11, a12, a22) = (entry(j1, j1), entry(j1, j2), entry(j2, j2));
+    let determinant = a11 * a22 - a12 * a12;
+    let error = (0.5 * (a11 + a22) / determinant).sqrt();
+    (determinant > SINGULAR * (a11 + a22).powi(2) && error.is_finite()).then_some(error)
+}
+
 /// The value below which a part of `sorted` lies, interpolated between neighbours; `None` where there is none. Of places
 /// that stand for equal areas it is the percentile by area.
 pub fn percentile(sorted: &[f64], part: f64) -> Option<f64> {
@@ -117,6 +135,27 @@ mod tests {
         let square: f64 = DVec3::AXES.iter().map(|axis| turned(*axis).length_squared()).sum();
         let found = normal_error_rad(&light, normal).expect("an inverse");
         assert!((found / (0.5 * square).sqrt() - 1.0).abs() < 1e-7, "{found} {}", (0.5 * square).sqrt());
+    }
+
+    #[test]
+    fn slopes_are_told_by_two_colors_where_brightness_is_known_and_not_between_opposite_lights() {
+        let light = DMat3::from_cols_array(&[90.0, 20.0, -35.0, 3.0, 60.0, 41.0, 55.0, 70.0, 48.0]) * 10.0;
+        let normal = DVec3::new(0.3, -0.2, 0.9).normalize();
+        // Of three bright colors brightness, known to a part, tells little.
+        let [free, held] =
+            [normal_error_rad, slope_error_rad].map(|error| error(&light, normal).expect("three colors"));
+        assert!(held < free && held > 0.9 * free, "{held} {free}");
+        let two = DMat3::from_diagonal(DVec3::new(1.0, 1.0, 0.0)) * light;
+        let error = slope_error_rad(&two, normal).expect("two colors and the brightness");
+        assert!(
+            error > held && error < 20.0 * held && normal_error_rad(&two, normal).is_none(),
+            "{error} {held}"
+        );
+        // Light of each color from both sides is light from above.
+        assert_eq!(
+            slope_error_rad(&DMat3::from_cols(DVec3::ZERO, DVec3::ZERO, DVec3::splat(200.0)), DVec3::Z),
+            None
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Symmetric positive systems in room that is there.
 
 /// Factors the lower triangle of a symmetric matrix in place, row by row with this stride; false where it is not positive.
-pub(super) fn factor(matrix: &mut [f64], size: usize, stride: usize) -> bool {
+pub(crate) fn factor(matrix: &mut [f64], size: usize, stride: usize) -> bool {
     for i in 0..size {
         let (above, rest) = matrix.split_at_mut(i * stride);
         let Some(row) = rest.get_mut(..size) else { return false };
@@ -21,7 +21,7 @@ pub(super) fn factor(matrix: &mut [f64], size: usize, stride: usize) -> bool {
 }
 
 /// Solves `L x = b` in place.
-pub(super) fn forward(matrix: &[f64], stride: usize, b: &mut [f64]) {
+pub(crate) fn forward(matrix: &[f64], stride: usize, b: &mut [f64]) {
     for i in 0..b.len() {
         let Some(row) = matrix.get(i * stride..i * stride + i + 1) else { return };
         let sum: f64 = row.iter().zip(b.iter()).take(i).map(|(a, b)| a * b).sum();
@@ -30,7 +30,7 @@ pub(super) fn forward(matrix: &[f64], stride: usize, b: &mut [f64]) {
 }
 
 /// Solves `L L^T x = b` in place.
-pub(super) fn solve(matrix: &[f64], stride: usize, b: &mut [f64]) {
+pub(crate) fn solve(matrix: &[f64], stride: usize, b: &mut [f64]) {
     forward(matrix, stride, b);
     for i in (0..b.len()).rev() {
         let Some(row) = matrix.get(i * stride..i * stride + i + 1) else { return };

@@ -1,6 +1,7 @@
 //! The runtime of a sensor: it knows the constants and no design.
 
 pub mod calibrate;
+mod cholesky;
 pub mod constants;
 pub mod frames;
 #[cfg(feature = "overlay")]

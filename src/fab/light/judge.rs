@@ -5,6 +5,7 @@ use serde_json::json;
 
 use super::edges::ShadowEdges;
 use super::levels::{FULL, LightReport, MarkerLevels};
+use super::separation::Separation;
 use crate::numbers::{percent, typeset};
 use domecast_design::{Cure, Design, DesignError};
 use domecast_runtime::track::MIN_MARKER_RISE_LEVELS;
@@ -147,6 +148,19 @@ fn on_edges(edges: ShadowEdges) -> Option<String> {
     ))
 }
 
+/// What lights mean whose colors hardly change with the skin's slope, as where two of a color stand opposite each other.
+fn hides_slopes(separation: Separation) -> Option<String> {
+    let share = separation.blind_share_to_45_deg;
+    (share > MAX_SHARE).then(|| {
+        format!(
+            "{} of the dome within 45 degrees of the pole hardly changes its color with slope (a normal is off by more than 5 degrees for one \
+             level): `track --shape` fills in from around there, and deep touches may be far off, as `height_sd` says; let each color reach it from one \
+             side, its lights side by side and not opposite each other",
+            percent(share)
+        )
+    })
+}
+
 /// What platforms that let light through mean: neither the lit platform nor what the lens sees of the lights is simulated.
 fn shows_lights(design: &Design) -> Option<String> {
     let leds = &design.sections().leds;
@@ -205,9 +219,20 @@ pub(super) fn warnings(design: &Design, report: &LightReport) -> Vec<(String, St
             ),
         );
     }
+    if let Some(message) = report.separation.and_then(hides_slopes) {
+        warn("leds.list", message);
+    }
     if let Some(message) = report.edges.and_then(on_edges) {
         warn("pattern.polar_angle_deg", message);
     }
+    found.extend(dim_markers(design, report));
+    found
+}
+
+/// White markers that hardly stand out, or less than the dome does.
+fn dim_markers(design: &Design, report: &LightReport) -> Vec<(String, String)> {
+    let (dome, mut found) = (&report.dome, Vec::new());
+    let mut warn = |field: &str, message: String| found.push((field.to_owned(), message));
     let contrast = |pick: fn(f64, f64) -> f64, start: f64| {
         report.markers.iter().map(|marker| marker.contrast_levels).fold(start, pick)
     };

@@ -91,10 +91,10 @@ impl LightCheck {
         let (light, mut report) = measure(design)?;
         report.edges = ShadowEdges::of(design, &light);
         judge::require_key(design, &report)?;
-        let warnings = judge::warnings(design, &report);
         let map_png = frame::map(design, &light, &report)?;
         let lit = scene(design, report.level_per_mw_mm2, design.sections().exposure.stray_level)?;
         report.separation = Separation::of(&lit, report.level_per_mw_mm2)?;
+        let warnings = judge::warnings(design, &report);
         Ok(Self { frame_png: frame::frame(&lit)?, map_png, report, warnings })
     }
 

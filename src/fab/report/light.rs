@@ -73,6 +73,10 @@ fn separation_rows(separation: Separation) -> Vec<Vec<Html>> {
             or_dash(separation.condition_number_p95_to_60_deg),
         ),
         (
+            "hardly any slope in color: area within 45° where that error is above 5°",
+            percent(separation.blind_share_to_45_deg),
+        ),
+        (
             "crescents: area within 75° where a colour is below a twentieth of its median",
             percent(separation.crescent_share_to_75_deg),
         ),

@@ -240,7 +240,7 @@ impl Deviations {
                 let next = view.surface_mm.get(cell + 1).copied().unwrap_or_default();
                 if deep > 0.0 {
                     let size_mm = next.distance(view.surface_mm[cell]).min(0.1 * radius_mm);
-                    let hidden = (wide * size_mm / (TOUCH_PART * radius_mm)).powi(2).min(1.0) * FILLED_SD_RAD;
+                    let hidden = (wide * size_mm / (TOUCH_PART * radius_mm)).powi(4).min(1.0) * FILLED_SD_RAD;
                     let around = tilt_around(sizes, column, row, wide);
                     hole_mm[column] = deep * size_mm * hidden.hypot(HOLE_PART * around);
                 }

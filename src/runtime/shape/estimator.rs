@@ -14,7 +14,7 @@ use super::light::ShapeLight;
 use super::lights::Lights;
 use super::map::{ShapeMap, Skin};
 use super::marks::Marks;
-use super::normals::{self, CellReading};
+use super::normals::CellReading;
 use super::rest::RestMap;
 use super::rows::{self, MIN_ROWS, share};
 use super::system::{END_MM, Joint, SolveStatus, System};
@@ -24,10 +24,6 @@ use crate::track::{CameraFrame, Tracked, Tracker};
 use domecast_light::tables::Ways;
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
-
-/// Step along the ray over which the readings' turn is taken, mm, and what each channel is known to there: a hundredth.
-const TURN_STEP_MM: f32 = 0.2;
-const TURN_PRECISION: f32 = 1e4;
 
 /// The largest motion, mm, after which a pass more changes nothing.
 const STILL_MM: f64 = 0.03;
@@ -82,8 +78,8 @@ pub struct ShapeFromColor {
     differences: Vec<f32>,
     pub(super) gain: Vec<Vec3A>,
     /// By how much a reading's normal turns where the point lies 1 mm further along its ray, for the same colours.
-    turn_per_mm: Vec<Vec3A>,
-    turns: Lattice,
+    pub(super) turn_per_mm: Vec<Vec3A>,
+    pub(super) turns: Lattice,
     /// By how many cells a place of the dome is seen beside where it was at rest.
     pub(super) shifts: Lattice,
     readings: Vec<CellReading>,
@@ -170,7 +166,14 @@ impl ShapeFromColor {
         let (levels, covered) = (&self.levels, &self.covered);
         self.rest = Some(RestMap::measured(levels, covered, &self.cells, &self.view, &self.light, noise)?);
         let is_bare = |cell: usize| self.view.is_dome[cell] && !self.covered[cell];
-        self.lights = Lights::at_rest(&self.ways, &self.cells, &self.view, &self.levels, tracked, is_bare);
+        self.lights = Lights::at_rest(
+            (&self.ways, &self.light),
+            &self.cells,
+            &self.view,
+            &self.levels,
+            tracked,
+            is_bare,
+        );
         self.rest_seen = self.optics.clone();
         Ok(())
     }
@@ -271,25 +274,6 @@ impl ShapeFromColor {
         let skin = Skin { view: &self.view, points_mm: &self.points_mm, dome: self.optics.dome() };
         self.map.draw(&self.cells, &skin, sd_mm, &mut self.chart, status);
         Ok(())
-    }
-
-    /// How readings turn with depth, on the undeformed dome: with it the light need not be taken again and again.
-    fn turn(&mut self) {
-        let (light, view) = (&self.light, &self.view);
-        self.turns.take(&self.cells, view, |cell| {
-            let (at, ray, out) = (view.surface_mm[cell], view.ray[cell], view.normal[cell]);
-            let here = light.at(at);
-            let irradiance = here.base + here.direct(out);
-            let precision = irradiance.max(Vec3A::splat(1e-12)).powf(-2.0) * TURN_PRECISION;
-            let deeper = light.at(at - ray * TURN_STEP_MM);
-            let along = out.any_orthonormal_vector();
-            let reading = normals::read(&deeper, irradiance, precision, Vec3A::ZERO, out, along)?;
-            Some((out - reading.normal) / TURN_STEP_MM)
-        });
-        let rows = self.turn_per_mm.par_chunks_mut(self.cells.width).zip(&view.spans).enumerate();
-        rows.with_min_len(share(MIN_ROWS)).for_each(|(row, (turns, span))| {
-            span.clone().for_each(|column| turns[column] = self.turns.at(column, row));
-        });
     }
 
     /// Finds where the cells' points are now; those beside the dome do not move.

@@ -4,13 +4,12 @@ use glam::{Vec2, Vec3A};
 
 use super::fill::Weighted;
 use super::light::PointLight;
+use domecast_light::separation;
+
+const BRIGHTNESS_SD: f32 = separation::BRIGHTNESS_SD as f32;
 
 /// Tilt of a normal that was filled in from around, rad.
 pub(super) const FILLED_SD_RAD: f32 = 0.09;
-
-/// How well the brightness of the membrane is known beside the frame at rest, a part: what a touch changes of the light that the
-/// dome gives itself (a third of all) and what JPEG leaves of brightness.
-const BRIGHTNESS_SD: f32 = 0.03;
 
 /// What a cell's light says.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,16 @@
 //! What the colours of a cell say of the skin there.
 
 use glam::Vec3A;
+use rayon::prelude::*;
 
 use super::estimator::ShapeFromColor;
 use super::fill::Weighted;
 use super::normals::{self, CellReading, FILLED_SD_RAD};
+use super::rows::{MIN_ROWS, share};
+
+/// Step along the ray over which the readings' turn is taken, mm, and what each channel is known to there: a hundredth.
+const TURN_STEP_MM: f32 = 0.2;
+const TURN_PRECISION: f32 = 1e4;
 
 /// Variance of a reading's tilt, rad^2, from which on there is no light to read by: the skin is taken to be as
 /// at rest there.
@@ -14,11 +20,33 @@ const MAX_SPREAD: f32 = 0.03;
 /// of a hundred, and what a camera's JPEG makes of colours.
 const LEVEL_ERROR: f32 = 0.005;
 
+/// A channel that is known so well, a part of itself, is bright.
+const BRIGHT_SD: f32 = 0.02;
+
 /// Squares of what is left over, in deviations, up to which a reading counts in full, and from which on not at all.
 const GOOD_MISFIT: f32 = 6.0;
 const BAD_MISFIT: f32 = 30.0;
 
 impl ShapeFromColor {
+    /// How readings turn with depth, on the undeformed dome: with it the light need not be taken again and again.
+    pub(super) fn turn(&mut self) {
+        let (light, view) = (&self.light, &self.view);
+        self.turns.take(&self.cells, view, |cell| {
+            let (at, ray, out) = (view.surface_mm[cell], view.ray[cell], view.normal[cell]);
+            let here = light.at(at);
+            let irradiance = here.base + here.direct(out);
+            let precision = irradiance.max(Vec3A::splat(1e-12)).powf(-2.0) * TURN_PRECISION;
+            let deeper = light.at(at - ray * TURN_STEP_MM);
+            let along = out.any_orthonormal_vector();
+            let reading = normals::read(&deeper, irradiance, precision, Vec3A::ZERO, out, along)?;
+            Some((out - reading.normal) / TURN_STEP_MM)
+        });
+        let rows = self.turn_per_mm.par_chunks_mut(self.cells.width).zip(&view.spans).enumerate();
+        rows.with_min_len(share(MIN_ROWS)).for_each(|(row, (turns, span))| {
+            span.clone().for_each(|column| turns[column] = self.turns.at(column, row));
+        });
+    }
+
     /// Reads a cell's normal, one step from that of the skin as it is known.
     #[inline]
     pub(super) fn read_cell(&self, cell: usize) -> CellReading {
@@ -30,7 +58,10 @@ impl ShapeFromColor {
         }
         // Where a channel is cut off there is light, so that the skin is not taken to be as at rest but as around.
         let is_cut_off = self.levels[cell].is_known.min_element() <= 0.0;
-        let unlit = if is_cut_off {
+        let (irradiance, precision, noise) = self.irradiance(cell);
+        // So it is where all colours are well seen and say nothing of slopes, as halfway between two lights of one colour.
+        let is_bright = (irradiance * irradiance * precision).min_element() * BRIGHT_SD.powi(2) > 1.0;
+        let unlit = if is_cut_off || is_bright {
             nothing
         } else {
             CellReading { tilt: Weighted::new(Vec3A::ZERO, 1.0), ..nothing }
@@ -49,7 +80,6 @@ impl ShapeFromColor {
         let (out, ray) = (view.normal[cell], view.ray[cell]);
         let guess = right.cross(below).normalize_or(out);
         let guess = if guess.dot(ray) < 0.0 { -guess } else { guess };
-        let (irradiance, precision, noise) = self.irradiance(cell);
         let light = self.light.at(at);
         let Some(reading) = normals::read(&light, irradiance, precision, noise, guess, right) else {
             return unlit;

@@ -5,8 +5,8 @@
 //! their shear comes and goes with them, for which the proof of the end does not hold: a node that went stays out until the next
 //! solve, so there are at most twice as many steps as nodes.
 
-use super::cholesky::{factor, solve};
 use super::model::AXES;
+use crate::cholesky::{factor, solve};
 
 /// Most nodes that bear a pressure at once.
 pub(super) const MAX_ACTIVE: usize = 96;

@@ -35,7 +35,6 @@
 //! | `contact` | area, point, normal, force |
 
 mod active_set;
-mod cholesky;
 mod columns;
 mod contact;
 mod forces;

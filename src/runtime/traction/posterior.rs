@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::active_set::{ActiveSet, Rows};
-use super::cholesky::{factor, forward};
 use super::model::{Dot, ElasticModel};
+use crate::cholesky::{factor, forward};
 
 /// A dot without a deviation of its own, px.
 pub(super) const USUAL_DOT_SD_PX: f64 = 0.02;

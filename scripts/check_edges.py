@@ -39,8 +39,8 @@ ELEMENT_MM = {"thumb24": 0.25, "thumb24-wide": 0.25, "endoscope-r5": 0.125, "pic
 SEEDS = 3
 
 # Degrees; and parts of the object's own larger curvature.
-MAX_OFF_DEG = 5.0
-MAX_BEND_OFF = 0.25
+MAX_OFF_DEG = 6.0
+MAX_BEND_OFF = 0.28
 
 
 def laid_on(kind, radius, angle, polar, azimuth, depth, dome):

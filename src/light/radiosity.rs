@@ -16,7 +16,7 @@
 //! The balance `B = albedo (E + K B)` is solved on rings of patches; the mirror's part depends on the azimuth
 //! between two patches only, so one ring of it serves all. Its series falls at least as fast as the albedo.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::dome_map::DomeFace;
 use super::fresnel;
@@ -58,9 +58,13 @@ impl Rings {
         self.rings * self.patches
     }
 
-    /// Numbers of [`DomeRoom::mirror`].
-    pub fn mirror_len(&self) -> usize {
+    fn mirror_len(&self) -> usize {
         self.rings * self.count()
+    }
+
+    /// Numbers of [`DomeRoom::numbers`].
+    pub fn numbers_len(&self) -> usize {
+        4 * self.mirror_len()
     }
 }
 
@@ -74,6 +78,8 @@ pub struct DomeRoom {
     /// `mirror[(to * rings + from) * patches + shift]`: irradiance at ring `to` for an exitance of one of the
     /// patch of ring `from` that is `shift` patches further round.
     mirror: Vec<f64>,
+    /// The same by the straight way too, as vector irradiance at the ring's first patch.
+    vectors: Vec<DVec3>,
 }
 
 /// The balance of light in the dome.
@@ -111,6 +117,13 @@ impl DomeRoom {
     pub fn new(optics: &SensorOptics, rings: Rings, underside: Underside) -> Self {
         let dome = *optics.dome();
         let mut mirror = vec![0.0; rings.mirror_len()];
+        let mut vectors = straight_vectors(rings, &dome);
+        if rings.face.has_wall() {
+            for (at, value) in mirror.iter_mut().enumerate() {
+                let target = rings.place(at / (rings.rings * rings.patches), 0);
+                *value = vectors[at].dot(rings.face.normal(target)).max(0.0);
+            }
+        }
         if underside != Underside::Dark {
             for to in 0..rings.rings {
                 let target = rings.place(to, 0);
@@ -119,31 +132,34 @@ impl DomeRoom {
                     let mut near = 0.0;
                     for shift in 0..rings.patches {
                         let source = rings.place(from, shift);
-                        let (value, tangent) = mirrored(optics, source, at_mm, normal, underside, near);
+                        let (one, tangent) = mirrored(optics, source, at_mm, underside, near);
                         near = tangent;
-                        mirror[(to * rings.rings + from) * rings.patches + shift] =
-                            value * patch_mm2(rings, &dome);
+                        let (at, value) = (
+                            (to * rings.rings + from) * rings.patches + shift,
+                            one * patch_mm2(rings, &dome),
+                        );
+                        mirror[at] += value.dot(normal).max(0.0);
+                        // What comes from beyond the skin's own plane does not reach it.
+                        vectors[at] += if value.dot(normal) > 0.0 { value } else { DVec3::ZERO };
                     }
                 }
             }
         }
-        if rings.face.has_wall() {
-            add_straight(rings, &dome, &mut mirror);
-        }
-        Self::of(optics, rings, mirror)
+        Self { rings, dome, straight: straight(rings, &dome), mirror, vectors }
     }
 
-    /// The same of what was computed before: [`DomeRoom::mirror`] of the same dome and rings.
-    pub fn of(optics: &SensorOptics, rings: Rings, mirror: Vec<f64>) -> Self {
+    /// The same of what was computed before: [`DomeRoom::numbers`] of the same dome and rings.
+    pub fn of(optics: &SensorOptics, rings: Rings, numbers: &[f64]) -> Self {
         let dome = *optics.dome();
-        let straight = if rings.face.has_wall() { 0.0 } else { dome.height_mm() / dome.radius_mm() };
-        Self { rings, dome, straight, mirror }
+        let (mirror, vectors) = numbers.split_at(rings.mirror_len().min(numbers.len()));
+        let vectors = vectors.as_chunks::<3>().0.iter().map(|xyz| DVec3::from_array(*xyz)).collect();
+        Self { rings, dome, straight: straight(rings, &dome), mirror: mirror.to_vec(), vectors }
     }
 
     /// What patches give each other over the underside, and straight where the face has a wall: for each ring, each ring that gives,
-    /// and each turn between two patches, the irradiance for an exitance of one.
-    pub fn mirror(&self) -> &[f64] {
-        &self.mirror
+    /// and each turn between two patches, the irradiance for an exitance of one; then so the vectors of all light.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        self.mirror.iter().copied().chain(self.vectors.iter().flat_map(|vector| vector.to_array()))
     }
 
     /// The patches.
@@ -177,6 +193,22 @@ impl DomeRoom {
         out
     }
 
+    /// Vector irradiance of every patch by the exitance of all: its product with the outward normal is the irradiance, also of skin that
+    /// is tilted a little (light from the edge of what it sees counts nothing yet).
+    pub fn vector_irradiance(&self, exitance: &[f64]) -> Vec<DVec3> {
+        let Rings { rings, patches, .. } = self.rings;
+        let at = |i: usize| {
+            let (to, patch) = (i / patches, i % patches);
+            let kernels = self.vectors[to * rings * patches..].chunks(patches).zip(exitance.chunks(patches));
+            let sum: DVec3 = kernels
+                .flat_map(|(kernel, light)| light.iter().cycle().skip(patch).zip(kernel))
+                .map(|(light, vector)| *vector * *light)
+                .sum();
+            DMat3::from_rotation_z(std::f64::consts::TAU * patch as f64 / patches as f64) * sum
+        };
+        (0..self.rings.count()).map(at).collect()
+    }
+
     /// The balance for the direct irradiance of every patch and one albedo (0 to below 1).
     pub fn solve(&self, direct: &[f64], albedo: f64) -> Balance {
         let largest = direct.iter().copied().fold(0.0, f64::max);
@@ -206,9 +238,9 @@ impl DomeRoom {
         for ring in 0..self.rings.rings {
             for patch in 0..self.rings.patches {
                 let source = self.rings.place(ring, patch);
-                let (value, tangent) = mirrored(optics, source, point_mm, DVec3::Z, Underside::Fresnel, near);
+                let (value, tangent) = mirrored(optics, source, point_mm, Underside::Fresnel, near);
                 near = tangent;
-                sum += value * exitance[ring * self.rings.patches + patch];
+                sum += value.z.max(0.0) * exitance[ring * self.rings.patches + patch];
             }
         }
         sum * self.patch_mm2()
@@ -224,49 +256,55 @@ fn on_dome(dome: &DomeShape, place: DVec3) -> DVec3 {
     dome.center_mm() + place * dome.radius_mm()
 }
 
-/// Irradiance by the straight ways between patches, which for a sphere is one number and here is not. A patch is taken
-/// at several places: next to it the kernel is bounded, but not smooth.
-fn add_straight(rings: Rings, dome: &DomeShape, kernel: &mut [f64]) {
+/// Share of an exitance of one that all patches together give each other straight, over the sphere: a wall's ways are in the mirror's list.
+fn straight(rings: Rings, dome: &DomeShape) -> f64 {
+    if rings.face.has_wall() { 0.0 } else { dome.height_mm() / dome.radius_mm() }
+}
+
+/// Vector irradiance by the straight ways between patches. A patch is taken at several places: next to it the kernel is bounded, but
+/// not smooth.
+fn straight_vectors(rings: Rings, dome: &DomeShape) -> Vec<DVec3> {
     let own_mm2 = patch_mm2(rings, dome) / f64::from(SUB * SUB);
     let step = std::f64::consts::TAU / rings.patches as f64;
-    for (at, value) in kernel.iter_mut().enumerate() {
+    let of = |at: usize| {
         let (to, from, shift) =
             (at / (rings.rings * rings.patches), at / rings.patches % rings.rings, at % rings.patches);
         let target = rings.place(to, 0);
         let (target_mm, normal) = (on_dome(dome, target), rings.face.normal(target));
+        let mut sum = DVec3::ZERO;
         for (i, j) in (0..SUB).flat_map(|i| (0..SUB).map(move |j| (i, j))) {
             let [up, around] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(SUB));
             let level = rings.face.level((from as f64 + up) / rings.rings as f64);
             let source = rings.face.place(step * (shift as f64 + around), level);
             let way = target_mm - on_dome(dome, source);
             let square = way.length_squared();
-            if square > 1e-12 * dome.radius_mm() * dome.radius_mm() {
-                let cosines = normal.dot(way).max(0.0) * (-rings.face.normal(source).dot(way)).max(0.0);
-                *value += own_mm2 * cosines / (std::f64::consts::PI * square * square);
+            if square > 1e-12 * dome.radius_mm() * dome.radius_mm() && normal.dot(way) > 0.0 {
+                let leaving = (-rings.face.normal(source).dot(way)).max(0.0);
+                sum += way * (own_mm2 * leaving / (std::f64::consts::PI * square * square));
             }
         }
-    }
+        sum
+    };
+    (0..rings.mirror_len()).map(of).collect()
 }
 
 /// Places along each side of a patch.
 const SUB: u32 = 4;
 
-/// Irradiance at a point by way of the underside, for an exitance of one and an area of 1 mm^2 at the dome's
+/// Vector irradiance at a point by way of the underside, for an exitance of one and an area of 1 mm^2 at the dome's
 /// place `source`; and the tangent of the way.
 fn mirrored(
     optics: &SensorOptics,
     source: DVec3,
     point_mm: DVec3,
-    normal: DVec3,
     underside: Underside,
     near: f64,
-) -> (f64, f64) {
+) -> (DVec3, f64) {
     let dome = optics.dome();
     let (radius, source_mm) = (dome.rim_radius_mm(), on_dome(dome, source));
-    let Ok(tube) = optics.mirrored_tube(source_mm, point_mm, near) else { return (0.0, near) };
-    let cosines =
-        (-DomeFace::of(dome).normal(source).dot(tube.leaving)).max(0.0) * normal.dot(tube.arriving).max(0.0);
-    let value = cosines * tube.sr_per_mm2 / std::f64::consts::PI;
+    let Ok(tube) = optics.mirrored_tube(source_mm, point_mm, near) else { return (DVec3::ZERO, near) };
+    let leaving = (-DomeFace::of(dome).normal(source).dot(tube.leaving)).max(0.0);
+    let value = tube.arriving * (leaving * tube.sr_per_mm2 / std::f64::consts::PI);
     if underside == Underside::Perfect {
         return (value, tube.tangent);
     }
@@ -274,7 +312,7 @@ fn mirrored(
     let foot = |end: DVec3, along: DVec3| (end - along * (end.z / along.z)).truncate().length() <= radius;
     let up = point_mm.z <= 0.0 || foot(point_mm, tube.arriving);
     if !(up && foot(source_mm, tube.leaving)) {
-        return (0.0, tube.tangent);
+        return (DVec3::ZERO, tube.tangent);
     }
     let channel = optics.channel();
     // From the dome down, without the air that stands first.

@@ -175,11 +175,10 @@ impl Prepared {
         }
         if room && self.rooms.get().is_none() {
             let rings = Rings::usual(ways.face());
-            let made = || rooms(ways).iter().flat_map(|room| room.mirror().iter().copied()).collect();
-            let all = numbers("rooms' returns", ways.optics.len() * rings.mirror_len(), &made);
-            let each = all.chunks_exact(rings.mirror_len()).zip(&ways.optics);
-            let _ =
-                self.rooms.set(each.map(|(one, optics)| DomeRoom::of(optics, rings, one.to_vec())).collect());
+            let made = || rooms(ways).iter().flat_map(DomeRoom::numbers).collect();
+            let all = numbers("rooms' vectors", ways.optics.len() * rings.numbers_len(), &made);
+            let each = all.chunks_exact(rings.numbers_len()).zip(&ways.optics);
+            let _ = self.rooms.set(each.map(|(one, optics)| DomeRoom::of(optics, rings, one)).collect());
         }
     }
 }

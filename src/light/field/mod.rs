@@ -30,6 +30,25 @@ pub struct FieldParts {
     pub moved: bool,
 }
 
+/// Light on a point before its normal is known, by channel: irradiance is `base + vectors^T normal`.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BeforeNormal {
+    /// What does not change with the normal.
+    pub base: Vec3A,
+    /// `[k]` has component k of each channel's vector irradiance.
+    pub vectors: [Vec3A; 3],
+    /// What comes straight from the lights where the skin is as at rest.
+    pub direct: Vec3A,
+}
+
+impl BeforeNormal {
+    /// Irradiance of each channel on a surface with this unit normal, beside the base.
+    #[inline]
+    pub fn along(&self, normal: Vec3A) -> Vec3A {
+        self.vectors[0] * normal.x + self.vectors[1] * normal.y + self.vectors[2] * normal.z
+    }
+}
+
 /// Light on the membrane for the three channels of the camera, mW/mm^2 weighted by their responses.
 #[derive(Debug, Clone)]
 pub struct LightField {
@@ -78,7 +97,7 @@ impl LightField {
         if parts.moved && parts.falloff {
             let tables = prepared.shells(ways);
             field.evaluations += tables.iter().map(|tables| tables.evaluations).sum::<u64>();
-            field.shells = Shells::new(ways, prepared.dome(ways), tables);
+            field.shells = Shells::new(ways, prepared.dome(ways), tables, own.as_ref());
         }
         field.own = own;
         field
@@ -159,15 +178,15 @@ impl LightField {
         (self.still(at.place) + change.extend(0.0)).max(Vec4::ZERO)
     }
 
-    /// [`LightField::moved`] before the normal is known: irradiance is `base + vectors^T normal`, where `[k]` of the vectors
-    /// has component k of each channel. `None` without shells.
+    /// [`LightField::moved`] before the normal is known; `None` without shells.
     #[inline]
-    pub fn before_normal(&self, point_mm: Vec3A) -> Option<(Vec3A, [Vec3A; 3])> {
+    pub fn before_normal(&self, point_mm: Vec3A) -> Option<BeforeNormal> {
         let at = self.middle.inside(point_mm);
-        let [there, outer] = self.shells.as_ref()?.vectors(&at);
+        let [vectors, outer, own] = self.shells.as_ref()?.vectors(&at);
         let out = at.outward;
-        let at_rest = outer[0] * out.x + outer[1] * out.y + outer[2] * out.z;
-        Some((Vec3A::from_vec4(self.still(at.place)) - at_rest, there))
+        let along = |flux: [Vec3A; 3]| flux[0] * out.x + flux[1] * out.y + flux[2] * out.z;
+        let still = Vec3A::from_vec4(self.still(at.place));
+        Some(BeforeNormal { base: still - along(outer), vectors, direct: still - along(own) })
     }
 
     #[inline]

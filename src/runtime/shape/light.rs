@@ -4,6 +4,7 @@ use glam::{Vec3A, Vec4};
 
 use super::error::ShapeError;
 use crate::constants::{Constants, LightConstants};
+pub(crate) use domecast_light::field::BeforeNormal as PointLight;
 use domecast_light::field::{FieldParts, LightField};
 use domecast_light::fresnel;
 use domecast_light::tables::{Prepared, Ways};
@@ -26,22 +27,6 @@ pub(crate) struct ShapeLight {
     pub stray: f32,
     /// Light of a byte's value, full scale 1.
     pub linear: Vec<f32>,
-}
-
-/// Light on a point before its normal is known: irradiance is `base + matrix^T normal`.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct PointLight {
-    pub base: Vec3A,
-    /// `[k]`: component k of the vector irradiance of each channel.
-    pub vectors: [Vec3A; 3],
-}
-
-impl PointLight {
-    /// Irradiance of each channel on a surface with this unit normal.
-    #[inline]
-    pub fn direct(&self, normal: Vec3A) -> Vec3A {
-        self.vectors[0] * normal.x + self.vectors[1] * normal.y + self.vectors[2] * normal.z
-    }
 }
 
 impl ShapeLight {
@@ -114,8 +99,6 @@ impl ShapeLight {
     /// The light on a point of the skin, sensor frame.
     #[inline]
     pub fn at(&self, point_mm: Vec3A) -> PointLight {
-        self.field
-            .before_normal(point_mm)
-            .map_or_else(PointLight::default, |(base, vectors)| PointLight { base, vectors })
+        self.field.before_normal(point_mm).unwrap_or_default()
     }
 }

@@ -72,7 +72,7 @@ pub(super) fn read(
     along: Vec3A,
 ) -> Option<Reading> {
     let [t1, t2] = tangents(guess, along);
-    let [j1, j2, whole] = [light.direct(t1), light.direct(t2), light.direct(guess)];
+    let [j1, j2, whole] = [light.along(t1), light.along(t2), light.along(guess)];
     let left = irradiance - light.base - whole;
     let weigh = |a: Vec3A, b: Vec3A| (a * b).dot(precision);
     let (a11, a12, a22) = (weigh(j1, j1), weigh(j1, j2), weigh(j2, j2));
@@ -115,11 +115,12 @@ mod tests {
         let light = PointLight {
             base: Vec3A::new(0.3, 0.2, 0.25),
             vectors: [Vec3A::new(0.5, -0.3, -0.2), Vec3A::new(0.0, 0.4, -0.45), Vec3A::new(0.8, 0.9, 0.7)],
+            direct: Vec3A::ONE,
         };
         let normal = Vec3A::new(0.25, -0.1, 1.0).normalize();
         let precision = Vec3A::splat(1e4);
         for brightness in [1.0, 1.01] {
-            let irradiance = light.base + light.direct(normal) * brightness;
+            let irradiance = light.base + light.along(normal) * brightness;
             let mut guess = Vec3A::Z;
             let mut misfit = 0.0;
             for _ in 0..3 {
@@ -131,7 +132,7 @@ mod tests {
             assert!(off < 3e-3 && misfit < 1.0, "{brightness}: {off} {misfit}");
         }
         // A channel without a say leaves two; no channel leaves nothing.
-        let irradiance = light.base + light.direct(normal);
+        let irradiance = light.base + light.along(normal);
         let two =
             read(&light, irradiance, precision * Vec3A::new(1.0, 1.0, 0.0), Vec3A::ONE, normal, Vec3A::X);
         assert!(two.is_some_and(|two| two.normal.distance(normal) < 1e-3));

@@ -34,7 +34,7 @@ impl ShapeFromColor {
         self.turns.take(&self.cells, view, |cell| {
             let (at, ray, out) = (view.surface_mm[cell], view.ray[cell], view.normal[cell]);
             let here = light.at(at);
-            let irradiance = here.base + here.direct(out);
+            let irradiance = here.base + here.along(out);
             let precision = irradiance.max(Vec3A::splat(1e-12)).powf(-2.0) * TURN_PRECISION;
             let deeper = light.at(at - ray * TURN_STEP_MM);
             let along = out.any_orthonormal_vector();
@@ -58,7 +58,8 @@ impl ShapeFromColor {
         }
         // Where a channel is cut off there is light, so that the skin is not taken to be as at rest but as around.
         let is_cut_off = self.levels[cell].is_known.min_element() <= 0.0;
-        let (irradiance, precision, noise) = self.irradiance(cell);
+        let light = self.light.at(self.points_mm[cell]);
+        let (irradiance, precision, noise) = self.irradiance(cell, light.direct);
         // So it is where all colours are well seen and say nothing of slopes, as halfway between two lights of one colour.
         let is_bright = (irradiance * irradiance * precision).min_element() * BRIGHT_SD.powi(2) > 1.0;
         let unlit = if is_cut_off || is_bright {
@@ -80,7 +81,6 @@ impl ShapeFromColor {
         let (out, ray) = (view.normal[cell], view.ray[cell]);
         let guess = right.cross(below).normalize_or(out);
         let guess = if guess.dot(ray) < 0.0 { -guess } else { guess };
-        let light = self.light.at(at);
         let Some(reading) = normals::read(&light, irradiance, precision, noise, guess, right) else {
             return unlit;
         };
@@ -107,17 +107,16 @@ impl ShapeFromColor {
         }
     }
 
-    /// Irradiance of a cell by the picture, one over its variance, and the variance that noise alone has, by channel.
+    /// Irradiance of a cell, of which so much comes straight from the lights where the skin is at rest, by the picture, one over its variance, and the variance that noise alone has, by channel.
     #[inline]
-    fn irradiance(&self, cell: usize) -> (Vec3A, Vec3A, Vec3A) {
+    fn irradiance(&self, cell: usize, direct: Vec3A) -> (Vec3A, Vec3A, Vec3A) {
         let variance = self.noise * self.noise / (self.cells.px * self.cells.px) as f32;
         let (view, level) = (&self.view, &self.levels[cell]);
         let gain = self.light.passed(view.ray[cell].z) * self.gain[cell];
         let known_gain = gain.max(Vec3A::splat(1e-12));
         let irradiance = (level.light - Vec3A::splat(self.light.stray)) / known_gain;
-        // Where noise would be cut off at black its mean is not the light.
-        let expected = gain * self.light.still(view.place[cell]);
-        let is_lit = Vec3A::select(expected.cmpgt(2.0 * self.noise), Vec3A::ONE, Vec3A::ZERO);
+        // What the dome throws on itself says little of slopes.
+        let is_lit = Vec3A::select((gain * direct).cmpgt(2.0 * self.noise), Vec3A::ONE, Vec3A::ZERO);
         let off = (level.light + Vec3A::splat(level.light.max_element())) * LEVEL_ERROR;
         let precision = gain * gain * level.is_known * is_lit / (off * off + variance);
         (irradiance, precision, variance / (known_gain * known_gain))

@@ -57,7 +57,7 @@ pub fn grey_of_loss(gamma: f64, brightest: f64, part: f64) -> f64 {
 #[derive(Debug, Clone, Copy, Default)]
 struct Light {
     still: f64,
-    /// `None` where the normal does not count.
+    /// With what the membrane throws on itself; `None` where the normal does not count.
     vector: Option<DVec3>,
     own: f64,
 }
@@ -155,6 +155,7 @@ impl CoarseLight {
                 let patches: Vec<f64> = all.iter().take(RINGS.count()).map(|light| light[c].still).collect();
                 let balance = room.solve(&patches, self.albedo[c]);
                 let mean = balance.exitance.iter().sum::<f64>() / RINGS.count() as f64;
+                let vectors = room.vector_irradiance(&balance.exitance);
                 for (light, sample) in all.iter_mut().zip(&self.samples.list) {
                     light[c].own = match sample.beside {
                         Some(beside) => {
@@ -166,6 +167,10 @@ impl CoarseLight {
                         }
                         None => balance.indirect.get(sample.patch).copied().unwrap_or(0.0),
                     };
+                    if let (None, Some(own)) = (sample.normal, vectors.get(sample.patch)) {
+                        light[c].own = light[c].own.max(own.length());
+                        light[c].vector = light[c].vector.map(|vector| vector + *own);
+                    }
                 }
             }
         }
@@ -202,14 +207,14 @@ impl CoarseLight {
                         };
                         255.0 * (code(a, pa) - code(b, pb)).abs()
                     } else {
-                        let direct = match (a.vector, b.vector) {
+                        let [a_still, b_still] = [(a.still + a.own) * pa, (b.still + b.own) * pb];
+                        let change = match (a.vector, b.vector) {
                             (Some(a), Some(b)) => (a * pa - b * pb).length(),
-                            (Some(v), None) => (v.length() * pa).max(b.still * pb),
-                            (None, Some(v)) => (v.length() * pb).max(a.still * pa),
-                            (None, None) => (a.still * pa - b.still * pb).abs(),
+                            (Some(v), None) => (v.length() * pa).max(b_still),
+                            (None, Some(v)) => (v.length() * pb).max(a_still),
+                            (None, None) => (a_still - b_still).abs(),
                         };
-                        let change = gain * (direct + (a.own * pa - b.own * pb).abs());
-                        grey_of_change_from(gamma, self.stray, change)
+                        grey_of_change_from(gamma, self.stray, gain * change)
                     };
                     largest = largest.max(by_code);
                 }

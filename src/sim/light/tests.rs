@@ -1,6 +1,7 @@
 mod domes;
 mod mitsuba;
 mod photons;
+mod room;
 mod tables;
 
 use std::f64::consts::{PI, TAU};
@@ -267,61 +268,6 @@ fn fresnel_splits_without_loss_and_stops_at_the_critical_angle() {
     assert!((fresnel::returned(&indices, momentum) / slow - 1.0).abs() < 1e-12, "{slow}");
     // Along the sheet the upper face throws back much, and nothing of it is lost.
     assert!(fresnel::turned(&indices, 1.39) < 0.9 && fresnel::returned(&indices, 1.39) == 1.0);
-}
-
-#[test]
-fn a_dome_on_a_perfect_mirror_is_half_a_sphere() {
-    // Without a sheet between, the mirrored dome closes the sphere: evenly lit, E_indirect = a / (1 - a) E.
-    let optics = sensor(&[], 1.41);
-    let rings = Rings { rings: 20, patches: 48, ..Rings::USUAL };
-    let room = DomeRoom::new(&optics, rings, Underside::Perfect);
-    for albedo in [0.2, 0.6, 0.9] {
-        let balance = room.solve(&vec![1.0; rings.count()], albedo);
-        let expected = albedo / (1.0 - albedo);
-        let mean = balance.indirect.iter().sum::<f64>() / rings.count() as f64;
-        assert!((mean / expected - 1.0).abs() < 5e-3 / (1.0 - albedo), "{albedo}: {mean} {expected}");
-        assert!(balance.residual < 1e-6 * expected);
-    }
-}
-
-#[test]
-fn the_dome_alone_keeps_half_of_its_light() {
-    // Form factor of a hemisphere to itself: 1/2. So E_indirect = (a/2) / (1 - a/2) E, exactly.
-    let optics = sensor(&[1.49], 1.41);
-    let room = DomeRoom::new(&optics, Rings::USUAL, Underside::Dark);
-    for albedo in [0.1, 0.5, 0.95] {
-        let balance = room.solve(&vec![2.0; Rings::USUAL.count()], albedo);
-        let expected = 2.0 * (0.5 * albedo) / (1.0 - 0.5 * albedo);
-        for e in &balance.indirect {
-            assert!((e / expected - 1.0).abs() < 1e-8);
-        }
-    }
-}
-
-#[test]
-fn interreflection_makes_no_light() {
-    // What the membrane absorbs is what the lights put in, less what leaves through the underside; of a membrane's
-    // own light less than all comes back, and more comes back with total reflection than without a mirror.
-    let optics = sensor(&[1.494], 1.412);
-    let room = DomeRoom::new(&optics, Rings::USUAL, Underside::Fresnel);
-    let ones = vec![1.0; Rings::USUAL.count()];
-    let back = room.irradiance(&ones);
-    let share = back.iter().sum::<f64>() / ones.len() as f64;
-    // Half straight; of the other half, 1 - 1/n^2 = 0.498 lies beyond the critical angle and returns, less what
-    // escapes beside the dome's foot; of the rest a few percent.
-    assert!(share > 0.65 && share < 0.5 + 0.5 * (0.499 + 0.05), "{share}");
-    let finer = Rings { rings: 32, patches: 80, ..Rings::USUAL };
-    let fine = DomeRoom::new(&optics, finer, Underside::Fresnel).irradiance(&vec![1.0; finer.count()]);
-    let fine_share = fine.iter().sum::<f64>() / fine.len() as f64;
-    assert!((share / fine_share - 1.0).abs() < 3e-3, "{share} {fine_share}");
-    let direct: Vec<f64> = (0..ones.len()).map(|i| 1.0 + (i % 7) as f64).collect();
-    let balance = room.solve(&direct, 0.8);
-    let (input, exitance): (f64, f64) = (direct.iter().sum(), balance.exitance.iter().sum());
-    let absorbed = (input + balance.indirect.iter().sum::<f64>()) * 0.2;
-    let returned: f64 = balance.indirect.iter().sum();
-    let left = exitance - returned;
-    assert!(left > 0.0);
-    assert!((absorbed + left - input).abs() < 1e-6 * input, "{absorbed} {left} {input}");
 }
 
 #[test]

@@ -142,7 +142,7 @@ impl Problem<'_> {
             let at_mm = own.point_mm + own.ray * depth_mm;
             let normal = (center_mm - at_mm).normalize_or(own.ray).as_vec3a();
             let there = lit.shaded.at(at_mm.as_vec3a());
-            let touched = f64::from(there.base[c] + there.direct(normal)[c]).max(0.0);
+            let touched = f64::from(there.base[c] + there.along(normal)[c]).max(0.0);
             let still = f64::from(lit.shaded.still(own.place)[c]).max(1e-12);
             let at_rest = place.at_rest[c] + self.start_stray - lit.light.stray;
             *value = lit.light.stray + at_rest * touched / still;

@@ -220,7 +220,9 @@ def main():
         for design, press in list(SCARCE.items())[: 1 if arguments.quick else None]:
             if arguments.only in (None, design):
                 sequence(arguments.domecast, work, design, built_constants(arguments.domecast, work, design), press, 12)
-    check_deviations()
+    # Errors of a frame go together: three frames say little of their mean.
+    if not arguments.quick:
+        check_deviations()
     sys.exit(1 if shape_frames.failed else 0)
 
 

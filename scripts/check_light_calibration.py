@@ -89,9 +89,7 @@ def true_constants(file, nominal, change, out):
 
 
 def place(polar_deg, azimuth_deg, distance_mm, dome):
-    polar, azimuth = np.radians([polar_deg, azimuth_deg])
-    way = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
-    return np.array([0, 0, dome["center_z"]]) + way * distance_mm
+    return np.array([0, 0, dome["center_z"]]) + judge.direction(polar_deg, azimuth_deg) * distance_mm
 
 
 def presses_of(dome):

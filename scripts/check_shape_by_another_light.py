@@ -3,7 +3,7 @@
 
     check_shape_by_another_light.py DOMECAST [--designs NAME...] [--points N] [--keep FOLDER]
 
-A dome is dented along its radius by bells with a ring about them, as much rubber up as down. Every second pixel's ray goes through
+A dome is pressed in along its radius by bells with a ring about them, as much rubber up as down. Every second pixel's ray goes through
 OpenCV's lens and Snell's law to that skin. The light there is summed over each light's square past the triangles of the built
 platforms (`check_shadow_edges.py`); where a lip lets only a strip of each light be seen, as on digit-rigid, it takes 1024 points.
 What the skin throws on itself, straight and by the sheet, is a sum over places of it: what does not leave into the air comes back.
@@ -22,15 +22,15 @@ import numpy as np
 import shape_frames
 from check_light_by_photons import BEFORE, COLORS, Sensor
 from check_shadow_edges import Light, irradiance, lobe, passed, spread
-from shape_frames import built_constants, check, dome_of, drawn, photograph, shown, simulate, track, within
+from shape_frames import built_constants, check, direction, dome_of, drawn, photograph, shown, simulate, track, within
 
 # Depth and width in parts of the radius, polar angle and azimuth, degrees.
-DENTS = {"bell on the pole": (0.04, 0.14, 0, 0), "bell at 30 deg": (0.03, 0.14, 30, 70), "wide bell at 15 deg": (0.03, 0.25, 15, 200), "small bell at 25 deg": (0.015, 0.09, 25, 310)}
+BELLS = {"bell on the pole": (0.04, 0.14, 0, 0), "bell at 30 deg": (0.03, 0.14, 30, 70), "wide bell at 15 deg": (0.03, 0.25, 15, 200), "small bell at 25 deg": (0.015, 0.09, 25, 310)}
 # rms to 45 and to 60 degrees and the 99th percentile to 45, mm, larger on domes of more than 10 mm; the least share within three deviations
 MAX_RMS_MM, MAX_WIDE_RMS_MM, MAX_P99_MM, MIN_WITHIN = 0.010, 0.020, 0.030, 0.95
 # On endoscope-r5 dots hide half of the skin.
 LESS_WITHIN = {"endoscope-r5": 0.9}
-# Deeper dents must be stated as a touch, mm.
+# Deeper ones must be stated as a touch, mm.
 MIN_STATED_MM = 0.2
 # The frame at rest beside domecast's: rms, part of the level.
 MAX_REST = 0.02
@@ -40,23 +40,22 @@ PLACES, END_DEG = 600, 75
 
 
 class Skin:
-    """A dome with a dent along its radius: `depth (1 - u^2) exp(-u^2)`, `u` the angle over the width."""
+    """A dome that is displaced along its radius: `depth (1 - u^2) exp(-u^2)`, `u` the angle over the width."""
 
     def __init__(self, sensor, depth=0.0, width=1.0, polar_deg=0.0, azimuth_deg=0.0):
         self.radius, self.center = sensor.radius, np.array([0, 0, sensor.center_z])
-        polar, azimuth = np.radians([polar_deg, azimuth_deg])
-        self.axis = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+        self.axis = direction(polar_deg, azimuth_deg)
         self.depth, self.width = depth * sensor.radius, width
 
     def at(self, ways):
         """Points, outward normals and heights along directions from the centre."""
         cos, sine = ways @ self.axis, np.linalg.norm(np.cross(ways, self.axis), axis=-1)
         u = np.arctan2(sine, cos) / self.width
-        dent, slope = self.depth * (1 - u * u) * np.exp(-u * u), self.depth / self.width * 2 * u * (u * u - 2) * np.exp(-u * u)
-        rho = self.radius - dent
+        inward, slope = self.depth * (1 - u * u) * np.exp(-u * u), self.depth / self.width * 2 * u * (u * u - 2) * np.exp(-u * u)
+        rho = self.radius - inward
         along = (cos[..., None] * ways - self.axis) / np.maximum(sine, 1e-12)[..., None]
         normals = ways + (slope / rho)[..., None] * along
-        return self.center + rho[..., None] * ways, normals / np.linalg.norm(normals, axis=-1, keepdims=True), -dent
+        return self.center + rho[..., None] * ways, normals / np.linalg.norm(normals, axis=-1, keepdims=True), -inward
 
     def met(self, starts, rays):
         """Directions from the centre of where rays from inside leave the skin."""
@@ -208,8 +207,8 @@ def judge(domecast, work, design, points):
     folder = work / f"{design}-another"
     folder.mkdir(exist_ok=True)
     gain = None
-    for number, (name, dent) in enumerate({"at rest": (), **DENTS}.items()):
-        mixed, true, polar, ink = picture(constants, draw(sensor, constants, camera, Skin(sensor, *dent), points))
+    for number, (name, bell) in enumerate({"at rest": (), **BELLS}.items()):
+        mixed, true, polar, ink = picture(constants, draw(sensor, constants, camera, Skin(sensor, *bell), points))
         inside = np.isfinite(mixed).all(axis=2)
         if gain is None:
             bare = inside & (polar < 60) & (cv2.dilate(ink, np.ones((7, 7))) == 0)

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 import shape_frames
-from shape_frames import PRESSES, ROOT, ball, built_constants, check, dome_of, draw, drawn, errors, photograph, run, shown, simulate, track, within
+from shape_frames import PRESSES, ROOT, ball, built_constants, check, direction, dome_of, draw, drawn, errors, photograph, run, shown, simulate, track, within
 
 # A press of each design, and its name among the frames.
 TOUCHES = {
@@ -44,8 +44,7 @@ MAX_FALSE_TOUCHES = {"endoscope-r5": 10, "picam-r20": 13, "thumb24-wide": 12, "d
 def away_deg(truth, dome, polar_deg, azimuth_deg):
     """Angle of each pixel's skin from a place of the dome."""
     from_center = np.load(truth / "frame_0000.surface.npy").astype(float) - [0, 0, dome["center_z"]]
-    polar, azimuth = np.radians([polar_deg, azimuth_deg])
-    way = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    way = direction(polar_deg, azimuth_deg)
     cosine = (from_center @ way) / np.linalg.norm(from_center, axis=2)
     return np.where(np.isfinite(cosine), np.degrees(np.arccos(np.clip(cosine, -1, 1))), 180)
 
@@ -234,7 +233,7 @@ def opposite_lights(domecast, work):
         e = errors(truth, truth / "shape", dome)
         sds = np.abs(e["off"] / e["sd"])[e["known"] & (e["polar"] <= 60)]
         touch = np.abs(e["off"] / e["sd"])[e["known"] & (away_deg(truth, dome, polar, azimuth) <= 8)]
-        check(f"opposite lights: touched at {polar} deg", np.mean(sds <= 3) >= 0.97 and np.mean(touch <= 3) >= 0.95,
+        check(f"opposite lights: touched at {polar} deg", within(sds)[2] >= 0.97 and within(touch)[2] >= 0.95,
               f"{np.nanmax(np.abs(e['off'][e['polar'] <= 60])):.3f} mm off at most; {shown(within(sds))}, in the touch {shown(within(touch))}")
 
 

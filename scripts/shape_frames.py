@@ -24,10 +24,15 @@ def check(what, holds, detail=""):
     print(f"{'ok  ' if holds else 'FAIL'} {what:<46} {detail}", flush=True)
 
 
+def direction(polar_deg, azimuth_deg):
+    """The way from the dome's centre to a place of it."""
+    polar, azimuth = np.radians([polar_deg, azimuth_deg])
+    return np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+
+
 def ball(radius, polar_deg, azimuth_deg, depth, dome):
     """A ball pressed `depth` deep towards the dome's centre."""
-    polar, azimuth = np.radians([polar_deg, azimuth_deg])
-    way = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
+    way = direction(polar_deg, azimuth_deg)
     at = np.array([0, 0, dome["center_z"]]) + way * (dome["radius"] + radius - depth)
     return [{"name": "ball", "shape": {"kind": "sphere", "radius_mm": radius},
              "path": [{"time_s": 0, "position_mm": at.tolist()}]}]

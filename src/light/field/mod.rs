@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use self::own::OwnLight;
 use self::places::{Inside, Middle, Scale, continued, split};
-use self::shells::Shells;
+use self::shells::{Shells, along};
 use crate::direct::EmitterRule;
 use crate::dome_map::{DomeGrid, bicubic};
 use crate::splines::{Degree, cubics, to_coefficients};
@@ -45,7 +45,7 @@ impl BeforeNormal {
     /// Irradiance of each channel on a surface with this unit normal, beside the base.
     #[inline]
     pub fn along(&self, normal: Vec3A) -> Vec3A {
-        self.vectors[0] * normal.x + self.vectors[1] * normal.y + self.vectors[2] * normal.z
+        along(&self.vectors, normal)
     }
 }
 
@@ -184,9 +184,8 @@ impl LightField {
         let at = self.middle.inside(point_mm);
         let [vectors, outer, own] = self.shells.as_ref()?.vectors(&at);
         let out = at.outward;
-        let along = |flux: [Vec3A; 3]| flux[0] * out.x + flux[1] * out.y + flux[2] * out.z;
         let still = Vec3A::from_vec4(self.still(at.place));
-        Some(BeforeNormal { base: still - along(outer), vectors, direct: still - along(own) })
+        Some(BeforeNormal { base: still - along(&outer, out), vectors, direct: still - along(&own, out) })
     }
 
     #[inline]

@@ -17,6 +17,12 @@ use crate::tables::{SHELL_CELLS, SHELLS, Tables, Ways};
 /// Fluxes of the three channels along x, y and z.
 type Flux = [Vec3A; 3];
 
+/// A flux along a way, by channel.
+#[inline]
+pub(super) fn along(flux: &Flux, way: Vec3A) -> Vec3A {
+    (flux[0] * way.x + flux[1] * way.y) + flux[2] * way.z
+}
+
 /// The outer shell's flux with what the membrane throws there, how much more the others have, and what the membrane throws, side by side: a
 /// look-up asks all of them.
 #[derive(Debug, Clone, Copy, Default)]
@@ -94,9 +100,7 @@ impl Shells {
         for (row, wy) in wy.into_iter().enumerate() {
             let row = &corner[row * nodes..row * nodes + 3];
             let of = |node: &Node| {
-                let one =
-                    |flux: &Flux, along: Vec3A| (flux[0] * along.x + flux[1] * along.y) + flux[2] * along.z;
-                (one(&node.outer, off) + one(&node.second, second)) + one(&node.third, third)
+                (along(&node.outer, off) + along(&node.second, second)) + along(&node.third, third)
             };
             light += ((of(&row[0]) * wx[0] + of(&row[1]) * wx[1]) + of(&row[2]) * wx[2]) * wy;
         }

@@ -115,7 +115,7 @@ impl ShapeFromColor {
         let gain = self.light.passed(view.ray[cell].z) * self.gain[cell];
         let known_gain = gain.max(Vec3A::splat(1e-12));
         let irradiance = (level.light - Vec3A::splat(self.light.stray)) / known_gain;
-        // What the dome throws on itself says little of slopes.
+        // Where noise would be cut off at black its mean is not the light; what the dome throws on itself alone says little of slopes.
         let is_lit = Vec3A::select((gain * direct).cmpgt(2.0 * self.noise), Vec3A::ONE, Vec3A::ZERO);
         let off = (level.light + Vec3A::splat(level.light.max_element())) * LEVEL_ERROR;
         let precision = gain * gain * level.is_known * is_lit / (off * off + variance);

@@ -3,8 +3,8 @@
 //! On three shells inside the dome there are tables of the *vector* irradiance, whose product with the normal is the
 //! irradiance; between them, Lagrange's parabola over the radius. What the undeformed membrane's own table shows beyond the
 //! outer shell's coarser one, the edges of shadows and the nearest lights, stays with the direction from the dome's centre:
-//! so only the difference that depth and tilt make is looked up here, as quadratic splines, which have no creases. The membrane's own light
-//! has its vectors on the outer shell: tilt changes it as it does the lights', depth much less.
+//! so only the difference that depth and tilt make is looked up here, as quadratic splines, which have no creases. The
+//! membrane's own light has its vectors on the outer shell: tilt changes it as it does the lights', depth much less.
 
 use glam::{DVec2, Vec2, Vec3A, Vec4};
 
@@ -23,8 +23,8 @@ pub(super) fn along(flux: &Flux, way: Vec3A) -> Vec3A {
     (flux[0] * way.x + flux[1] * way.y) + flux[2] * way.z
 }
 
-/// The outer shell's flux with what the membrane throws there, how much more the others have, and what the membrane throws, side by side: a
-/// look-up asks all of them.
+/// The outer shell's flux with what the membrane throws there, how much more the others have, and what the membrane throws,
+/// side by side: a look-up asks all of them.
 #[derive(Debug, Clone, Copy, Default)]
 struct Node {
     outer: Flux,
@@ -109,8 +109,8 @@ impl Shells {
 }
 
 impl Shells {
-    /// Vector irradiance of the channels at a place over or under the undeformed membrane, on the outer shell over it, and of that what the
-    /// membrane throws: `[k]` has component k of the three.
+    /// Vector irradiance of the channels at a place over or under the undeformed membrane, on the outer shell over it, and
+    /// of that what the membrane throws: `[k]` has component k of the three.
     #[inline]
     pub fn vectors(&self, at: &Inside) -> [Flux; 3] {
         let nodes = self.scale.nodes;

@@ -7,7 +7,9 @@
 //!
 //! The estimate is [`JUMP`] of the largest fourth difference of nodes in a row: as much as cubics can be off where the
 //! slope of the brightness jumps, wherever in the cell it does. For a jump of the brightness itself it is a seventh more than
-//! needed, for jumps of higher derivatives and smooth brightness six times and more.
+//! needed, for jumps of higher derivatives and smooth brightness six times and more. Where the membrane hides itself, the
+//! brightness and its slope jump in the same place, and a fourth difference may lack both: there [`MIDDLE`] of what the cubics
+//! are off in the middle of the cell counts as well.
 
 use std::ops::Range;
 
@@ -20,6 +22,9 @@ use crate::work::Work;
 /// Error of the cubic through four even nodes over the larger fourth difference about their middle two, where the slope
 /// jumps once: the largest, for a jump in the middle.
 const JUMP: f32 = 0.375;
+/// Error of cubics over what they are off in the middle of the cell, where brightness and slope jump together and neither
+/// [`JUMP`] of the fourth differences tells: the largest.
+const MIDDLE: f32 = 3.0;
 /// The sum of the sizes of a cubic's weights between the middle two nodes, at most: by this errors along x grow when they
 /// are interpolated along y.
 const LEBESGUE: f32 = 1.25;
@@ -99,15 +104,18 @@ impl Lattice {
                 self.ask(surface, (column, row), WIDE);
             }
             for column in cells.step_by(WIDE) {
-                let is_smooth = self.error((column, row), WIDE, mask) <= surface.tolerance;
+                let is_smooth = self.is_smooth(surface, (column, row), WIDE, mask);
                 for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
                     let part = (column + x, row + y);
                     let source = if is_smooth {
                         Source::Cubics(WIDE)
                     } else {
                         self.ask(surface, part, NARROW);
-                        let is_smooth = self.error(part, NARROW, mask) <= surface.tolerance;
-                        if is_smooth { Source::Cubics(NARROW) } else { Source::Traced }
+                        if self.is_smooth(surface, part, NARROW, mask) {
+                            Source::Cubics(NARROW)
+                        } else {
+                            Source::Traced
+                        }
                     };
                     let at = part.1 * self.across + part.0;
                     self.sources.get_mut(at).into_iter().for_each(|place| *place = source);
@@ -136,6 +144,31 @@ impl Lattice {
                 level.into_iter().for_each(|level| self.nodes[at] = level);
             }
         }
+    }
+
+    /// Whether cubics serve in the cell right and below of a node.
+    fn is_smooth(
+        &mut self,
+        surface: &ShadedSurface<'_>,
+        at: (usize, usize),
+        stride: usize,
+        mask: Vec4,
+    ) -> bool {
+        if self.error(at, stride, mask) > surface.tolerance {
+            return false;
+        }
+        let (column, row) = at;
+        let pixel = |cell: usize| (cell.saturating_sub(BEFORE) * SPACING) + stride * SPACING / 2;
+        let (x, y) = (pixel(column), pixel(row));
+        if !surface.may_jump(y) || x >= surface.rays.width() {
+            return true;
+        }
+        let Some(ray) = surface.rays.pixel(x, y) else { return true };
+        let Some(shown) = surface.ray_level(y, ray, &mut self.traced) else { return true };
+        let w = &WEIGHTS[WIDE * SPACING / 2];
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| self.column(column + k * stride, y, stride));
+        let off = ((a * w[0] + b * w[1]) + (c * w[2] + d * w[3]) - shown).abs();
+        (off * mask).max_element() * MIDDLE <= surface.tolerance
     }
 
     /// Estimate of the error of cubics in the cell right and below of a node; infinite where a node of the stencil is not
@@ -263,5 +296,32 @@ mod tests {
         println!("error over fourth difference by order of the jump: {largest:.3?}");
         assert!((largest[1] - f64::from(JUMP)).abs() < 1e-3);
         assert!(largest[2] < 0.2 * largest[1] && largest[3] < 0.2 * largest[1]);
+    }
+
+    /// The same for a jump of the value and of the slope in one place, where the fourth differences of the two may cancel.
+    #[test]
+    fn the_middle_tells_where_a_jump_and_a_crease_cancel() {
+        let mut largest = [0.0_f64; 2];
+        for jump in (-200..=300).map(|k| f64::from(k) / 100.0) {
+            for turn in (0..360).map(|k| f64::from(k).to_radians()) {
+                let f = |x: f64| if x > jump { turn.cos() + turn.sin() * (x - jump) } else { 0.0 };
+                let nodes: [f64; 6] = std::array::from_fn(|k| f(k as f64 - 2.0));
+                let fourth = |k: usize| {
+                    (nodes[k] - 4.0 * nodes[k + 1] + 6.0 * nodes[k + 2] - 4.0 * nodes[k + 3] + nodes[k + 4])
+                        .abs()
+                };
+                let off = |t: f64| {
+                    let cubic: f64 = lagrange(t).iter().zip(&nodes[1..5]).map(|(w, v)| w * v).sum();
+                    (cubic - f(t)).abs()
+                };
+                let estimate = f64::from(JUMP) * fourth(0).max(fourth(1));
+                let with_middle = estimate.max(f64::from(MIDDLE) * off(0.5));
+                for off in (0..=100).map(|k| off(f64::from(k) / 100.0)).filter(|off| *off > 1e-9) {
+                    largest = [largest[0].max(off / estimate), largest[1].max(off / with_middle)];
+                }
+            }
+        }
+        println!("error over the estimate, without and with the middle: {largest:.3?}");
+        assert!(largest[0] > 2.0 && largest[1] < 1.0);
     }
 }

@@ -99,6 +99,11 @@ impl LensRays {
         }
     }
 
+    /// Pixels of each row.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
     /// Nodes along each row of the lattice.
     pub fn nodes_across(&self) -> usize {
         self.nodes_across

@@ -80,6 +80,11 @@ impl<'a> ShadedSurface<'a> {
         self.slices.get(self.slices.partition_point(|slice| slice.end <= y)).or(self.slices.last())
     }
 
+    /// Whether the membrane may hide a part of itself in a row, so that the brightness jumps.
+    pub fn may_jump(&self, y: usize) -> bool {
+        self.at(y).and_then(|seen| seen.map).is_some_and(DisplacementMap::may_fold)
+    }
+
     /// Brightness of what a ray of a row shows, red, green and blue; `None` where it misses the dome. Dome and membrane go on
     /// beyond the rim, so that the brightness does.
     #[inline]

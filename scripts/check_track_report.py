@@ -20,6 +20,7 @@ from html.parser import HTMLParser
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 LIMIT_BYTES = 2_000_000
@@ -112,7 +113,8 @@ def make_frames(domecast, work):
 
 
 def rotation_vector(rotation):
-    return cv2.Rodrigues(np.array(rotation))[0].ravel()
+    # OpenCV's takes angles below 1e-5 for none
+    return Rotation.from_matrix(rotation).as_rotvec()
 
 
 def wanted_of(line, at):

@@ -22,8 +22,8 @@ use crate::work::Work;
 /// Error of the cubic through four even nodes over the larger fourth difference about their middle two, where the slope
 /// jumps once: the largest, for a jump in the middle.
 const JUMP: f32 = 0.375;
-/// Error of cubics over what they are off in the middle of the cell, where brightness and slope jump together and neither
-/// [`JUMP`] of the fourth differences tells: the largest.
+/// Error of cubics over what they are off in the middle of the cell, where brightness and slope jump together and
+/// [`JUMP`] of the fourth differences is less: the largest.
 const MIDDLE: f32 = 3.0;
 /// The sum of the sizes of a cubic's weights between the middle two nodes, at most: by this errors along x grow when they
 /// are interpolated along y.
@@ -165,9 +165,8 @@ impl Lattice {
         }
         let Some(ray) = surface.rays.pixel(x, y) else { return true };
         let Some(shown) = surface.ray_level(y, ray, &mut self.traced) else { return true };
-        let w = &WEIGHTS[WIDE * SPACING / 2];
-        let [a, b, c, d] = [0, 1, 2, 3].map(|k| self.column(column + k * stride, y, stride));
-        let off = ((a * w[0] + b * w[1]) + (c * w[2] + d * w[3]) - shown).abs();
+        let columns = [0, 1, 2, 3].map(|k| self.column(column + k * stride, y, stride));
+        let off = (cubic(columns, &WEIGHTS[WIDE * SPACING / 2]) - shown).abs();
         (off * mask).max_element() * MIDDLE <= surface.tolerance
     }
 
@@ -223,11 +222,8 @@ impl Lattice {
                             [0, 1, 2, 3].map(|k| self.column(first + k * stride, y, stride)),
                         );
                     }
-                    let [a, b, c, d] = known.1;
-                    for x in x..end {
-                        let w = &WEIGHTS[x % (stride * SPACING) * (WIDE / stride)];
-                        self.row.push((a * w[0] + b * w[1]) + (c * w[2] + d * w[3]));
-                    }
+                    let weights = |x: usize| &WEIGHTS[x % (stride * SPACING) * (WIDE / stride)];
+                    self.row.extend((x..end).map(|x| cubic(known.1, weights(x))));
                     filled += (end - x) as u64;
                 }
                 _ => self.row.extend((x..end).map(|x| surface.pixel_level((x, y), &mut self.traced))),
@@ -246,8 +242,14 @@ impl Lattice {
         let start = (row - stride) * self.across + column - stride;
         let w = &WEIGHTS[y % (stride * SPACING) * (WIDE / stride)];
         let node = |k: usize| self.nodes.get(start + k * stride * self.across).copied().unwrap_or(Vec4::NAN);
-        (node(0) * w[0] + node(1) * w[1]) + (node(2) * w[2] + node(3) * w[3])
+        cubic([0, 1, 2, 3].map(node), w)
     }
+}
+
+/// What four nodes in a row show where a cubic through them has these weights.
+#[inline]
+fn cubic([a, b, c, d]: [Vec4; 4], w: &[f32; 4]) -> Vec4 {
+    (a * w[0] + b * w[1]) + (c * w[2] + d * w[3])
 }
 
 /// The columns of wide cells, of which every second counts, that some rows of pixels, all of one row of wide cells, ask for.
@@ -270,6 +272,19 @@ fn channel_mask(channels: &Range<usize>) -> Vec4 {
 mod tests {
     use super::*;
 
+    /// The larger fourth difference of six nodes about a cell, and how far the cubic through the middle four is off in it.
+    fn of_cubic(f: impl Fn(f64) -> f64) -> (f64, impl Fn(f64) -> f64) {
+        let nodes: [f64; 6] = std::array::from_fn(|k| f(k as f64 - 2.0));
+        let fourth = |k: usize| {
+            (nodes[k] - 4.0 * nodes[k + 1] + 6.0 * nodes[k + 2] - 4.0 * nodes[k + 3] + nodes[k + 4]).abs()
+        };
+        let off = move |t: f64| {
+            let cubic: f64 = lagrange(t).iter().zip(&nodes[1..5]).map(|(w, v)| w * v).sum();
+            (cubic - f(t)).abs()
+        };
+        (fourth(0).max(fourth(1)), off)
+    }
+
     /// The constant of the estimate: jumps of the value, the slope, and the next two derivatives, anywhere about a cell.
     #[test]
     fn cubics_are_off_by_no_more_than_the_estimate_where_something_jumps() {
@@ -277,15 +292,9 @@ mod tests {
         for (order, largest) in largest.iter_mut().enumerate() {
             for jump in (-200..=300).map(|k| f64::from(k) / 100.0) {
                 let f = |x: f64| if x > jump { (x - jump).powi(order as i32) } else { 0.0 };
-                let nodes: [f64; 6] = std::array::from_fn(|k| f(k as f64 - 2.0));
-                let fourth = |k: usize| {
-                    (nodes[k] - 4.0 * nodes[k + 1] + 6.0 * nodes[k + 2] - 4.0 * nodes[k + 3] + nodes[k + 4])
-                        .abs()
-                };
-                let difference = fourth(0).max(fourth(1));
+                let (difference, off) = of_cubic(f);
                 for t in (0..=100).map(|k| f64::from(k) / 100.0) {
-                    let cubic: f64 = lagrange(t).iter().zip(&nodes[1..5]).map(|(w, v)| w * v).sum();
-                    let off = (cubic - f(t)).abs();
+                    let off = off(t);
                     assert!(off <= f64::from(JUMP) * difference + 1e-12, "{order} {jump} {t}: {off}");
                     if difference > 1e-9 {
                         *largest = largest.max(off / difference);
@@ -300,21 +309,13 @@ mod tests {
 
     /// The same for a jump of the value and of the slope in one place, where the fourth differences of the two may cancel.
     #[test]
-    fn the_middle_tells_where_a_jump_and_a_crease_cancel() {
+    fn the_middle_shows_where_a_jump_and_a_crease_cancel() {
         let mut largest = [0.0_f64; 2];
         for jump in (-200..=300).map(|k| f64::from(k) / 100.0) {
             for turn in (0..360).map(|k| f64::from(k).to_radians()) {
                 let f = |x: f64| if x > jump { turn.cos() + turn.sin() * (x - jump) } else { 0.0 };
-                let nodes: [f64; 6] = std::array::from_fn(|k| f(k as f64 - 2.0));
-                let fourth = |k: usize| {
-                    (nodes[k] - 4.0 * nodes[k + 1] + 6.0 * nodes[k + 2] - 4.0 * nodes[k + 3] + nodes[k + 4])
-                        .abs()
-                };
-                let off = |t: f64| {
-                    let cubic: f64 = lagrange(t).iter().zip(&nodes[1..5]).map(|(w, v)| w * v).sum();
-                    (cubic - f(t)).abs()
-                };
-                let estimate = f64::from(JUMP) * fourth(0).max(fourth(1));
+                let (difference, off) = of_cubic(f);
+                let estimate = f64::from(JUMP) * difference;
                 let with_middle = estimate.max(f64::from(MIDDLE) * off(0.5));
                 for off in (0..=100).map(|k| off(f64::from(k) / 100.0)).filter(|off| *off > 1e-9) {
                     largest = [largest[0].max(off / estimate), largest[1].max(off / with_middle)];

@@ -129,7 +129,18 @@ pub struct Tables {
     pub evaluations: u64,
 }
 
-/// Gives the numbers of a table by its name, how many it has, and what makes them.
+/// Which parts of the light a field has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldParts {
+    /// Whether light falls off with the way and the slant; else every point is lit like the pole.
+    pub falloff: bool,
+    /// The membrane's mean reflectance for each channel, if it lights itself.
+    pub albedo: Option<[f64; 3]>,
+    /// Whether moved points are asked for.
+    pub moved: bool,
+}
+
+/// Gives the numbers of a table by its key, which says all that they depend on, how many it has, and what makes them.
 pub type Numbers<'a> = dyn Fn(&str, usize, &dyn Fn() -> Vec<f64>) -> Vec<f64> + 'a;
 
 /// All that is computed once for a design and a choice of effects.
@@ -156,24 +167,27 @@ impl Prepared {
         kept::<Vec<_>>(&self.rooms, || rooms(ways))
     }
 
-    /// Takes what a field of some parts needs as plain numbers from elsewhere: `numbers` is given a table's name, how many numbers it
-    /// has, and what makes them.
-    pub fn fill(&self, ways: &Ways, (dome, shells, room): (bool, bool, bool), numbers: &Numbers<'_>) {
+    /// Takes what a field of some parts needs as plain numbers from elsewhere.
+    pub fn fill(&self, ways: &Ways, parts: &FieldParts, numbers: &Numbers<'_>) {
+        let key = ways.key();
+        let numbers = |name: &str, count: usize, make: &dyn Fn() -> Vec<f64>| {
+            numbers(&format!("light's {name} {key}"), count, make)
+        };
         let grid = |cells| DomeGrid::with_cells(cells).over(ways.face());
         let count = |grid: &DomeGrid| 2 + ways.sources.len() * grid.nodes.pow(2) * 4;
-        if dome && self.dome.get().is_none() {
+        if parts.falloff && self.dome.get().is_none() {
             let grid = grid(DOME_CELLS << HALVINGS);
             let all = numbers("dome", count(&grid), &|| dome_tables(ways).numbers());
             let _ = self.dome.set(Tables::of_numbers(grid, &all));
         }
-        if shells && self.shells.get().is_none() {
+        if parts.falloff && parts.moved && self.shells.get().is_none() {
             let (grid, inside) = (grid(SHELL_CELLS), SHELLS.len() - 1);
             let made = || shell_tables(ways).iter().flat_map(Tables::numbers).collect();
             let all = numbers("shells", inside * count(&grid), &made);
             let each = all.chunks_exact(count(&grid)).map(|one| Tables::of_numbers(grid, one));
             let _ = self.shells.set(each.collect());
         }
-        if room && self.rooms.get().is_none() {
+        if parts.albedo.is_some() && self.rooms.get().is_none() {
             let rings = Rings::usual(ways.face());
             let made = || rooms(ways).iter().flat_map(DomeRoom::numbers).collect();
             let all = numbers("rooms' vectors", ways.optics.len() * rings.numbers_len(), &made);

@@ -1,8 +1,10 @@
-//! The shape of the skin from colour beside the forces on it: that nothing is allocated once they run, and that threads change nothing.
+//! The shape of the skin from colour beside the forces on it: that nothing is allocated once they run, and that neither threads nor kept tables change anything.
 
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-use domecast::shape::{ShapeFromColor, ShapeMap, ShapeOptions};
+use domecast::shape::{Numbers, ShapeFromColor, ShapeMap, ShapeOptions};
 use domecast::sim::scene::SceneFile;
 use domecast::sim::{Around, Drawn, Plan, Renderer, Scene, Scratch};
 use domecast::track::{CameraFrame, TrackOptions};
@@ -99,4 +101,50 @@ fn shape_and_forces_allocate_nothing_and_are_the_same_for_any_number_of_threads(
             assert_eq!(*forces, other_forces);
         }
     }
+}
+
+#[test]
+fn kept_tables_of_the_light_change_nothing() {
+    let drawn = pressed();
+    let pictures: Vec<_> =
+        drawn.iter().take(2).map(|drawn| drawn.image.as_ref().expect("a picture")).collect();
+    let frames: Vec<CameraFrame<'_>> = pictures
+        .iter()
+        .map(|image| {
+            CameraFrame::new(image.width, image.height, image.channels, &image.bytes).expect("a frame")
+        })
+        .collect();
+    let kept = RefCell::new(BTreeMap::<String, Vec<f64>>::new());
+    let made = Cell::new(0);
+    let keeping = |key: &str, count: usize, make: &dyn Fn() -> Vec<f64>| {
+        let numbers = kept
+            .borrow_mut()
+            .entry(key.to_owned())
+            .or_insert_with(|| {
+                made.set(made.get() + 1);
+                make()
+            })
+            .clone();
+        assert_eq!(numbers.len(), count, "{key:.40}");
+        numbers
+    };
+    let read = |tables: Option<&Numbers<'_>>| {
+        let mut tracker = tracker(TrackOptions::default());
+        let options = ShapeOptions::default();
+        let mut shape = match tables {
+            Some(tables) => ShapeFromColor::with_tables(&SENSOR.constants, &tracker, options, tables),
+            None => ShapeFromColor::new(&SENSOR.constants, &tracker, options),
+        }
+        .expect("light");
+        shape.set_rest(&frames[0], tracker.track(0, &frames[0])).expect("a frame at rest");
+        let map = shape.measure(&frames[1], tracker.track(1, &frames[1])).expect("a map");
+        let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
+        (bits(&map.height_mm), bits(&map.height_sd_mm), map.contact.clone())
+    };
+    let alone = read(None);
+    assert!(alone.2.is_some(), "a touch");
+    assert!(read(Some(&keeping)) == alone, "when they are made");
+    assert_eq!(made.get(), 3, "the dome's, the shells', the room's");
+    assert!(read(Some(&keeping)) == alone, "when they are there");
+    assert_eq!(made.get(), 3);
 }

@@ -265,7 +265,7 @@ fn long_chosen_settings_keep_what_is_asked_of_random_designs() {
 #[test]
 fn long_chosen_settings_keep_what_is_asked_over_the_sweep_of_the_parts() {
     let (mut done, mut measured) = (0, 0);
-    for (index, mut d) in random_designs::random_designs(220).enumerate() {
+    for (index, mut d) in random_designs::random_designs(110).enumerate() {
         // all three in turn from crude to fine, each in its own step
         let step = |period: usize| (index % period) as f64 / (period - 1) as f64;
         let asked = [
@@ -300,7 +300,7 @@ fn long_chosen_settings_keep_what_is_asked_over_the_sweep_of_the_parts() {
             assert!(worst <= asked[2], "{index}: {} is {worst} mm off", part.name);
         }
     }
-    assert!(done > 150 && measured >= 8, "{done} {measured}");
+    assert!(done > 75 && measured >= 4, "{done} {measured}");
 }
 
 /// Whether the design can be laid out; where it can, its chosen settings must keep what is asked: dots mm, image px,

@@ -8,6 +8,9 @@ use serde_json::{Value, json};
 
 use domecast_design::DesignError;
 use domecast_files::{Cache, OutputRules, WriteError};
+use domecast_runtime::constants::Constants;
+use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeOptions};
+use domecast_runtime::track::Tracker;
 
 /// Why a command did not do what it was asked for.
 #[derive(Debug)]
@@ -126,6 +129,17 @@ impl Output {
     /// The cache of tables, if there is one.
     pub fn cache(&self) -> Option<Cache> {
         (self.cache)()
+    }
+
+    /// What reads the skin's shape, by kept tables of the light where there are some.
+    pub fn shape(&self, constants: &Constants, tracker: &Tracker) -> Result<ShapeFromColor, ShapeError> {
+        let cache = self.cache();
+        ShapeFromColor::with_tables(constants, tracker, ShapeOptions::default(), &|key, count, make| {
+            match &cache {
+                Some(cache) => cache.numbers(key, count, make),
+                None => make(),
+            }
+        })
     }
 
     /// Prints nothing: results and notes are kept.

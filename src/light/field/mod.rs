@@ -17,18 +17,8 @@ use self::shells::{Shells, along};
 use crate::direct::EmitterRule;
 use crate::dome_map::{DomeGrid, bicubic};
 use crate::splines::{Degree, cubics, to_coefficients};
+pub use crate::tables::FieldParts;
 use crate::tables::{Prepared, Tables, Ways};
-
-/// Which parts of the light a field has.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FieldParts {
-    /// Whether light falls off with the way and the slant; else every point is lit like the pole.
-    pub falloff: bool,
-    /// The membrane's mean reflectance for each channel, if it lights itself.
-    pub albedo: Option<[f64; 3]>,
-    /// Whether moved points are asked for.
-    pub moved: bool,
-}
 
 /// Light on a point before its normal is known, by channel: irradiance is `base + vectors^T normal`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

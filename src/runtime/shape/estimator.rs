@@ -21,7 +21,7 @@ use super::system::{END_MM, Joint, SolveStatus, System};
 use super::volume::Volume;
 use crate::constants::Constants;
 use crate::track::{CameraFrame, Tracked, Tracker};
-use domecast_light::tables::Ways;
+use domecast_light::tables::{Numbers, Ways};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 
@@ -106,13 +106,26 @@ impl ShapeFromColor {
     /// # Errors
     /// [`ShapeError`] names the field of the constants that is missing or at fault.
     pub fn new(constants: &Constants, tracker: &Tracker, options: ShapeOptions) -> Result<Self, ShapeError> {
+        Self::with_tables(constants, tracker, options, &|_, _, make| make())
+    }
+
+    /// The same with the light's tables, most of the work, from whoever keeps them.
+    ///
+    /// # Errors
+    /// Those of [`ShapeFromColor::new`].
+    pub fn with_tables(
+        constants: &Constants,
+        tracker: &Tracker,
+        options: ShapeOptions,
+        tables: &Numbers<'_>,
+    ) -> Result<Self, ShapeError> {
         for (name, value) in [("cell_px", options.cell_px), ("max_passes", options.max_passes)] {
             if !(1..=16).contains(&value) {
                 return Err(ShapeError::new(name, format!("is {value}"), "give a number from 1 to 16"));
             }
         }
         let optics = tracker.optics().clone();
-        let (light, ways) = ShapeLight::new(constants, &optics)?;
+        let (light, ways) = ShapeLight::new(constants, &optics, tables)?;
         let cells = Cells::new(&optics, options.cell_px);
         let count = cells.count();
         Ok(Self {

@@ -7,7 +7,7 @@ use crate::constants::{Constants, LightConstants};
 pub(crate) use domecast_light::field::BeforeNormal as PointLight;
 use domecast_light::field::{FieldParts, LightField};
 use domecast_light::fresnel;
-use domecast_light::tables::{Prepared, Ways};
+use domecast_light::tables::{Numbers, Prepared, Ways};
 use domecast_optics::{ColorChannel, SensorOptics};
 
 /// Places of the table of what leaves towards the camera.
@@ -15,6 +15,10 @@ const LEAVING: usize = 512;
 
 /// What a build of this release writes.
 const REBUILD: &str = "build the design again with this release, which writes its nominal light";
+
+fn parts(light: &LightConstants) -> FieldParts {
+    FieldParts { falloff: true, albedo: Some(light.mean_reflectance), moved: true }
+}
 
 /// Irradiance of the membrane, and what of it goes the camera's way.
 #[derive(Debug, Clone)]
@@ -31,7 +35,11 @@ pub(crate) struct ShapeLight {
 
 impl ShapeLight {
     /// With the lights' ways to the membrane.
-    pub fn new(constants: &Constants, optics: &SensorOptics) -> Result<(Self, Ways), ShapeError> {
+    pub fn new(
+        constants: &Constants,
+        optics: &SensorOptics,
+        tables: &Numbers<'_>,
+    ) -> Result<(Self, Ways), ShapeError> {
         let Some(light) = &constants.light else {
             return Err(ShapeError::new("light", "is not in these constants", REBUILD));
         };
@@ -45,13 +53,14 @@ impl ShapeLight {
                 return Err(ShapeError::new("light.leds", problem, "give each colour a light"));
             }
         }
-        Ok((Self::with(light, optics, &ways, &Prepared::default()), ways))
+        let prepared = Prepared::default();
+        prepared.fill(&ways, &parts(light), tables);
+        Ok((Self::with(light, optics, &ways, &prepared), ways))
     }
 
     /// The same with tables of these ways that the caller has.
     pub fn with(light: &LightConstants, optics: &SensorOptics, ways: &Ways, prepared: &Prepared) -> Self {
-        let parts = FieldParts { falloff: true, albedo: Some(light.mean_reflectance), moved: true };
-        let field = LightField::new(ways, prepared, &parts);
+        let field = LightField::new(ways, prepared, &parts(light));
         let index = |channel: ColorChannel| {
             let last = optics.layers().last();
             last.map_or(1.0, |layer| layer.index_for(channel))

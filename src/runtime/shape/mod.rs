@@ -67,6 +67,7 @@ mod volume;
 pub use colours::are_colours_judged;
 pub use contact::SkinContact;
 pub use curvature::ContactEdge;
+pub use domecast_light::tables::Numbers;
 pub use error::ShapeError;
 pub use estimator::{ShapeFromColor, ShapeOptions};
 pub(crate) use light::ShapeLight;

@@ -98,12 +98,7 @@ impl ShadedDome {
             moved: !scene.file().objects.is_empty(),
         };
         if let Some(cache) = scene.cache() {
-            let (key, falloff) = (ways.key(), parts.falloff);
-            prepared.fill(
-                &ways,
-                (falloff, falloff && parts.moved, parts.albedo.is_some()),
-                &|name, count, make| cache.numbers(&format!("light's {name} {key}"), count, make),
-            );
+            prepared.fill(&ways, &parts, &|key, count, make| cache.numbers(key, count, make));
         }
         let field = LightField::new(&ways, &prepared, &parts);
         count(work, used, field.evaluations() * lights, lights);

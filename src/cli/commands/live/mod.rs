@@ -18,7 +18,7 @@ use domecast_live::page::{LivePage, ShownSensor};
 use domecast_live::source::{CameraRequest, ControlRequest, LiveSource, open_device as open_named};
 use domecast_live::{HeightReader, LiveEvent, LiveReader};
 use domecast_runtime::constants::Constants;
-use domecast_runtime::shape::{ShapeFromColor, ShapeOptions};
+use domecast_runtime::shape::ShapeFromColor;
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
 use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
 use session::{Outlets, Session};
@@ -76,6 +76,7 @@ fn check_size(
 
 /// What reads the skin, from a frame at rest, and what is tracked in that.
 fn skin_of(
+    output: &Output,
     arguments: &LiveArguments,
     constants: &Constants,
     tracker: &Tracker,
@@ -89,8 +90,8 @@ fn skin_of(
         ));
     }
     let fault = |path: &Path, problem: String| input_fault(path, problem, "what shape from colour needs");
-    let shape = ShapeFromColor::new(constants, tracker, ShapeOptions::default());
-    let mut shape = shape.map_err(|error| fault(&arguments.constants, error.to_string()))?;
+    let mut shape =
+        output.shape(constants, tracker).map_err(|error| fault(&arguments.constants, error.to_string()))?;
     let bytes = read_whole(rest).map_err(|error| fault(rest, format!("cannot be read ({error})")))?;
     let picture = picture(&bytes).map_err(|problem| fault(rest, problem))?;
     let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
@@ -105,7 +106,7 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
     let constants = read_constants(&arguments.constants)?;
     let unfit = |problem: String| input_fault(&arguments.constants, problem, "constants of a sensor");
     let tracker = Tracker::new(&constants, arguments.tracker.options()).map_err(|e| unfit(e.to_string()))?;
-    let skin = skin_of(arguments, &constants, &tracker)?;
+    let skin = skin_of(output, arguments, &constants, &tracker)?;
     let device = Device { name: &arguments.device, rate_hz: arguments.rate, controls: arguments.controls() };
     let source = open_device(&device, &constants)?;
     check_size(&*source, arguments, &constants)?;

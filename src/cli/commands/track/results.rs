@@ -112,7 +112,7 @@ impl Results {
     ) -> Result<Self, Failure> {
         let at_mm = tracker.springs().map_or(DVec3::ZERO, Springs::at_mm);
         let pictures = Pictures::new(arguments, rules, constants, tracker)?;
-        let shape = ShapeFiles::open(arguments, rules, constants, tracker, rest)?;
+        let shape = ShapeFiles::open(output, arguments, rules, constants, tracker, rest)?;
         let hardness = HardnessLines::open(arguments, rest, at_mm)?;
         let sink = Sink::new(arguments.out.as_deref(), rules)?;
         let page = match &arguments.report {

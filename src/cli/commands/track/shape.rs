@@ -10,7 +10,7 @@ use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
 use domecast_files::{OutputRules, StagedFolder, npy_f32, npy_u8, ply, png_u16};
 use domecast_runtime::constants::Constants;
-use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeMap, ShapeOptions};
+use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeMap};
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
 use domecast_runtime::traction::{ForceDistribution, PressureMap};
 
@@ -24,6 +24,7 @@ pub struct ShapeFiles {
 impl ShapeFiles {
     /// `None` where no shape is asked for.
     pub fn open(
+        output: &Output,
         arguments: &TrackArguments,
         rules: &OutputRules<'_>,
         constants: &Constants,
@@ -32,8 +33,7 @@ impl ShapeFiles {
     ) -> Result<Option<Self>, Failure> {
         let Some(path) = &arguments.shape else { return Ok(None) };
         let of_constants = |error: ShapeError| unfit(&arguments.constants, &error);
-        let mut shape =
-            ShapeFromColor::new(constants, tracker, ShapeOptions::default()).map_err(of_constants)?;
+        let mut shape = output.shape(constants, tracker).map_err(of_constants)?;
         if let Some(rest) = rest {
             let taken = shape.set_rest(&rest.frame()?, &rest.tracked);
             taken.map_err(|error| rest.fault(error.to_string()))?;

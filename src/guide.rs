@@ -4,7 +4,7 @@
 //! |---|---|
 //! | choose and design | [`design`], [`dots`], [`simulating`], [`accuracy`] |
 //! | make | [`printing`], [`casting`] |
-//! | calibrate and run | [`force`], [`tracking`], [`live`], [`python`], [`formats`] |
+//! | calibrate and run | [`force`], [`tracking`], [`shape`], [`live`], [`python`], [`formats`] |
 //! | learn | [`hardness`] |
 //! | change domecast | [`architecture`] |
 
@@ -22,6 +22,8 @@ pub mod force {}
 pub mod simulating {}
 #[doc = include_str!("guide/tracking.md")]
 pub mod tracking {}
+#[doc = include_str!("guide/shape.md")]
+pub mod shape {}
 #[doc = include_str!("guide/live.md")]
 pub mod live {}
 #[doc = include_str!("guide/accuracy.md")]

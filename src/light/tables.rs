@@ -167,6 +167,13 @@ impl Prepared {
         kept::<Vec<_>>(&self.rooms, || rooms(ways))
     }
 
+    /// With what a field of some parts needs, from elsewhere.
+    pub fn filled(ways: &Ways, parts: &FieldParts, numbers: &Numbers<'_>) -> Self {
+        let prepared = Self::default();
+        prepared.fill(ways, parts, numbers);
+        prepared
+    }
+
     /// Takes what a field of some parts needs as plain numbers from elsewhere.
     pub fn fill(&self, ways: &Ways, parts: &FieldParts, numbers: &Numbers<'_>) {
         let key = ways.key();

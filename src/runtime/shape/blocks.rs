@@ -8,7 +8,7 @@ const MIN_COVERED: f32 = 0.1;
 
 /// Share of a block's cells that must be read for it to say what is left over, and how many such blocks there must be.
 const MIN_READ: f32 = 0.9;
-pub(super) const MIN_BLOCKS: usize = 20;
+const MIN_BLOCKS: usize = 20;
 
 /// Middle one of the squares of a normal number.
 const CHI_MEDIAN: f32 = 0.455;

@@ -4,11 +4,13 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::error::ShapeError;
-use super::estimator::{ShapeFromColor, ShapeOptions};
+use super::estimator::ShapeFromColor;
+use super::options::ShapeOptions;
 use super::rest::{OTHER_ORDERS, Seen, seen};
 use super::rows::share;
 use crate::constants::Constants;
 use crate::track::{CameraFrame, Tracked, Tracker};
+use domecast_light::tables::{Prepared, SourceTables};
 
 /// Every seventh cell is asked, in as many parts.
 const STEP: usize = 7;
@@ -17,8 +19,11 @@ const PARTS: usize = 4;
 /// The part of their misfit that another order must leave to be taken for theirs.
 const OTHER_ORDER: f32 = 0.5;
 
+/// By so many times coarser than those that heights are read with are the tables of the light that shows the order of colours.
+const COARSER: usize = 4;
+
 /// Refuses a frame whose colours lie over the dome as the constants' light does only in another order; `tracker`
-/// has just followed it. `false` where this frame does not tell (it is not `ok`): ask with the next one. Takes some tenths of a
+/// has just followed it. `false` where this frame does not tell (it is not `ok`): ask with the next one. Takes a tenth of a
 /// second, so ask once.
 ///
 /// # Errors
@@ -35,7 +40,11 @@ pub fn are_colours_judged(
     if !tracked.problems.is_empty() {
         return Ok(false);
     }
-    let shape = ShapeFromColor::new(constants, tracker, ShapeOptions::default());
+    let shape = ShapeFromColor::prepared_by(constants, tracker, ShapeOptions::default(), &|ways, _| {
+        let coarse = |source| SourceTables::new(ways, source, COARSER);
+        let sources: Vec<_> = ways.sources.iter().map(coarse).collect();
+        Prepared::of(&sources.iter().collect::<Vec<_>>(), Prepared::default().rooms(ways))
+    });
     match shape.and_then(|mut shape| shape.set_rest(frame, tracked)) {
         Err(error) if error.colour_order.is_some() => Err(error),
         _ => Ok(true),

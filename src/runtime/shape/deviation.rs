@@ -20,7 +20,7 @@
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use super::blocks::{BLOCK, MIN_BLOCKS, Size, tilt_around};
+use super::blocks::{BLOCK, Size, tilt_around};
 use super::cells::{Cells, View};
 use super::holes::Holes;
 use super::normals::{CellReading, FILLED_SD_RAD};
@@ -192,8 +192,7 @@ impl Deviations {
             };
             let usual = factors[k.min(SEEN_LEVELS)];
             // Half of a sum of two squares of normal numbers.
-            let is_local = blocks.len() >= 2 * MIN_BLOCKS;
-            let far_more = if is_local { (BY_CHANCE * blocks.len() as f32).ln() } else { f32::INFINITY };
+            let far_more = (BY_CHANCE * blocks.len() as f32).ln();
             let to_holes = HOLE_LEVEL.saturating_sub(smaller.len());
             for (i, block) in blocks.iter_mut().enumerate() {
                 let beyond = around(i, 1).map(|block| block.variance_mm2);

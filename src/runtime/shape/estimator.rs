@@ -10,18 +10,19 @@ use super::error::ShapeError;
 use super::fill::{Pyramid, Weighted};
 use super::lattice::Lattice;
 use super::levels::{self, Level};
-use super::light::ShapeLight;
+use super::light::{Prepare, ShapeLight};
 use super::lights::Lights;
 use super::map::{ShapeMap, Skin};
 use super::marks::Marks;
 use super::normals::CellReading;
+use super::options::ShapeOptions;
 use super::rest::RestMap;
 use super::rows::{self, MIN_ROWS, share};
 use super::system::{END_MM, Joint, SolveStatus, System};
 use super::volume::Volume;
 use crate::constants::Constants;
 use crate::track::{CameraFrame, Tracked, Tracker};
-use domecast_light::tables::{Numbers, Ways};
+use domecast_light::tables::{Numbers, Prepared, Ways};
 use domecast_optics::SensorOptics;
 use domecast_optics::numeric::Rigid;
 
@@ -36,22 +37,6 @@ const PASS_END_MM: f64 = 3e-3;
 
 /// Most by which the skin moves, part of its height over the sheet: it is bonded at the rim.
 const MAX_STRAIN: f32 = 0.5;
-
-/// Settings of a [`ShapeFromColor`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShapeOptions {
-    /// Pixels along each side of a cell that is solved for, 1 to 16: half of the picture's resolution halves the noise, and colour
-    /// comes no finer from a camera whose chroma is halved.
-    pub cell_px: usize,
-    /// How often normals are read, integrated, and read again with the light at the moved skin, 1 to 16.
-    pub max_passes: usize,
-}
-
-impl Default for ShapeOptions {
-    fn default() -> Self {
-        Self { cell_px: 2, max_passes: 2 }
-    }
-}
 
 /// Reads the shape of the skin from the colours of frames.
 #[derive(Debug, Clone)]
@@ -119,13 +104,18 @@ impl ShapeFromColor {
         options: ShapeOptions,
         tables: &Numbers<'_>,
     ) -> Result<Self, ShapeError> {
-        for (name, value) in [("cell_px", options.cell_px), ("max_passes", options.max_passes)] {
-            if !(1..=16).contains(&value) {
-                return Err(ShapeError::new(name, format!("is {value}"), "give a number from 1 to 16"));
-            }
-        }
+        Self::prepared_by(constants, tracker, options, &|ways, parts| Prepared::filled(ways, parts, tables))
+    }
+
+    pub(super) fn prepared_by(
+        constants: &Constants,
+        tracker: &Tracker,
+        options: ShapeOptions,
+        prepare: Prepare<'_>,
+    ) -> Result<Self, ShapeError> {
+        options.check()?;
         let optics = tracker.optics().clone();
-        let (light, ways) = ShapeLight::new(constants, &optics, tables)?;
+        let (light, ways) = ShapeLight::new(constants, &optics, prepare)?;
         let cells = Cells::new(&optics, options.cell_px);
         let count = cells.count();
         Ok(Self {

@@ -7,7 +7,7 @@ use crate::constants::{Constants, LightConstants};
 pub(crate) use domecast_light::field::BeforeNormal as PointLight;
 use domecast_light::field::{FieldParts, LightField};
 use domecast_light::fresnel;
-use domecast_light::tables::{Numbers, Prepared, Ways};
+use domecast_light::tables::{Prepared, Ways};
 use domecast_optics::{ColorChannel, SensorOptics};
 
 /// Places of the table of what leaves towards the camera.
@@ -15,6 +15,9 @@ const LEAVING: usize = 512;
 
 /// What a build of this release writes.
 const REBUILD: &str = "build the design again with this release, which writes its nominal light";
+
+/// Makes the tables of lights.
+pub(super) type Prepare<'a> = &'a dyn Fn(&Ways, &FieldParts) -> Prepared;
 
 fn parts(light: &LightConstants) -> FieldParts {
     FieldParts { falloff: true, albedo: Some(light.mean_reflectance), moved: true }
@@ -38,7 +41,7 @@ impl ShapeLight {
     pub fn new(
         constants: &Constants,
         optics: &SensorOptics,
-        tables: &Numbers<'_>,
+        prepare: Prepare<'_>,
     ) -> Result<(Self, Ways), ShapeError> {
         let Some(light) = &constants.light else {
             return Err(ShapeError::new("light", "is not in these constants", REBUILD));
@@ -53,8 +56,7 @@ impl ShapeLight {
                 return Err(ShapeError::new("light.leds", problem, "give each colour a light"));
             }
         }
-        let prepared = Prepared::default();
-        prepared.fill(&ways, &parts(light), tables);
+        let prepared = prepare(&ways, &parts(light));
         Ok((Self::with(light, optics, &ways, &prepared), ways))
     }
 

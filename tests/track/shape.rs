@@ -144,7 +144,7 @@ fn kept_tables_of_the_light_change_nothing() {
     let alone = read(None);
     assert!(alone.2.is_some(), "a touch");
     assert!(read(Some(&keeping)) == alone, "when they are made");
-    assert_eq!(made.get(), 3, "the dome's, the shells', the room's");
+    assert_eq!(made.get(), 3, "on the dome, inside it, and what it throws on itself");
     assert!(read(Some(&keeping)) == alone, "when they are there");
     assert_eq!(made.get(), 3);
 }

@@ -1,5 +1,8 @@
 //! Shape from colour: what its resolution and its passes cost in time and give in exactness, on touches with noise.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
 use super::clock::{TimeLimit, time_again};
@@ -116,10 +119,15 @@ fn measured(
         let tracked = tracker.track(number, &frame).clone();
         frames.push((frame, tracked));
     }
+    // The light is the same for all settings.
+    let kept = RefCell::new(BTreeMap::new());
+    let tables = |key: &str, _: usize, make: &dyn Fn() -> Vec<f64>| -> Vec<f64> {
+        kept.borrow_mut().entry(key.to_owned()).or_insert_with(make).clone()
+    };
     let mut samples = Vec::new();
     for (index, (method, cell_px, max_passes)) in SETTINGS.into_iter().enumerate() {
         let options = ShapeOptions { cell_px, max_passes };
-        let mut shape = ShapeFromColor::new(constants, &tracker, options).ok()?;
+        let mut shape = ShapeFromColor::with_tables(constants, &tracker, options, &tables).ok()?;
         if shape.set_rest(&rest, &seen_at_rest).is_err() {
             // too few cells for what the frame at rest has to say
             continue;

@@ -23,7 +23,7 @@ const OTHER_ORDER: f32 = 0.5;
 const COARSER: usize = 4;
 
 /// Refuses a frame whose colours lie over the dome as the constants' light does only in another order; `tracker`
-/// has just followed it. `false` where this frame does not tell (it is not `ok`): ask with the next one. Takes a tenth of a
+/// has just followed it. `false` where this frame does not tell (it is not `ok`): ask with the next one. Takes some tenths of a
 /// second, so ask once.
 ///
 /// # Errors

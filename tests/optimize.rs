@@ -61,7 +61,7 @@ fn a_search_that_is_asked_to_stop_keeps_what_it_has() {
     let looks = Cell::new(0);
     let is_stopped = || {
         looks.set(looks.get() + 1);
-        looks.get() > 2
+        looks.get() > 1
     };
     let options = SearchOptions { evaluations: 5000, ..SearchOptions::default() };
     let found = searched(&design, &options, &is_stopped);

@@ -231,7 +231,7 @@ fn long_none_is_mislabelled_over_thousands_of_frames() {
     let missing = [3, 40, 41, 120];
     let mut tracker = tracker(TrackOptions::default());
     let (mut square, mut count, mut wanted) = (0.0, 0.0, 0.0);
-    for number in 0..frames_or(3_000) {
+    for number in 0..frames_or(1_500) {
         let (pose, shear, twist) = manoeuvre(number);
         let shear = sheared(shear);
         let displace = |p: DVec3| {
@@ -265,7 +265,7 @@ fn long_memory_is_flat_over_thousands_of_frames() {
         tracker.track(number, &frame(&frames[number as usize % 6].bytes));
     }
     // Asking the environment allocates: that is no frame's.
-    let last = frames_or(20_000);
+    let last = frames_or(10_000);
     let counted = allocation_counter::measure(|| {
         for number in 12..last {
             tracker.track(number, &frame(&frames[number as usize % 6].bytes));

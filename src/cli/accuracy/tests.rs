@@ -237,7 +237,7 @@ fn long_chosen_settings_keep_what_is_asked_of_random_designs() {
         low + (high - low) * f64::from(seed >> 8) / f64::from(1_u32 << 24)
     };
     let mut done = 0;
-    for _ in 0..60 {
+    for _ in 0..36 {
         let asked = [
             10_f64.powf(random(-3.5, -1.5)),
             10_f64.powf(random(-1.0, 0.5)),
@@ -258,14 +258,14 @@ fn long_chosen_settings_keep_what_is_asked_of_random_designs() {
         // a design that cannot be is not what is tested here
         done += usize::from(made.is_ok_and(|design| keeps_what_is_asked(&design, asked, 256)));
     }
-    assert!(done > 40, "{done}");
+    assert!(done > 24, "{done}");
 }
 
 /// As above, over the random designs that the parts are tried on, whose parts are measured too.
 #[test]
 fn long_chosen_settings_keep_what_is_asked_over_the_sweep_of_the_parts() {
     let (mut done, mut measured) = (0, 0);
-    for (index, mut d) in random_designs::random_designs(110).enumerate() {
+    for (index, mut d) in random_designs::random_designs(60).enumerate() {
         // all three in turn from crude to fine, each in its own step
         let step = |period: usize| (index % period) as f64 / (period - 1) as f64;
         let asked = [
@@ -300,7 +300,7 @@ fn long_chosen_settings_keep_what_is_asked_over_the_sweep_of_the_parts() {
             assert!(worst <= asked[2], "{index}: {} is {worst} mm off", part.name);
         }
     }
-    assert!(done > 75 && measured >= 4, "{done} {measured}");
+    assert!(done > 40 && measured >= 2, "{done} {measured}");
 }
 
 /// Whether the design can be laid out; where it can, its chosen settings must keep what is asked: dots mm, image px,

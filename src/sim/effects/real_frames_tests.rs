@@ -178,7 +178,7 @@ fn what_real_frames_have_stays_within_its_bound() {
 
 #[test]
 fn long_what_real_frames_have_stays_within_its_bound() {
-    within_bounds(100..140);
+    within_bounds(100..120);
 }
 
 #[test]

@@ -65,12 +65,12 @@ fn random_designs_pass_or_are_refused_by_field() {
 
 #[test]
 fn long_many_random_designs() {
-    let (sound, refused) = sweep(160);
+    let (sound, refused) = sweep(100);
     println!("{sound} made, {} refused", refused.len());
     for reason in &refused {
         println!("  {reason}");
     }
-    assert!(sound >= 25, "only {sound} designs were made; refused: {refused:#?}");
+    assert!(sound >= 16, "only {sound} designs were made; refused: {refused:#?}");
 }
 
 /// Shapes that kernels stumble over: pockets that touch the window, flush

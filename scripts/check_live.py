@@ -7,7 +7,7 @@ BUILD is the build of thumb24, OTHER that of another sensor with frames of the s
 frame that came is read or counted as pushed out, each reading is `track`'s bit for bit, memory stays, a device that is unplugged
 comes back, wrong constants are named. The page answers to this machine's own names alone, a browser that does not read holds
 nothing up, and in Chromium, where that is at hand, the page shows what is read. Ages are reported, not judged: they are the machine's
-too. --all plays 10,000 frames instead of 600.
+too. --all plays 3,000 frames instead of 600.
 """
 
 import json
@@ -367,7 +367,7 @@ def main():
         sys.exit(__doc__)
     domecast = os.path.abspath(words[0])
     constants, other = (Path(word).resolve() / "constants/constants.json" for word in words[1:])
-    count = 10_000 if "--all" in sys.argv else 600
+    count = 3_000 if "--all" in sys.argv else 600
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as base:
         base = Path(base)

@@ -9,22 +9,10 @@ use glam::{DAffine3, DVec2, DVec3, DVec4, Vec3Swizzles, Vec4Swizzles};
 
 use super::cavity::Cavities;
 use super::fresnel;
+use super::in_sight::Share;
+pub use super::in_sight::{EmitterRule, PLACES};
 use super::lobe::Lobe;
-use super::quadrature::GaussRule;
 use domecast_optics::SensorOptics;
-
-/// Places across the emitter, each way. The emitter is small against its distance from the dome: with four,
-/// the rule's error is below 1e-5 (tested against 64).
-pub const PLACES: usize = 4;
-
-/// Lines that a shadow's edge is cut along, for each place across.
-const LINES: usize = 2;
-
-/// Looks along the whole of the emitter at which pieces of a diagonal in sight are distinguished from pieces in the shadow.
-const LOOKS: f64 = 5.0;
-
-/// Halvings between two looks of which one is in sight: the edge is then known to 1/2560 of the emitter.
-const HALVINGS: u32 = 9;
 
 /// A square that emits, everywhere alike.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,185 +42,6 @@ pub struct DirectLight<'a> {
     pub fresnel: bool,
 }
 
-/// The rule across the emitter, made once: Gauss's places each way, what interpolates between them, and the lines that shadows are
-/// cut along.
-///
-/// The lines are diagonals that go on at the other side of the square, `u = begin + v` modulo 1, evenly spaced: what they see is
-/// periodic in `begin`, with kinks, for which no rule is better. A shadow's edge that lies along a side of the emitter cuts each of
-/// them in its own part, and so it moves through the light without a step; lines along a side would be taken one by one.
-#[derive(Debug, Clone)]
-pub struct EmitterRule {
-    rule: GaussRule,
-    /// Barycentric weights of the polynomial through the places.
-    weights: Vec<f64>,
-    /// Every other one first: where those see all of the light or nothing of it, the others are not asked.
-    diagonals: Vec<Diagonal>,
-}
-
-/// A diagonal between two sides of the emitter's unit square: `u = v + shift` for `v` in a range.
-#[derive(Debug, Clone)]
-struct Diagonal {
-    shift: f64,
-    weight: f64,
-    /// The range of `v`.
-    ends: [f64; 2],
-    /// Where along it is looked first, its ends among them, evenly spaced.
-    looks: Vec<f64>,
-    /// Along it the polynomial through the places is one in `v`, of Chebyshev's series over the range: for each of its terms, how
-    /// much of it each place gives.
-    series: Vec<Vec<f64>>,
-}
-
-impl Default for EmitterRule {
-    fn default() -> Self {
-        Self::with_places(PLACES)
-    }
-}
-
-impl EmitterRule {
-    /// A rule with another number of places each way, to see how much the number matters.
-    pub fn with_places(count: usize) -> Self {
-        let rule = GaussRule::new(count);
-        let nodes = rule.nodes();
-        let product = |i: usize| -> f64 {
-            let others = nodes.iter().enumerate().filter(|(j, _)| *j != i);
-            // Four times the distance keeps the product near 1 for any number of places.
-            others.map(|(_, (v, _))| 4.0 * (nodes[i].0 - v)).product()
-        };
-        let weights = (0..nodes.len()).map(|i| 1.0 / product(i)).collect();
-        let mut made = Self { rule, weights, diagonals: Vec::new() };
-        let lines = LINES * made.nodes().len();
-        let pair = |line: usize| {
-            let (begin, weight) = ((line as f64 + 0.5) / lines as f64, 1.0 / lines as f64);
-            let turn = 1.0 - begin;
-            [(begin, 0.0, turn, weight), (begin - 1.0, turn, 1.0, weight)]
-        };
-        let diagonal = |(shift, from, to, weight): (f64, f64, f64, f64)| {
-            let count = ((to - from) * LOOKS).ceil().max(1.0);
-            let look = |k: usize| {
-                if k as f64 == count { to } else { from + (to - from) * k as f64 / count }
-            };
-            let looks = (0..=count as usize).map(look).collect();
-            Diagonal { shift, weight, ends: [from, to], looks, series: made.series(shift, [from, to]) }
-        };
-        let order = (0..lines).step_by(2).chain((1..lines).step_by(2));
-        made.diagonals = order.flat_map(pair).map(diagonal).collect();
-        made
-    }
-
-    fn nodes(&self) -> &[(f64, f64)] {
-        self.rule.nodes()
-    }
-
-    /// Chebyshev's series of the places' weights along `u = v + shift`, from their values at as many places as it has terms
-    /// (L. N. Trefethen, Approximation Theory and Approximation Practice, ch. 3 and 4).
-    fn series(&self, shift: f64, [from, to]: [f64; 2]) -> Vec<Vec<f64>> {
-        let terms = 2 * self.nodes().len() - 1;
-        let turn = |p: usize| (p as f64 + 0.5) * std::f64::consts::PI / terms as f64;
-        let mut lines = [Vec::new(), Vec::new()];
-        let mut series = vec![vec![0.0; self.nodes().len().pow(2)]; terms];
-        for p in 0..terms {
-            let v = 0.5 * (from + to) + 0.5 * (to - from) * turn(p).cos();
-            self.weigh(v + shift, &mut lines[0]);
-            self.weigh(v, &mut lines[1]);
-            let [across, along] = &lines;
-            for (k, term) in series.iter_mut().enumerate() {
-                let part = if k == 0 { 1.0 } else { 2.0 * (k as f64 * turn(p)).cos() } / terms as f64;
-                let weights = across.iter().flat_map(|across| along.iter().map(move |along| across * along));
-                term.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += part * weight);
-            }
-        }
-        series
-    }
-
-    /// Weights of the values at the places in the polynomial through them, at `v` (J.-P. Berrut and L. N. Trefethen, Barycentric
-    /// Lagrange interpolation, SIAM Review 46, 2004).
-    fn weigh(&self, v: f64, weights: &mut Vec<f64>) {
-        weights.clear();
-        if let Some(own) = self.nodes().iter().position(|(place, _)| *place == v) {
-            weights.extend((0..self.weights.len()).map(|i| f64::from(u8::from(i == own))));
-            return;
-        }
-        weights
-            .extend(self.weights.iter().zip(self.nodes()).map(|(weight, (place, _))| weight / (v - place)));
-        let sum: f64 = weights.iter().sum();
-        weights.iter_mut().for_each(|weight| *weight /= sum);
-    }
-}
-
-/// What one place of the emitter gives.
-#[derive(Debug, Clone, Copy, Default)]
-struct Share {
-    /// Where its ray meets the sheet's underside and, to a point of the dome, its top, x and y of each, mm; the origin for a
-    /// point of the top itself.
-    crossings_mm: DVec4,
-    flux: DVec3,
-}
-
-impl Share {
-    /// Itself and a part of another.
-    fn and(&self, other: &Self, part: f64) -> Self {
-        Self {
-            crossings_mm: self.crossings_mm + other.crossings_mm * part,
-            flux: self.flux + other.flux * part,
-        }
-    }
-}
-
-impl Diagonal {
-    /// The terms of what the places' shares are along it.
-    fn terms<'a>(&'a self, all: &'a [Share]) -> impl Iterator<Item = Share> + 'a {
-        let sum = move |term: &Vec<f64>| {
-            term.iter().zip(all).fold(Share::default(), |sum, (part, share)| sum.and(share, *part))
-        };
-        self.series.iter().map(sum)
-    }
-
-    /// What the terms sum to at a place (C. W. Clenshaw's recurrence).
-    fn at(&self, terms: &[Share], v: f64) -> Share {
-        let [from, to] = self.ends;
-        let x = (2.0 * v - from - to) / (to - from);
-        let Some((first, others)) = terms.split_first() else { return Share::default() };
-        let (mut next, mut after) = (Share::default(), Share::default());
-        for term in others.iter().rev() {
-            (next, after) = (term.and(&next, 2.0 * x).and(&after, -1.0), next);
-        }
-        first.and(&next, x).and(&after, -1.0)
-    }
-}
-
-/// The flux of the whole square.
-fn whole(rule: &EmitterRule, all: &[Share]) -> DVec3 {
-    let nodes = rule.nodes();
-    let weights = nodes.iter().flat_map(|(_, across)| nodes.iter().map(move |(_, along)| across * along));
-    all.iter().zip(weights).map(|(share, weight)| share.flux * weight).sum()
-}
-
-/// The flux of what is in sight of the square, of its places' shares; `is_free` is given a place of it and its ray's crossings.
-fn in_sight(rule: &EmitterRule, all: &[Share], is_free: &mut dyn FnMut(f64, f64, DVec4) -> bool) -> DVec3 {
-    let (mut terms, mut looked) = (Vec::new(), Vec::new());
-    let mut sum = DVec3::ZERO;
-    let (mut any_free, mut any_blocked) = (false, false);
-    for (number, diagonal) in rule.diagonals.iter().enumerate() {
-        if number == rule.diagonals.len() / 2 && !(any_free && any_blocked) {
-            break;
-        }
-        terms.clear();
-        terms.extend(diagonal.terms(all));
-        let mut free = |v: f64| is_free(v + diagonal.shift, v, diagonal.at(&terms, v).crossings_mm);
-        looked.clear();
-        looked.extend(diagonal.looks.iter().map(|v| (*v, free(*v))));
-        any_free |= looked.iter().any(|(_, free)| *free);
-        any_blocked |= looked.iter().any(|(_, free)| !*free);
-        pieces_in_sight(&looked, free, |low, high| {
-            for (v, up) in rule.rule.over(low, high) {
-                sum += diagonal.at(&terms, v).flux * (diagonal.weight * up);
-            }
-        });
-    }
-    if any_blocked { sum } else { whole(rule, all) }
-}
-
 impl DirectLight<'_> {
     /// Vector irradiance at a point of the dome or the sheet's top, mW/mm^2, sensor frame. Its product with the
     /// unit normal *away from* the light is the irradiance.
@@ -245,10 +54,10 @@ impl DirectLight<'_> {
         let place =
             |u: f64, v: f64| pose.transform_point3(DVec3::new((u - 0.5) * side, (v - 0.5) * side, 0.0));
         let indices = self.indices(point_mm.z);
-        let mut all = Vec::with_capacity(rule.nodes().len() * rule.nodes().len());
+        let mut all = Vec::with_capacity(rule.places().len().pow(2));
         let (mut near, mut low, mut high) = (0.0, DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for &(u, _) in rule.nodes() {
-            for &(v, _) in rule.nodes() {
+        for &(u, _) in rule.places() {
+            for &(v, _) in rule.places() {
                 let source = place(u, v);
                 let Some((share, underside_mm)) = self.share(emitter, source, point_mm, &indices, &mut near)
                 else {
@@ -265,12 +74,12 @@ impl DirectLight<'_> {
         // The sheet's underside lies over all emitters.
         let underside_z_mm = high.z;
         let mut gather = |part: f64, is_free: &mut dyn FnMut(DVec3, DVec3) -> bool| {
-            let mut reaches = |u: f64, v: f64, at_mm: DVec4| {
+            let reaches = |from_mm: DVec3, at_mm: DVec4| {
                 self.enters(at_mm.xy())
                     && self.is_in_foot(at_mm.zw())
-                    && is_free(place(u, v), at_mm.xy().extend(underside_z_mm))
+                    && is_free(from_mm, at_mm.xy().extend(underside_z_mm))
             };
-            sum += part * in_sight(rule, &all, &mut reaches);
+            sum += part * rule.in_sight(&all, place, reaches);
         };
         if open > 0.0 {
             gather(open, &mut |_, _| true);
@@ -324,32 +133,5 @@ impl DirectLight<'_> {
         };
         let crossings_mm = tube.underside_mm.xy().extend(top_mm.x).extend(top_mm.y);
         Some((Share { crossings_mm, flux }, tube.underside_mm))
-    }
-}
-
-/// The pieces of a range that are in sight, from looks in order at places of it, their ends found by halving.
-fn pieces_in_sight(
-    looks: &[(f64, bool)],
-    mut free: impl FnMut(f64) -> bool,
-    mut found: impl FnMut(f64, f64),
-) {
-    let mut begun = looks.first().filter(|(_, free)| *free).map(|(from, _)| *from);
-    for two in looks.windows(2) {
-        let (before, here) = (two[0], two[1]);
-        if here.1 != before.1 {
-            let (mut low, mut high) = (before.0, here.0);
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (low + high);
-                if free(middle) == before.1 { low = middle } else { high = middle }
-            }
-            let edge = 0.5 * (low + high);
-            match begun.take() {
-                Some(start) => found(start, edge),
-                None => begun = Some(edge),
-            }
-        }
-    }
-    if let (Some(start), Some((to, _))) = (begun, looks.last()) {
-        found(start, *to);
     }
 }

@@ -21,6 +21,7 @@ pub mod direct;
 pub mod dome_map;
 pub mod field;
 pub mod fresnel;
+mod in_sight;
 pub mod lobe;
 pub mod quadrature;
 pub mod radiosity;

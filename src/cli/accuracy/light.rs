@@ -12,12 +12,12 @@ use domecast_sim::light::{LightUse, is_lit_by_leds, setup};
 use domecast_sim::{Scene, SimError};
 
 /// Places across an emitter, each direction, of the samples; the simulator's among them.
-const PLACES: [usize; 5] = [1, 2, 4, 8, 16];
+const PLACES: [usize; 5] = [1, 2, 3, 6, 12];
 /// The reference: the error of Gauss's rule falls faster than any power where nothing stands in the way, and as a power
 /// along the edge of a shadow.
 const REFERENCE: usize = 96;
 const QUICK_REFERENCE: usize = 24;
-const QUICK_PLACES: [usize; 3] = [1, 2, 4];
+const QUICK_PLACES: [usize; 3] = [1, 2, 3];
 /// Directions at which the light is looked at.
 const LOOKED: Rings = Rings { rings: 5, patches: 9, ..Rings::USUAL };
 const QUICK_LOOKED: Rings = Rings { rings: 3, patches: 5, ..Rings::USUAL };

@@ -71,10 +71,12 @@ impl Problem<'_> {
         [x, y, out]
     }
 
+    /// The balls' centres. A ball of another radius touches the skin as deep: its centre moves with it.
     pub fn centers_mm(&self, values: &Values) -> Vec<DVec3> {
+        let more_mm = self.radius_mm * (values.radius.exp() - 1.0);
         let moved = |(press, offset): (usize, &DVec3)| {
             let [x, y, out] = self.axes(press);
-            self.seen.presses[press].center_mm + x * offset.x + y * offset.y + out * offset.z
+            self.seen.presses[press].center_mm + x * offset.x + y * offset.y + out * (offset.z + more_mm)
         };
         values.centers.iter().enumerate().map(moved).collect()
     }
@@ -200,18 +202,25 @@ impl Problem<'_> {
         groups
     }
 
-    /// Derivatives of all levels by the light's numbers, whitened.
+    /// Derivatives of all levels by the light's numbers, whitened. To both sides where the shape of a light changes: where the platform's
+    /// lip begins to hide it, one side says nothing of the other.
     pub fn number_slopes(&self, values: &Values) -> Option<DMatrix<f64>> {
         let mut slopes = DMatrix::zeros(self.rows_count(), self.unknowns());
         let base = self.physics.lit_for_slopes(self.model.light(&values.numbers), None)?;
-        let before = self.rows(values, &base)?;
+        let here = self.rows(values, &base)?;
         for (k, number) in self.model.numbers.iter().enumerate() {
-            let mut after = values.clone();
-            after.numbers[k] += STEP;
             let changed = self.model.reshaped(*number);
-            let lit =
-                self.physics.lit_for_slopes(self.model.light(&after.numbers), Some((&base, changed)))?;
-            let column = (self.rows(&after, &lit)? - &before) / STEP;
+            let at = |step: f64| {
+                let mut moved = values.clone();
+                moved.numbers[k] += step;
+                let light = self.model.light(&moved.numbers);
+                self.rows(&moved, &self.physics.lit_for_slopes(light, Some((&base, changed)))?)
+            };
+            let column = if changed.is_empty() {
+                (at(STEP)? - &here) / STEP
+            } else {
+                (at(STEP)? - at(-STEP)?) / (2.0 * STEP)
+            };
             slopes.column_mut(k).copy_from(&column);
         }
         Some(slopes)
@@ -247,7 +256,9 @@ impl Problem<'_> {
                 let after = level(center_mm + axis * CENTER_STEP_MM, radius_mm);
                 put(numbers + 3 * place.press + k, after, sds[k] / CENTER_STEP_MM);
             }
-            let after = level(center_mm, radius_mm * RADIUS_STEP.exp());
+            let larger_mm = radius_mm * RADIUS_STEP.exp();
+            let [_, _, out] = self.axes(place.press);
+            let after = level(center_mm + out * (larger_mm - radius_mm), larger_mm);
             put(numbers + 3 * count, after, self.radius_sd / RADIUS_STEP);
         }
     }

@@ -139,16 +139,18 @@ fn together(
     // With the radius free first: presses of another ball must not be bent to fit this one.
     let balls = solve(&problem, start, Open::Balls)?;
     problem.radius_sd = FREE_RADIUS;
-    let free = solve(&problem, balls.values, Open::All)?;
+    let first = solve(&problem, balls.values, Open::All)?;
+    problem.scatter = scatter(&problem, &first).unwrap_or(problem.scatter);
+    // Again with the errors that these frames have: the radius' deviation is theirs.
+    let free = solve(&problem, first.values, Open::All)?;
     let last = problem.unknowns() - 1;
     let radius = [free.values.radius, FREE_RADIUS * free.covariance[(last, last)].max(0.0).sqrt()];
     verdict::radius(problem.radius_mm, radius)?;
-    problem.scatter = scatter(&problem, &free).unwrap_or(problem.scatter);
     problem.radius_sd = KNOWN_RADIUS;
     let solved = solve(&problem, Values { radius: 0.0, ..free.values.clone() }, Open::All)?;
     verdict::lights(problem.model, &solved.values.numbers)?;
-    let steps = steps + balls.steps + free.steps + solved.steps;
-    let rms = [free.rms[0], solved.rms[1]];
+    let steps = steps + balls.steps + first.steps + free.steps + solved.steps;
+    let rms = [first.rms[0], solved.rms[1]];
     Ok(result(constants, &problem, &solved, rms, free.values.radius, steps))
 }
 

@@ -82,13 +82,16 @@ impl Bench {
         checks::saturation(number, &cells)?;
         let dome = self.optics().dome();
         let (dome_center_mm, dome_mm) = (dome.center_mm(), dome.radius_mm());
-        let center_mm = ball_center(shape.map(), radius_mm, dome_mm).ok_or_else(|| {
+        let Some(center_mm) = ball_center(shape.map(), radius_mm, dome_mm) else {
+            // Under another exposure or white balance no touch is seen either.
+            checks::exposure(number, &cells.iter().collect::<Vec<_>>(), self.stray)?;
             let problem = match tracked.status() {
-                "ok" => "shows no touch".to_owned(),
+                "ok" => "shows no touch beside the frame at rest".to_owned(),
                 status => format!("shows no touch (the tracker says {status})"),
             };
-            LightFitError::in_frame(number, problem, "leave it out, or press the ball some 0.3 mm deep")
-        })?;
+            let cure = "leave it out, press the ball some 0.3 mm deep, or take the frame at rest again, if that is touched";
+            return Err(LightFitError::in_frame(number, problem, cure));
+        };
         let touch_mm = touch_radius_mm(center_mm, radius_mm, dome_center_mm, dome_mm);
         let out = (center_mm - dome_center_mm).normalize_or(DVec3::Z);
         let aside = |at: DVec3| (at - dome_center_mm).cross(out).length();

@@ -296,7 +296,8 @@ def refusals(domecast, it, is_quick):
 
     refused("red and blue swapped", "red and blue swapped", make=lambda picture, k: picture[..., ::-1])
     refused("a ball of another radius", "does not fit the presses", radius=1.25 * it["radius"], is_slow=True)
-    refused("a smaller ball", "does not fit the presses", radius=0.6 * it["radius"], is_slow=True)
+    refused("a smaller ball", "does not fit the presses", radius=0.8 * it["radius"], is_slow=True)
+    refused("a much smaller ball", "does not fit the presses", radius=0.6 * it["radius"], is_slow=True)
     moved = json.loads(it["constants"].read_text())
     moved["camera"]["camera_from_sensor"][0][3] += 0.6
     (work / "moved.json").write_text(json.dumps(moved))
@@ -308,7 +309,7 @@ def refusals(domecast, it, is_quick):
     refused("presses on one line", "too similar", picked=[0] + [touched[k] for k in (0, 1, 0, 1, 0, 1)], is_slow=True)
     refused("frames cut off", "cut off at full scale", make=lambda picture, k: picture * 2.5)
     refused("a frame without touch", "no touch", picked=[*all_frames[:4], 2, *all_frames[4:]], is_slow=True)
-    refused("a touched frame at rest", "touched", picked=[touched[1], *touched], is_slow=True)
+    refused("a touched frame at rest", "is touched", picked=[touched[1], *touched], is_slow=True)
     refused("a radius of 0", "radius", radius=0)
     tree = json.loads(it["file"].read_text())
     colors = [led["color"] for led in tree["leds"]["list"]]

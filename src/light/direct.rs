@@ -9,9 +9,9 @@ use glam::{DAffine3, DVec2, DVec3, DVec4, Vec3Swizzles, Vec4Swizzles};
 
 use super::cavity::Cavities;
 use super::fresnel;
-use super::in_sight::Share;
-pub use super::in_sight::{EmitterRule, PLACES};
 use super::lobe::Lobe;
+use super::visible::Share;
+pub use super::visible::{EmitterRule, PLACES};
 use domecast_optics::SensorOptics;
 
 /// A square that emits, everywhere alike.
@@ -79,7 +79,7 @@ impl DirectLight<'_> {
                     && self.is_in_foot(at_mm.zw())
                     && is_free(from_mm, at_mm.xy().extend(underside_z_mm))
             };
-            sum += part * rule.in_sight(&all, place, reaches);
+            sum += part * rule.visible_flux(&all, place, reaches);
         };
         if open > 0.0 {
             gather(open, &mut |_, _| true);

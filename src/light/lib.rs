@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! emitter (lobe, diffuser) ─> hollows of the platform (cavity) ─> sheet, silicone (optics::LightTube, fresnel)
-//!     ─> vector irradiance on the membrane (direct) ─> tables over the dome (tables, field, dome_map)
+//!     ─> vector irradiance on the membrane (direct, visible) ─> tables over the dome (tables, field, dome_map)
 //!     ─> the dome lighting itself (radiosity)
 //! ```
 //!
@@ -21,7 +21,6 @@ pub mod direct;
 pub mod dome_map;
 pub mod field;
 pub mod fresnel;
-mod in_sight;
 pub mod lobe;
 pub mod quadrature;
 pub mod radiosity;
@@ -29,5 +28,6 @@ pub mod separation;
 pub mod shelf;
 pub mod splines;
 pub mod tables;
+mod visible;
 
 pub use cavity::Cavities;

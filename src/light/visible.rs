@@ -1,7 +1,7 @@
-//! The part of a square emitter that is in sight of a point, and what that part sends there.
+//! The part of a square emitter that is visible from a point, and what that part sends there.
 //!
 //! What a place of the emitter sends, and where its ray goes, change smoothly over the emitter: both are interpolated between few
-//! places. The edge of what is in sight is found where it crosses the lines of a grid, and is straight between two of them: the
+//! places. The edge of what is visible is found where it crosses the lines of a grid, and is straight between two of them: the
 //! marching squares of contour lines (W. E. Lorensen and H. E. Cline, Marching cubes, SIGGRAPH 1987, in the plane). A straight edge
 //! is so cut exactly, whichever way it lies.
 
@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3, DVec4};
 use super::quadrature::GaussRule;
 
 /// Places across the emitter, each way. With three the error is below 1e-5 of the light's largest irradiance where the whole emitter
-/// is in sight, and below 1e-2 at the worst place of a shadow's edge (the shipped designs, against 24).
+/// is visible, and below 1e-2 at the worst place of a shadow's edge (the shipped designs, against 24).
 pub const PLACES: usize = 3;
 
 /// Cells of the grid for each place across.
@@ -39,11 +39,13 @@ pub(super) struct Share {
     pub flux: DVec3,
 }
 
-/// The way from a place of the emitter to the point.
+/// A corner of the grid's cells: a place of the unit square, and the way from there to the point.
 #[derive(Debug, Clone, Copy)]
-struct Ray {
+struct Corner {
+    at: DVec2,
     from_mm: DVec3,
     crossings_mm: DVec4,
+    is_free: bool,
 }
 
 impl Default for EmitterRule {
@@ -104,9 +106,9 @@ impl EmitterRule {
         all.iter().zip(weights).map(|(share, weight)| share.flux * weight).sum()
     }
 
-    /// The flux of what is in sight of the square, of its places' shares, along the second of its sides first. `from_mm` gives a
+    /// The flux of what is visible of the square, of its places' shares, along the second of its sides first. `from_mm` gives a
     /// place of the square, which `is_free` is asked of together with its ray's crossings.
-    pub(super) fn in_sight(
+    pub(super) fn visible_flux(
         &self,
         all: &[Share],
         from_mm: impl Fn(f64, f64) -> DVec3,
@@ -114,57 +116,43 @@ impl EmitterRule {
     ) -> DVec3 {
         let side = self.lines.len();
         let cell = 1.0 / (side - 1) as f64;
-        let place = |line: usize, along: usize| DVec2::new(line as f64, along as f64) * cell;
         let on_lines = between(all, &self.lines);
-        let mut rays = Vec::with_capacity(side * side);
+        let mut corners = Vec::with_capacity(side * side);
         for (line, row) in on_lines.chunks_exact(self.places().len()).enumerate() {
-            rays.extend(self.lines.iter().enumerate().map(|(along, weights)| {
-                let at = place(line, along);
+            corners.extend(self.lines.iter().enumerate().map(|(along, weights)| {
+                let at = DVec2::new(line as f64, along as f64) * cell;
+                let from_mm = from_mm(at.x, at.y);
                 let crossings_mm = weighed(row, weights, |share| share.crossings_mm);
-                Ray { from_mm: from_mm(at.x, at.y), crossings_mm }
+                Corner { at, from_mm, crossings_mm, is_free: is_free(from_mm, crossings_mm) }
             }));
         }
-        let free: Vec<bool> = rays.iter().map(|ray| is_free(ray.from_mm, ray.crossings_mm)).collect();
-        if free.iter().all(|free| *free) {
+        if corners.iter().all(|corner| corner.is_free) {
             return self.whole(all);
         }
-        if !free.contains(&true) {
+        if !corners.iter().any(|corner| corner.is_free) {
             return DVec3::ZERO;
         }
-        // Where the edge crosses the cells' sides, from corner to corner.
-        let mut crossed = |[a, b]: [(usize, usize); 2]| -> Option<DVec2> {
-            let at = |(line, along): (usize, usize)| line * side + along;
-            let (lit, dark) = if free[at(a)] { (a, b) } else { (b, a) };
-            let part = (free[at(lit)] && !free[at(dark)])
-                .then(|| edge(&rays[at(lit)], &rays[at(dark)], &mut is_free))?;
-            Some(place(lit.0, lit.1).lerp(place(dark.0, dark.1), part))
+        // From each corner to the next line, and to the next along its line.
+        let edges = |k: usize| {
+            let mut to = |other: usize| edge(&corners[k], corners.get(other)?, &mut is_free);
+            [to(k + side), if (k + 1).is_multiple_of(side) { None } else { to(k + 1) }]
         };
-        let mut edges = vec![[None; 2]; side * side];
-        for line in 0..side {
-            for along in 0..side {
-                let here = (line, along);
-                edges[line * side + along] = [
-                    (line + 1 < side).then(|| crossed([here, (line + 1, along)])).flatten(),
-                    (along + 1 < side).then(|| crossed([here, (line, along + 1)])).flatten(),
-                ];
-            }
-        }
+        let edges: Vec<[Option<DVec2>; 2]> = (0..corners.len()).map(edges).collect();
         let middles = between(all, &self.middles);
         let (mut outline, mut weights) = (Vec::with_capacity(8), [Vec::new(), Vec::new()]);
         let mut sum = DVec3::ZERO;
         for (line, row) in middles.chunks_exact(self.places().len()).enumerate() {
             for (along, middle) in self.middles.iter().enumerate() {
                 let k = line * side + along;
-                let corners = [k, k + side, k + side + 1, k + 1];
-                if corners.iter().all(|corner| free[*corner]) {
+                let around = [k, k + side, k + side + 1, k + 1].map(|k| corners[k]);
+                if around.iter().all(|corner| corner.is_free) {
                     sum += weighed(row, middle, |share| share.flux) * (cell * cell);
                     continue;
                 }
-                let places = [(line, along), (line + 1, along), (line + 1, along + 1), (line, along + 1)];
                 let sides = [edges[k][0], edges[k + side][1], edges[k + 1][0], edges[k][1]];
                 outline.clear();
-                for ((corner, at), edge) in corners.iter().zip(places).zip(sides) {
-                    outline.extend(free[*corner].then(|| place(at.0, at.1)).into_iter().chain(edge));
+                for (corner, edge) in around.iter().zip(sides) {
+                    outline.extend(corner.is_free.then_some(corner.at).into_iter().chain(edge));
                 }
                 if let Some((area, centroid)) = area_and_centroid(&outline) {
                     sum += self.flux_at(centroid, all, &mut weights) * area;
@@ -205,19 +193,24 @@ fn weighed<T: std::iter::Sum + std::ops::Mul<f64, Output = T>>(
     row.iter().zip(weights).map(|(share, weight)| part(share) * *weight).sum()
 }
 
-/// How far from a place in sight to one in the dark the edge lies, as a part of the way; the way between them is straight enough.
-fn edge(lit: &Ray, dark: &Ray, is_free: &mut impl FnMut(DVec3, DVec4) -> bool) -> f64 {
+/// Where the edge lies between two corners of which one alone is visible; the way between them is straight enough.
+fn edge(a: &Corner, b: &Corner, is_free: &mut impl FnMut(DVec3, DVec4) -> bool) -> Option<DVec2> {
+    let (lit, dark) = match (a.is_free, b.is_free) {
+        (true, false) => (a, b),
+        (false, true) => (b, a),
+        _ => return None,
+    };
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        let (from_mm, crossings_mm) =
-            (lit.from_mm.lerp(dark.from_mm, middle), lit.crossings_mm.lerp(dark.crossings_mm, middle));
+        let from_mm = lit.from_mm.lerp(dark.from_mm, middle);
+        let crossings_mm = lit.crossings_mm.lerp(dark.crossings_mm, middle);
         if is_free(from_mm, crossings_mm) { low = middle } else { high = middle }
     }
-    0.5 * (low + high)
+    Some(lit.at.lerp(dark.at, 0.5 * (low + high)))
 }
 
-/// Area and centroid of a polygon; `None` where there is none. Two opposite corners of a cell in sight are taken as joined.
+/// Area and centroid of a polygon; `None` where there is none. Two opposite corners of a cell, both visible, are taken as joined.
 fn area_and_centroid(outline: &[DVec2]) -> Option<(f64, DVec2)> {
     let (first, others) = outline.split_first()?;
     let (mut area, mut moment) = (0.0, DVec2::ZERO);

@@ -168,6 +168,10 @@ def sequence(domecast, work, design, constants, press, count):
             if part == "untouched":
                 shares.append(within((np.abs(e["off"]) / e["sd"])[here]))
             number += 1
+    # A frame at rest that was touched must not pass for one: the skin lies above it then, and beside a clean one nowhere.
+    line = track(domecast, frames / "frame_0000.png", frames / f"frame_{2 * count:04}.png", constants, shape)
+    plain = all(one["shape"]["status"] == "ok" for one in lines)
+    check(f"{design}: a touched frame at rest", line["shape"]["status"] == "raised" and not line["contact"] and plain, line["shape"]["status"])
     # some 10 MB of maps a frame
     shutil.rmtree(shape)
     check(f"{design}: untouched", len(lines) == number and not (stated["untouched"] or stated["released"]),

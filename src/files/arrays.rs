@@ -39,6 +39,7 @@ pub fn png_u16(size: [usize; 2], levels: &[u16]) -> Result<Vec<u8>, png::Encodin
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Sixteen);
+    encoder.set_compression(png::Compression::Fast);
     let big_endian: Vec<u8> = levels.iter().flat_map(|level| level.to_be_bytes()).collect();
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&big_endian)?;

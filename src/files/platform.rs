@@ -69,23 +69,28 @@ pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
 }
 
 #[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
-const MARK: &str = if cfg!(target_vendor = "apple") { "domecast.sha256" } else { "user.domecast.sha256" };
+const MARKS: [&str; 2] = if cfg!(target_vendor = "apple") {
+    ["domecast.xxh128", "domecast.sha256"]
+} else {
+    ["user.domecast.xxh128", "user.domecast.sha256"]
+};
 
 /// Notes a file's hash beside its content; a file system without attributes keeps none.
 #[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
 pub(crate) fn set_mark(file: &Path, hash: &str) {
     // without its mark the file is taken for someone else's, which loses nothing
-    let _ = rustix::fs::setxattr(file, MARK, hash.as_bytes(), rustix::fs::XattrFlags::empty());
+    let _ = rustix::fs::setxattr(file, MARKS[0], hash.as_bytes(), rustix::fs::XattrFlags::empty());
 }
 
 #[cfg(not(any(target_os = "linux", target_os = "android", target_vendor = "apple")))]
 pub(crate) fn set_mark(_: &Path, _: &str) {}
 
-/// The hash that was noted.
+/// The hash that was noted, by this version or an older one.
 #[cfg(any(target_os = "linux", target_os = "android", target_vendor = "apple"))]
 pub(crate) fn mark_of(file: &Path) -> Option<String> {
     let mut buffer = [0_u8; 128];
-    let count = rustix::fs::lgetxattr(file, MARK, &mut buffer[..]).ok()?;
+    let read = |mark: &&str| rustix::fs::lgetxattr(file, *mark, &mut buffer[..]).ok();
+    let count = MARKS.iter().find_map(read)?;
     String::from_utf8(buffer.get(..count)?.to_vec()).ok()
 }
 

@@ -89,8 +89,8 @@ fn what_was_changed_or_added_is_refused_by_name_and_kept_by_force() {
         ("marker", |out| {
             // the hash of an edited file, put right: the seal gives it away
             let marker = fs::read_to_string(out.join(".domecast")).unwrap();
-            let hash = marker.lines().find(|line| line.ends_with("  a.txt")).unwrap()[..64].to_owned();
-            fs::write(out.join(".domecast"), marker.replace(&hash, &"0".repeat(64))).unwrap();
+            let hash = marker.lines().find(|line| line.ends_with("  a.txt")).unwrap()[..32].to_owned();
+            fs::write(out.join(".domecast"), marker.replace(&hash, &"0".repeat(32))).unwrap();
         }),
         ("b/c.txt", |out| {
             fs::rename(out.join("b/c.txt"), out.join("../c.txt")).unwrap();
@@ -117,6 +117,31 @@ fn what_was_changed_or_added_is_refused_by_name_and_kept_by_force() {
         assert_eq!(moved.collect::<BTreeMap<_, _>>(), earlier, "{name}");
         assert_eq!(fs::read_to_string(out.join("a.txt")).unwrap(), "two");
         assert_eq!(result(&out, "three", &FORCE).unwrap(), None, "an unchanged result needs no copy");
+    }
+}
+
+#[test]
+fn a_result_of_an_older_version_is_known_by_its_sha_256() {
+    use sha2::{Digest, Sha256};
+    let hex =
+        |bytes: &[u8]| Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    for is_edited in [false, true] {
+        let place = tempfile::tempdir().unwrap();
+        let out = place.path().join("out");
+        result(&out, "one", &ANY).unwrap();
+        let marker = fs::read_to_string(out.join(".domecast")).unwrap();
+        let (head, rows) = marker.split_once('\n').unwrap();
+        let mut older = format!("{head}\n");
+        for (_, name) in rows.lines().filter_map(|row| row.split_once("  ")) {
+            older += &format!("{}  {name}\n", hex(&fs::read(out.join(name)).unwrap()));
+        }
+        older += &format!("# seal {}\n", hex(older.as_bytes()));
+        fs::write(out.join(".domecast"), older).unwrap();
+        if is_edited {
+            fs::write(out.join("a.txt"), "mine").unwrap();
+        }
+        assert_eq!(result(&out, "two", &ANY).is_err(), is_edited);
+        assert_eq!(fs::read_to_string(out.join("a.txt")).unwrap(), if is_edited { "mine" } else { "two" });
     }
 }
 

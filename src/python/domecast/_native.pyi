@@ -213,7 +213,8 @@ class ShapeMap:
 
     @property
     def status(self) -> str:
-        """`ok`, `not_converged`, `no_pose`, or `light_out`: a light is out that was on at rest, and nothing is known."""
+        """`ok`, `not_converged`, `no_pose`, `light_out`: a light is out that was on at rest, and nothing is known, or `raised`: the skin lies
+        farther above its shape at rest than anywhere below it, as where the frame at rest was touched, and no touch is stated."""
 
     @property
     def height_mm(self) -> Floats32:

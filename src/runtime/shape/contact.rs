@@ -23,6 +23,8 @@ const SIDE: usize = 128;
 /// every tenth.
 pub(super) const MIN_DEPTH_MM: f32 = 0.015;
 const MIN_DEPTH_SDS: f32 = 5.0;
+/// Cells to each side of a place that a touch presses in with it.
+const AROUND: usize = 2;
 
 /// The chart reaches this much farther than where the skin is pressed in by a fifth of the depth.
 const REACH: f32 = 1.8;
@@ -248,7 +250,51 @@ impl Chart {
     }
 }
 
-/// Whether a depth is that of a touch.
-pub(super) fn is_pressed(depth_mm: f32, sd_mm: f32) -> bool {
-    depth_mm < -MIN_DEPTH_MM.max(MIN_DEPTH_SDS * sd_mm)
+/// The middle of the place that lies farthest from its shape at rest, and how far, as its nearest cell has it: a touch presses all of a
+/// place in. What a few cells show that others beside them do not is noise, or an outline that is seen in part. `way` is -1 for what
+/// is pressed in, 1 for what is raised.
+pub(super) fn farthest_place(
+    heights_mm: &[f32],
+    sds_mm: &[f32],
+    width: usize,
+    way: f32,
+) -> Option<(usize, f32)> {
+    let is_far = |cell: usize, far_mm: f32| far_mm > MIN_DEPTH_MM.max(MIN_DEPTH_SDS * sds_mm[cell]);
+    let nearest_mm = |cell: usize| -> Option<f32> {
+        let (first, last) = (cell.checked_sub(AROUND * width + AROUND)?, cell + AROUND * width + AROUND);
+        let rows = heights_mm.get(first..=last)?.chunks(width).flat_map(|row| &row[..=2 * AROUND]);
+        let nearest =
+            rows.map(|height_mm| way * height_mm).reduce(|a, b| if a.is_nan() || a <= b { a } else { b });
+        nearest.filter(|far_mm| is_far(cell, *far_mm))
+    };
+    let far = |cell: &usize| is_far(*cell, way * heights_mm[*cell]);
+    let places = (0..heights_mm.len()).filter(far).filter_map(|cell| Some((cell, nearest_mm(cell)?)));
+    places.min_by(|a, b| b.1.total_cmp(&a.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_farthest_place_is_one_that_all_around_it_shares() {
+        let (width, height) = (20, 20);
+        let mut heights_mm = vec![0.0_f32; width * height];
+        let sds_mm = vec![0.01_f32; width * height];
+        let mut block = |row: usize, column: usize, side: usize, height_mm: f32| {
+            for r in row..row + side {
+                heights_mm[r * width + column..][..side].fill(height_mm);
+            }
+            farthest_place(&heights_mm, &sds_mm, width, 1.0)
+        };
+        // no wider than noise; too low for its deviation
+        assert_eq!(block(2, 2, 4, 1.0), None);
+        assert_eq!(block(8, 8, 5, 0.045), None);
+        assert_eq!(block(8, 8, 5, 0.06), Some((10 * width + 10, 0.06)));
+        assert_eq!(block(14, 14, 6, -0.5), Some((10 * width + 10, 0.06)));
+        let pressed = farthest_place(&heights_mm, &sds_mm, width, -1.0);
+        assert_eq!(pressed, Some((16 * width + 16, 0.5)));
+        heights_mm[16 * width + 16] = f32::NAN;
+        assert_eq!(farthest_place(&heights_mm, &sds_mm, width, -1.0), None);
+    }
 }

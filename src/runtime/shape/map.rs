@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::cells::{Cells, View};
-use super::contact::{Chart, SkinContact, is_pressed};
+use super::contact::{Chart, SkinContact, farthest_place};
 use super::outline::outline;
 use super::rows::{MIN_ROWS, share};
 use super::system::SolveStatus;
@@ -54,6 +54,8 @@ pub struct ShapeMap {
     pub contact: Option<SkinContact>,
     /// How the solve ended; `None` where the pose has no picture of the dome.
     pub status: Option<SolveStatus>,
+    /// Whether the skin lies farther above its shape at rest than anywhere below it; then no touch is stated.
+    pub is_raised: bool,
     /// Lights, by their place in the constants, that were on in the frame at rest and are out: then nothing is known.
     pub lights_out: Vec<usize>,
     /// What each light of the constants gives, parts of what it gave in the frame at rest.
@@ -83,9 +85,6 @@ type Mixed = [Vec3A; 2];
 /// A row of pixels: heights, their deviations, normals, touch.
 type Row<'a> = (&'a mut [f32], &'a mut [f32], &'a mut [Vec3], &'a mut [bool]);
 
-/// Cells to each side of a place that a touch presses in with it.
-const AROUND: usize = 2;
-
 /// Rows of pixels that are drawn one after the other.
 const BAND: usize = 32;
 
@@ -103,6 +102,7 @@ impl ShapeMap {
             is_touched: vec![false; pixels],
             contact: None,
             status: None,
+            is_raised: false,
             lights_out: Vec::new(),
             light_gain: Vec::new(),
             cell_mm: vec![f32::NAN; cells.count()],
@@ -195,13 +195,15 @@ impl ShapeMap {
         }
     }
 
-    /// How the reading ended: `ok`, `not_converged`, `no_pose`, or `light_out` where a light is out that was on at rest.
+    /// How the reading ended: `ok`, `not_converged`, `no_pose`, `light_out` where a light is out that was on at rest, or `raised` where
+    /// the skin lies farther above its shape at rest than anywhere below it, as no touch leaves it: where the frame at rest was touched.
     pub fn status_name(&self) -> &'static str {
         match &self.status {
             None if !self.lights_out.is_empty() => "light_out",
             None => "no_pose",
-            Some(solved) if solved.is_converged => "ok",
-            Some(_) => "not_converged",
+            Some(solved) if !solved.is_converged => "not_converged",
+            Some(_) if self.is_raised => "raised",
+            Some(_) => "ok",
         }
     }
 
@@ -214,6 +216,7 @@ impl ShapeMap {
         self.drawn.fill(0..0);
         self.forget_cells();
         self.status = None;
+        self.is_raised = false;
         self.lights_out.clear();
         self.light_gain.clear();
     }
@@ -286,7 +289,11 @@ impl ShapeMap {
     /// Finds the touch; its deepest cell.
     fn touch(&mut self, cells: &Cells, view: &View, dome: &DomeShape, chart: &mut Chart) -> Option<usize> {
         self.cell_pressure.fill(0.0);
-        let deepest = self.deepest_place(cells)?;
+        let deepest = farthest_place(&self.cell_mm, &self.cell_sd_mm, cells.width, -1.0);
+        let highest = farthest_place(&self.cell_mm, &self.cell_sd_mm, cells.width, 1.0);
+        let far_mm = |place: Option<(usize, f32)>| place.map_or(0.0, |(_, far_mm)| far_mm);
+        self.is_raised = far_mm(highest) > far_mm(deepest);
+        let (deepest, _) = deepest.filter(|_| !self.is_raised)?;
         chart.take(cells, view, &self.cell_point, &self.cell_mm, deepest, dome);
         let shown = &*chart;
         let pressures = self.cell_pressure.par_iter_mut().enumerate();
@@ -302,22 +309,6 @@ impl ShapeMap {
         )?;
         self.contact = Some(contact);
         Some(deepest)
-    }
-
-    /// The middle of the deepest place that a touch has pressed in, as its shallowest cell has it: a touch presses all of a place in. What
-    /// a few cells show that others beside them do not is noise, or an outline that is seen in part.
-    fn deepest_place(&self, cells: &Cells) -> Option<usize> {
-        let w = cells.width;
-        let shallowest_mm = |cell: usize| -> Option<f32> {
-            let (first, last) = (cell.checked_sub(AROUND * w + AROUND)?, cell + AROUND * w + AROUND);
-            let rows = self.cell_mm.get(first..=last)?.chunks(w).flat_map(|row| &row[..=2 * AROUND]);
-            let shallowest_mm = rows.copied().reduce(|a, b| if a.is_nan() || b <= a { a } else { b })?;
-            is_pressed(shallowest_mm, self.cell_sd_mm[cell]).then_some(shallowest_mm)
-        };
-        let pressed = |cell: &usize| is_pressed(self.cell_mm[*cell], self.cell_sd_mm[*cell]);
-        let places =
-            (0..self.cell_mm.len()).filter(pressed).filter_map(|cell| Some((cell, shallowest_mm(cell)?)));
-        places.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(cell, _)| cell)
     }
 
     /// Linear between the cells; a pixel whose own cell sees no dome has nothing.

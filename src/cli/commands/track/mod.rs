@@ -162,7 +162,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
             colours.step(output, &constants, &tracker, picture);
         }
         turn = tracked.camera_turn.or(turn);
-        *tally.counts.entry(tracked.status()).or_default() += 1;
+        tally.count(tracked);
         let encoded = next.encoded.as_deref();
         results.write(output, arguments, picture.as_ref().ok(), encoded, tracked, forces.as_mut())?;
         source.reuse(next.picture);
@@ -178,6 +178,9 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         return Err(input_fault(&arguments.frames[0], "holds no frame", allowed));
     }
     tell_turn(output, turn, &tally);
+    if arguments.tracker.has_reference() {
+        tally.tell_pull(output);
+    }
     tally.summarize(output, arguments.out.as_deref())?;
     let nothing_read = tally.counts.keys().all(|status| *status == "unreadable");
     if nothing_read { Err(Failure::Negative) } else { Ok(()) }

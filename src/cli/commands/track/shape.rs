@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::json;
 
 use super::arguments::TrackArguments;
@@ -19,6 +20,8 @@ pub struct ShapeFiles {
     shape: ShapeFromColor,
     folder: StagedFolder,
     pressure: PressureMap,
+    /// Frames whose skin lies above its shape at rest.
+    raised: u64,
 }
 
 impl ShapeFiles {
@@ -39,13 +42,15 @@ impl ShapeFiles {
             taken.map_err(|error| rest.fault(error.to_string()))?;
         }
         let folder = StagedFolder::new(path, "track", rules)?;
-        Ok(Some(Self { shape, folder, pressure: PressureMap::default() }))
+        Ok(Some(Self { shape, folder, pressure: PressureMap::default(), raised: 0 }))
     }
 
     /// Measures a frame.
     pub fn measure(&mut self, frame: &CameraFrame<'_>, tracked: &Tracked) -> Result<(), Failure> {
         let measured = self.shape.measure(frame, tracked);
-        measured.map(|_| ()).map_err(|error| unfit(Path::new("the frames"), &error))
+        let map = measured.map_err(|error| unfit(Path::new("the frames"), &error))?;
+        self.raised += u64::from(map.is_raised);
+        Ok(())
     }
 
     /// The measured frame's shape.
@@ -62,18 +67,16 @@ impl ShapeFiles {
         forces: Option<&mut ForceDistribution>,
     ) -> Result<(), Failure> {
         let map = self.shape.map();
-        for (name, bytes) in files(map).map_err(|error| Failure::Internal(error.to_string()))? {
-            self.folder.write(&format!("frame_{number:04}.{name}"), &bytes)?;
-        }
         let has_forces = forces.is_some();
         if let Some(forces) = forces {
             forces.draw_pressure(map, &mut self.pressure);
-            let PressureMap { width, height, pressure_n_mm2, pressure_sd_n_mm2 } = &self.pressure;
-            for (name, values) in [("pressure", pressure_n_mm2), ("pressure_sd", pressure_sd_n_mm2)] {
-                let bytes = npy_f32(&[*height, *width], values.iter().copied());
-                self.folder.write(&format!("frame_{number:04}.{name}.npy"), &bytes)?;
-            }
         }
+        let (folder, skin) = (&self.folder, (map, &self.pressure));
+        let count = if has_forces { FILES.len() } else { FILES_OF_SHAPE };
+        FILES[..count].par_iter().try_for_each(|(name, encode)| {
+            let bytes = encode(skin).map_err(|error| Failure::Internal(error.to_string()))?;
+            Ok::<(), Failure>(folder.write(&format!("frame_{number:04}.{name}"), &bytes)?)
+        })?;
         let Some(line) = line else { return Ok(()) };
         while line.last().is_some_and(|byte| matches!(byte, b'\n' | b'}')) {
             line.pop();
@@ -84,6 +87,13 @@ impl ShapeFiles {
 
     /// Puts the folder in its place.
     pub fn end(self, output: &Output) -> Result<(), Failure> {
+        if self.raised > 0 {
+            output.warn(&format!(
+                "frames whose skin lies above its shape at rest (`raised`): {}; the frame at rest was touched, or the skin is pulled or \
+                 stained: give a frame at rest of the clean, untouched sensor",
+                self.raised
+            ));
+        }
         output.kept(self.folder.commit()?);
         Ok(())
     }
@@ -93,21 +103,36 @@ impl ShapeFiles {
 const HEIGHT_STEP_MM: f32 = 0.001;
 const AT_REST: f32 = 32768.0;
 
-fn files(map: &ShapeMap) -> Result<[(&'static str, Vec<u8>); 6], png::EncodingError> {
-    let grid = [map.height, map.width];
+/// What a file of a frame is made of.
+type Skin<'a> = (&'a ShapeMap, &'a PressureMap);
+type Encode = fn(Skin<'_>) -> Result<Vec<u8>, png::EncodingError>;
+
+/// The files of a frame, the dearest first, and how many of them need no forces.
+const FILES: [(&str, Encode); 8] = [
+    ("normal.npy", |(map, _)| {
+        Ok(npy_f32(&[map.height, map.width, 3], map.normal.iter().flat_map(|n| n.to_array())))
+    }),
+    ("height.png", |(map, _)| height_png(map)),
+    ("ply", |(map, _)| Ok(surface_ply(map))),
+    ("height.npy", |(map, _)| Ok(npy_f32(&[map.height, map.width], map.height_mm.iter().copied()))),
+    ("height_sd.npy", |(map, _)| Ok(npy_f32(&[map.height, map.width], map.height_sd_mm.iter().copied()))),
+    ("contact.npy", |(map, _)| {
+        Ok(npy_u8(&[map.height, map.width], map.is_touched.iter().map(|is| u8::from(*is))))
+    }),
+    ("pressure.npy", |(_, map)| Ok(npy_f32(&[map.height, map.width], map.pressure_n_mm2.iter().copied()))),
+    ("pressure_sd.npy", |(_, map)| {
+        Ok(npy_f32(&[map.height, map.width], map.pressure_sd_n_mm2.iter().copied()))
+    }),
+];
+const FILES_OF_SHAPE: usize = 6;
+
+fn height_png(map: &ShapeMap) -> Result<Vec<u8>, png::EncodingError> {
     let level = |height_mm: &f32| {
         let level = (AT_REST + height_mm / HEIGHT_STEP_MM).round();
         if level.is_nan() { 0 } else { level.clamp(1.0, f32::from(u16::MAX)) as u16 }
     };
     let levels: Vec<u16> = map.height_mm.iter().map(level).collect();
-    Ok([
-        ("height.npy", npy_f32(&grid, map.height_mm.iter().copied())),
-        ("height_sd.npy", npy_f32(&grid, map.height_sd_mm.iter().copied())),
-        ("contact.npy", npy_u8(&grid, map.is_touched.iter().map(|is| u8::from(*is)))),
-        ("normal.npy", npy_f32(&[map.height, map.width, 3], map.normal.iter().flat_map(|n| n.to_array()))),
-        ("height.png", png_u16(grid, &levels)?),
-        ("ply", surface_ply(map)),
-    ])
+    png_u16([map.height, map.width], &levels)
 }
 
 /// The skin as triangles; its points' properties beside place and normal are `height_mm` and `height_sd_mm`.

@@ -7,15 +7,44 @@ use std::time::Duration;
 use serde_json::json;
 
 use crate::commands::output::{Failure, Output};
+use domecast_runtime::track::Tracked;
+
+/// A force that pulls the dome off its base is named from here on, N, and from so many standard deviations: a choice, more than what
+/// sticks to silicone pulls with.
+const MIN_PULL_N: f64 = 0.2;
+const PULL_SDS: f64 = 5.0;
 
 /// What happened to the frames.
 #[derive(Default)]
 pub(super) struct Tally {
     pub(super) counts: BTreeMap<&'static str, u64>,
     pub(super) times: Vec<Duration>,
+    /// Frames in which something pulls the dome off its base, and the strongest, N.
+    pulled: (u64, f64),
 }
 
 impl Tally {
+    /// Counts a frame.
+    pub(super) fn count(&mut self, tracked: &Tracked) {
+        *self.counts.entry(tracked.status()).or_default() += 1;
+        let (Some(wrench), Some(sd)) = (&tracked.wrench, &tracked.wrench_sd) else { return };
+        let (pull_n, sd_n) = (wrench.force_n.z, sd.force_n.z);
+        if pull_n > MIN_PULL_N.max(PULL_SDS * sd_n) {
+            self.pulled = (self.pulled.0 + 1, self.pulled.1.max(pull_n));
+        }
+    }
+
+    /// Says where frames that are taken off were not of the untouched sensor: nothing pulls a dome.
+    pub(super) fn tell_pull(&self, output: &Output) {
+        let (frames, pull_n) = self.pulled;
+        if frames > 0 {
+            output.warn(&format!(
+                "frames in which something pulls the dome off its base: {frames}, with up to {pull_n:.2} N; if nothing does, the frames of \
+                 --reference were not of the untouched sensor, and all forces are off by what touched it then"
+            ));
+        }
+    }
+
     /// The time, ms, that a share of the frames took at most.
     fn quantile_ms(&self, share: f64) -> f64 {
         let index = ((self.times.len() as f64 * share) as usize).min(self.times.len().saturating_sub(1));

@@ -131,6 +131,11 @@ def without_contact(_, video):
     return dataclasses.replace(video, frames=video.frames[shown], readings=video.readings[shown], dots=video.dots[shown])
 
 
+def touched_at_rest(_, video):
+    """A frame of the press given as the one at rest."""
+    return dataclasses.replace(video, rest=video.frames[len(video.frames) // 2])
+
+
 def at_size(width, height):
     """Every picture as the mean over areas of it, as `track` shows it to a model."""
     return lambda picture: cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
@@ -140,7 +145,7 @@ AS_IT_IS, NO_CONTACT = "as it is", "no contact"
 SHIFTS = {AS_IT_IS: lambda _, video: video, "30 % less light": of_pictures(lambda p: np.round(0.7 * p)),
           "half the light": of_pictures(lambda p: np.round(0.5 * p)), "lens 10 % longer": of_pictures(zoomed(1.1)),
           "lens 10 % shorter": of_pictures(zoomed(1 / 1.1)), "JPEG 70 of the small pictures": of_pictures(jpeg),
-          "two dots missing": without_dots, NO_CONTACT: without_contact}
+          "two dots missing": without_dots, "touched at rest": touched_at_rest, NO_CONTACT: without_contact}
 
 
 # --- what the model says

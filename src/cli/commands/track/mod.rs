@@ -121,7 +121,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
     let mut times = FrameTimes::open(arguments.times.as_deref())?;
     results.begin(arguments)?;
-    let mut tally = Tally::default();
+    let mut tally = Tally::new(arguments.tracker.has_reference(), rest.as_ref().map(|rest| &rest.tracked));
     warn_without_key(output, arguments, &constants);
     warn_without_rest(output, arguments, &constants);
     let mut turn = None;
@@ -178,9 +178,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         return Err(input_fault(&arguments.frames[0], "holds no frame", allowed));
     }
     tell_turn(output, turn, &tally);
-    if arguments.tracker.has_reference() {
-        tally.tell_pull(output);
-    }
+    tally.tell_pull(output);
     tally.summarize(output, arguments.out.as_deref())?;
     let nothing_read = tally.counts.keys().all(|status| *status == "unreadable");
     if nothing_read { Err(Failure::Negative) } else { Ok(()) }

@@ -19,28 +19,46 @@ const PULL_SDS: f64 = 5.0;
 pub(super) struct Tally {
     pub(super) counts: BTreeMap<&'static str, u64>,
     pub(super) times: Vec<Duration>,
+    /// Whether what the untouched sensor shows is taken off already; else what it bears along its axis, N, where a frame says so.
+    has_reference: bool,
+    rest_n: Option<f64>,
     /// Frames in which something pulls the dome off its base, and the strongest, N.
     pulled: (u64, f64),
 }
 
 impl Tally {
+    /// Begins, with the frame at rest where there is one.
+    pub(super) fn new(has_reference: bool, rest: Option<&Tracked>) -> Self {
+        let rest_n = rest.and_then(|tracked| Some(tracked.wrench.as_ref()?.force_n.z));
+        Self { has_reference, rest_n, ..Self::default() }
+    }
+
     /// Counts a frame.
     pub(super) fn count(&mut self, tracked: &Tracked) {
         *self.counts.entry(tracked.status()).or_default() += 1;
-        let (Some(wrench), Some(sd)) = (&tracked.wrench, &tracked.wrench_sd) else { return };
-        let (pull_n, sd_n) = (wrench.force_n.z, sd.force_n.z);
-        if pull_n > MIN_PULL_N.max(PULL_SDS * sd_n) {
-            self.pulled = (self.pulled.0 + 1, self.pulled.1.max(pull_n));
-        }
+        let Some(pull_n) = self.pull_n(tracked).filter(|pull_n| *pull_n > MIN_PULL_N) else { return };
+        self.pulled = (self.pulled.0 + 1, self.pulled.1.max(pull_n));
     }
 
-    /// Says where frames that are taken off were not of the untouched sensor: nothing pulls a dome.
+    /// What pulls the dome off its base, more than the untouched sensor shows and than the deviation of that allows.
+    fn pull_n(&self, tracked: &Tracked) -> Option<f64> {
+        let force_n = tracked.wrench.as_ref()?.force_n.z;
+        let (pull_n, sd_n) = if self.has_reference {
+            (force_n, tracked.wrench_sd.as_ref()?.force_n.z)
+        } else {
+            // What stays from frame to frame is in both.
+            (force_n - self.rest_n?, std::f64::consts::SQRT_2 * tracked.wrench_sd_random.as_ref()?.force_n.z)
+        };
+        (pull_n > PULL_SDS * sd_n).then_some(pull_n)
+    }
+
+    /// Says where frames that were given as untouched were not: nothing pulls a dome.
     pub(super) fn tell_pull(&self, output: &Output) {
         let (frames, pull_n) = self.pulled;
         if frames > 0 {
             output.warn(&format!(
                 "frames in which something pulls the dome off its base: {frames}, with up to {pull_n:.2} N; if nothing does, the frames of \
-                 --reference were not of the untouched sensor, and all forces are off by what touched it then"
+                 --reference or --rest were not of the untouched sensor, and what is counted from them is wrong"
             ));
         }
     }
@@ -67,5 +85,39 @@ impl Tally {
             "median_ms": median,
             "p99_ms": p99,
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use domecast_springs::Wrench;
+
+    fn bears(force_n: f64) -> Tracked {
+        let along = |force_n: f64| Some(Wrench::from_array([0.0, 0.0, force_n, 0.0, 0.0, 0.0]));
+        Tracked {
+            wrench: along(force_n),
+            wrench_sd: along(0.05),
+            wrench_sd_random: along(0.001),
+            ..Tracked::default()
+        }
+    }
+
+    fn pulled(has_reference: bool, rest_n: Option<f64>, force_n: f64) -> u64 {
+        let mut tally = Tally::new(has_reference, rest_n.map(bears).as_ref());
+        tally.count(&bears(force_n));
+        tally.pulled.0
+    }
+
+    #[test]
+    fn a_load_upside_down_is_counted() {
+        assert_eq!(pulled(true, None, 0.26), 1);
+        // within five deviations; a push; nothing is said of the untouched sensor
+        assert_eq!(pulled(true, None, 0.24), 0);
+        assert_eq!(pulled(true, None, -3.0), 0);
+        assert_eq!(pulled(false, None, 0.9), 0);
+        // beside a frame at rest what both have in common does not count
+        assert_eq!(pulled(false, Some(-2.4), 0.0), 1);
+        assert_eq!(pulled(false, Some(0.9), 1.0), 0);
     }
 }

@@ -178,7 +178,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         return Err(input_fault(&arguments.frames[0], "holds no frame", allowed));
     }
     tell_turn(output, turn, &tally);
-    tally.tell_pull(output);
+    tally.warn_of_pull(output);
     tally.summarize(output, arguments.out.as_deref())?;
     let nothing_read = tally.counts.keys().all(|status| *status == "unreadable");
     if nothing_read { Err(Failure::Negative) } else { Ok(()) }

@@ -52,8 +52,8 @@ impl Tally {
         (pull_n > PULL_SDS * sd_n).then_some(pull_n)
     }
 
-    /// Says where frames that were given as untouched were not: nothing pulls a dome.
-    pub(super) fn tell_pull(&self, output: &Output) {
+    /// Warns where frames that were given as untouched were not: nothing pulls a dome.
+    pub(super) fn warn_of_pull(&self, output: &Output) {
         let (frames, pull_n) = self.pulled;
         if frames > 0 {
             output.warn(&format!(

@@ -71,6 +71,8 @@ def bring(domecast, folder):
     for frame in sorted((folder / "simulated-ball").glob("frame_*.png")):
         shutil.copy(frame, folder / "pressed")
     shutil.rmtree(folder / "simulated-ball")
+    # the hand of that press
+    (folder / "travel.txt").write_text("0.0\n0.13\n0.27\n")
     bring_presses(run, folder)
     constants = json.loads((folder / "constants.json").read_text())
     scatter = np.random.default_rng(25)

@@ -29,6 +29,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 SCENES = pathlib.Path(__file__).resolve().parent.parent / "designs/scenes"
 WINDOW = 10
+CLASSES = {"soft": 0.07, "hard": 0.9}
 TOLERANCE = 1e-5
 
 
@@ -237,11 +238,11 @@ def rest_ranges(picture):
     return [[0.98 * v, 1.02 * v] for v in [picture.mean(), *blocks]]
 
 
-def with_metadata(model, ranges):
+def with_metadata(model, ranges, interval_quantile=1.6):
     wide = {"fz_n": [-1.6, -0.4]}
-    text = {"version": 1, "classes": [{"name": n, "youngs_modulus_mpa": None} for n in ("soft", "hard")],
+    text = {"version": 1, "classes": [{"name": n, "youngs_modulus_mpa": e} for n, e in CLASSES.items()],
             "readings": [{"name": n, "range": wide.get(n, [-1e3, 1e3])} for n in RIGID + ["dots_mean_px"]], "rest_ranges": ranges,
-            "log10_e_range": [-1e3, 1e3], "interval_quantile": 1.6, "novelty_limits": [1e9, 1e9],
+            "log10_e_range": [-1e3, 1e3], "interval_quantile": interval_quantile, "novelty_limits": [1e9, 1e9],
             "novelty_names": ["features", "readings"]}
     helper.set_model_props(model, {"domecast_hardness": json.dumps(text)})
     return model.SerializeToString()
@@ -296,6 +297,63 @@ def check_track(domecast, build, folder):
         sys.exit(f"FAULT: track differs from ONNX Runtime by {worst}, states {states}")
     print(f"track: {states.count('ok')} windows stated, {states.count('unsure')} unsure; off by {worst:.1e} from ONNX Runtime and OpenCV")
     check_unsure(domecast, build, frames, folder, data)
+    check_beside_travel(domecast, build, frames, folder, data, lines)
+
+
+def sure_of(data, label):
+    """The model with a bias in front of its probabilities: sure of a class, whatever it sees."""
+    model = onnx.load_from_string(data)
+    model.metadata_props.clear()
+    softmax = next(node for node in model.graph.node if "probability" in node.output)
+    last = next(node for node in model.graph.node if softmax.input[0] in node.output)
+    bias = next(constant for constant in model.graph.initializer if constant.name == last.input[2])
+    bias.CopyFrom(numpy_helper.from_array(np.where(np.arange(len(CLASSES)) == label, 50.0, -50.0).astype(np.float32), bias.name))
+    return model
+
+
+def check_beside_travel(domecast, build, frames, folder, data, lines):
+    """The same frames, and a hand that came as near as a soft object lets it, or as a hard one: the model's class is stated beside one of them only."""
+    constants = build / "constants/constants.json"
+    rest, shown = frames[0], frames[: WINDOW + 4]
+    for name in CLASSES:
+        sure = sure_of(data, list(CLASSES).index(name))
+        path = folder / f"sure-{name}.onnx"
+        path.write_bytes(with_metadata(sure, rest_ranges(shrunk(rest)), 0.0))
+        for other, young in CLASSES.items():
+            # by Hertz' punch of some 3 mm on a dome of 0.56 MPa, on the springs that the lines have
+            force = np.array([np.linalg.norm(np.array(line["wrench"][:3]) - lines[0]["wrench"][:3]) for line in lines])
+            sunk = np.array([lines[0]["pose"][2][3] - line["pose"][2][3] for line in lines])
+            travel = folder / "travel.txt"
+            travel.write_text("".join(f"{mm}\n" for mm in sunk + force * 0.77 * (1 / 0.56 + 1 / young) / 6.0))
+            done = subprocess.run([domecast, "track", *shown, "--constants", constants, "--hardness", path, "--rest", rest, "--traction",
+                                   "--shape", folder / "skin", "--travel", travel, "--force", "--quiet"], capture_output=True, text=True)
+            if done.returncode:
+                sys.exit(f"FAULT: track ends with {done.returncode}: {done.stderr[:500]}")
+            last = json.loads(done.stdout.splitlines()[-1])
+            found, contact = last["hardness"], last["contact_hardness"]
+            wanted = ("ok", name) if name == other else ("unsure", "contradicts_contact_mechanics")
+            if (found["status"], found["class"] or found["reason"]) != wanted:
+                sys.exit(f"FAULT: the model is sure that it is {name}, the travel that of a {other} object: {found}, {contact}")
+    print("travel: a class that contact mechanics has otherwise is not stated")
+    check_touched_at_rest(domecast, build, frames, folder, data)
+
+
+def check_touched_at_rest(domecast, build, frames, folder, data):
+    """A frame of the press given as the one at rest, untouched frames before it: with --shape nothing is stated."""
+    rest, path = frames[WINDOW], folder / "touched.onnx"
+    model = sure_of(data, 0)
+    path.write_bytes(with_metadata(model, rest_ranges(shrunk(rest))))
+    command = [domecast, "track", *frames, "--constants", build / "constants/constants.json", "--hardness", path, "--rest", rest, "--quiet"]
+    said = []
+    for more in ([], ["--shape", folder / "skin", "--force"]):
+        done = subprocess.run([*command, *more], capture_output=True, text=True)
+        if done.returncode:
+            sys.exit(f"FAULT: track ends with {done.returncode}: {done.stderr[:500]}")
+        found = [json.loads(line)["hardness"] for line in done.stdout.splitlines()]
+        said.append([one.get("reason", one["status"]) for one in found if one])
+    if "ok" not in said[0] or "ok" in said[1] or "raised" not in said[1]:
+        sys.exit(f"FAULT: touched at rest: {said}")
+    print(f"touched at rest: {said[0].count('ok')} windows are stated without --shape, none with it")
 
 
 def check_unsure(domecast, build, frames, folder, data):

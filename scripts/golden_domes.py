@@ -70,29 +70,39 @@ def section(radius, center, n):
     return MeshTri(size * meridian(radius, center, angle / (np.pi / 2)), mesh.t), np.isclose(size, 1.0)
 
 
-def pressed(case, n):
-    radius, center, ball, young, nu, depths = case
+def stiffness(young, nu):
+    """Axisymmetric linear elasticity, of the whole body."""
     mu, lam = young / (2 * (1 + nu)), young * nu / ((1 + nu) * (1 - 2 * nu))
-    mesh, on_face = section(radius, center, n)
-    element = ElementVector(ElementTriP2())
-    basis = Basis(mesh, element, intorder=6)
 
     @BilinearForm
-    def stiffness(u, v, w):
+    def form(u, v, w):
         r, du, dv = w.x[0], grad(u), grad(v)
         shear = (du[0, 1] + du[1, 0]) * (dv[0, 1] + dv[1, 0]) / 2
         hoop = u[0] * v[0] / r**2
         inner = du[0, 0] * dv[0, 0] + du[1, 1] * dv[1, 1] + shear + hoop
         return (2 * mu * inner + lam * (trace(du) + u[0] / r) * (trace(dv) + v[0] / r)) * r * 2 * np.pi
 
-    facets = mesh.boundary_facets()
-    face = facets[on_face[mesh.facets[:, facets]].all(axis=0)]
-    skin = FacetBasis(mesh, element, facets=face, intorder=8)
+    return form
+
+
+def free_of(basis):
+    """The unknowns of a body that is bonded at z = 0 and has its axis at r = 0."""
     fixed = np.unique(np.concatenate([
         basis.get_dofs(lambda p: p[1] < 1e-9).flatten(), basis.get_dofs(lambda p: p[0] < 1e-9).all("u^1"),
     ]))
-    free = np.setdiff1d(np.arange(basis.N), fixed)
-    matrix = stiffness.assemble(basis)
+    return np.setdiff1d(np.arange(basis.N), fixed)
+
+
+def pressed(case, n):
+    radius, center, ball, young, nu, depths = case
+    mesh, on_face = section(radius, center, n)
+    element = ElementVector(ElementTriP2())
+    basis = Basis(mesh, element, intorder=6)
+    facets = mesh.boundary_facets()
+    face = facets[on_face[mesh.facets[:, facets]].all(axis=0)]
+    skin = FacetBasis(mesh, element, facets=face, intorder=8)
+    free = free_of(basis)
+    matrix = stiffness(young, nu).assemble(basis)
     k = PENALTY * young / radius
 
     # what no step changes, at each point of the surface

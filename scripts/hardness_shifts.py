@@ -194,9 +194,24 @@ def judge(model, index, video):
     return int(outputs["probability"][0].argmax())
 
 
+def contradicted(metadata, label, by_contact):
+    """Whether contact mechanics, where it has the hand's travel, says another class: then `track --travel` states none."""
+    if by_contact["status"] not in ("ok", "saturated"):
+        return False
+    off = [abs(np.log10(each["youngs_modulus_mpa"]) - by_contact["log10_youngs_modulus_mpa"]) for each in metadata["classes"]]
+    return off[label] > min(off)
+
+
 def opened(model):
     session = onnxruntime.InferenceSession(str(model), providers=["CPUExecutionProvider"])
     return session, json.loads(session.get_modelmeta().custom_metadata_map["domecast_hardness"])
+
+
+KINDS = ("right", "wrong", "unsure")
+
+
+def kind_of(found, video):
+    return "unsure" if found is None else "right" if found == video.label["label"] else "wrong"
 
 
 def unsure_of(folder, file):
@@ -205,12 +220,16 @@ def unsure_of(folder, file):
     return sum(judge(model, index, video) is None for index, video in videos_of(folder, "test"))
 
 
-def said(folder, file, shifts):
-    """Of the test's videos in each of `shifts`: right, wrong, unsure."""
+def said(folder, file, shifts, by_contact):
+    """Of the test's videos in each of `shifts`: right, wrong, unsure; and the same where contact mechanics (`by_contact`, the lines of
+    `domecast hardness` by key) has a say."""
     model = opened(file)
-    rows = {name: {"right": 0, "wrong": 0, "unsure": 0} for name in shifts}
+    rows = {name: {kind: 0 for kind in (*KINDS, *(f"{kind}_beside" for kind in KINDS))} for name in shifts}
     for index, video in videos_of(folder, "test"):
         for name, shift in shifts.items():
             found = judge(model, index, shift(index, video))
-            rows[name]["unsure" if found is None else "right" if found == video.label["label"] else "wrong"] += 1
+            rows[name][kind_of(found, video)] += 1
+            if found is not None and contradicted(model[1], found, by_contact[video.label["key"]]):
+                found = None
+            rows[name][f"{kind_of(found, video)}_beside"] += 1
     return rows

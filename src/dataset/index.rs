@@ -113,6 +113,7 @@ impl Dataset {
             "label_range_mpa": spec.hardness.young_mpa,
             "dome": {
                 "radius_mm": self.design.sections().dome.radius_mm,
+                "center_z_mm": self.design.sections().dome.shape().center_mm().z,
                 "youngs_modulus_mpa": elastomer.young_modulus_mpa,
                 "poisson": elastomer.poisson_ratio,
                 "reference_mm": reference_mm(&self.design)?,

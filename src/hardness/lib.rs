@@ -7,6 +7,7 @@
 //! `readings` `[window, count]`; outputs are `probability` `[1, classes]`, `log10_e` `[1, 2]` (mean, and ln of the deviation, of
 //! log10 of the modulus in MPa) and `novelty` `[1, n]` (squared distances from what was trained with).
 
+mod approach;
 mod compile;
 mod error;
 mod graph;
@@ -18,11 +19,13 @@ mod onnx_read;
 mod onnx_write;
 pub mod physics;
 mod picture;
+mod press;
 mod protobuf;
 mod reader;
 mod settings;
 #[cfg(test)]
 mod tests;
+pub mod touch;
 
 pub use error::ModelError;
 pub use graph::{Attribute, Constant, Graph, GraphNode, Port, Values};

@@ -23,94 +23,40 @@
 //!
 //! Where the hand's travel is not known there is no `d`, and force and contact alone leave E* over the object's curvature only: then the
 //! answer is the whole range. An object much harder than the dome leaves E* as that of the dome: then the interval reaches to the
-//! end of the range.
+//! end of the range. An approach that no object of the range has is named: the hand's travel is not what it is taken for.
 //!
 //! # Example
 //! ```
 //! use domecast_hardness::physics::{Dome, HardnessStatus, PressRow, Prior, hardness};
 //!
-//! let dome = Dome { radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, at_mm: glam::DVec3::ZERO };
-//! let prior = Prior { young_mpa: [0.05, 5.0], poisson: 0.47, travel_sd_mm: 0.02 };
+//! let at_mm = glam::DVec3::ZERO;
+//! let dome = Dome { radius_mm: 10.0, center_mm: at_mm, young_mpa: 0.56, young_sd_mpa: 0.0, poisson: 0.49, at_mm };
+//! let prior = Prior { young_mpa: [0.05, 5.0], poisson: 0.47, travel_sd_mm: 0.02, force_sd_part: 0.0 };
 //! // nothing was touched in these frames: the whole range is the answer
 //! let found = hardness(&[PressRow::default(); 10], &dome, &prior);
 //! assert_eq!(found.status, HardnessStatus::NotMeasured);
 //! assert!(found.interval[1] - found.interval[0] > 1.7);
 //! ```
 
-use glam::DVec3;
 use serde_json::Value;
 
-/// What the bonded base holds back, in F / (E* R): the middle of what finite elements give for a hemisphere of Poisson's ratio 0.49
-/// (`domecast-contact`, closed forms: 0.31 to 0.38).
-const HELD: f64 = 0.33;
+use crate::approach::{Pressed, pressed, yields};
+pub use crate::press::{Dome, PressRow, READINGS};
+
 /// Share of the approach that the formula leaves open, as one standard deviation of its logarithm: shapes that are not round, friction, the dome's
 /// curvature and its modulus, and the contact's radius as it is read. On the shipped sets' training shapes 0.10 holds nine of ten; others differ
 /// from them.
 const MODEL_PART: f64 = 0.12;
-/// A frame is in contact where its force is above this.
-const MIN_FORCE_N: f64 = 0.02;
 /// A rigid object is not ruled out where the yield is above the dome's own by less than so many standard deviations: 5 of 100.
 const RIGID_SD: f64 = 1.645;
+/// What is read is none of the range's where it is beyond its ends by so many standard deviations.
+const IMPOSSIBLE_SD: f64 = 3.0;
 /// Places of the range at which the hardness is weighed.
 const PLACES: usize = 801;
-/// Powers of the force by which a contact's radius grows, before it is read: of a ball, and how far others are from it.
-const USUAL_POWER: [f64; 2] = [1.0 / 3.0, 0.15];
-/// From a flat end to a cone.
-const POWERS: [f64; 2] = [0.0, 0.5];
-/// Noise of a contact's radius as it is read, mm: what sets have it with.
-const RADIUS_SD_MM: f64 = 0.05;
 /// Two classes may be of any modulus within this factor of theirs.
 const BEYOND_CLASSES: f64 = 3.0;
 /// Noise of a hand's travel where a set says none, mm.
 const USUAL_TRAVEL_SD_MM: f64 = 0.02;
-
-/// The readings of a frame that the formula needs, in the order of a [`PressRow`], by their names in data sets.
-pub const READINGS: [&str; 14] = [
-    "fx_n",
-    "fy_n",
-    "fz_n",
-    "mx_nmm",
-    "my_nmm",
-    "mz_nmm",
-    "tx_mm",
-    "ty_mm",
-    "tz_mm",
-    "rx_rad",
-    "ry_rad",
-    "rz_rad",
-    "robot_travel_mm",
-    "contact_radius_mm",
-];
-
-/// The readings of a frame: wrench, displacement of the platform, travel of the hand, radius of the contact.
-pub type PressRow = [f64; READINGS.len()];
-
-/// The dome that feels.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dome {
-    /// Radius, mm.
-    pub radius_mm: f64,
-    /// Young's modulus, MPa.
-    pub young_mpa: f64,
-    /// Poisson's ratio.
-    pub poisson: f64,
-    /// Point about which wrench and displacement are stated, mm.
-    pub at_mm: DVec3,
-}
-
-impl Dome {
-    /// The nominal dome of a data set by its `dataset.json`; `None` where a number is missing.
-    pub fn of_set(index: &Value) -> Option<Self> {
-        let number = |path: &str| index.pointer(path).and_then(Value::as_f64);
-        let at = |k: usize| number(&format!("/dome/reference_mm/{k}"));
-        Some(Self {
-            radius_mm: number("/dome/radius_mm")?,
-            young_mpa: number("/dome/youngs_modulus_mpa")?,
-            poisson: number("/dome/poisson")?,
-            at_mm: DVec3::new(at(0)?, at(1)?, at(2)?),
-        })
-    }
-}
 
 /// What is known before anything is felt.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,6 +67,8 @@ pub struct Prior {
     pub poisson: f64,
     /// Noise of the hand's travel, mm.
     pub travel_sd_mm: f64,
+    /// Standard deviation of the forces' scale, as a part of them; of a data set 0, as for [`Dome::young_sd_mpa`].
+    pub force_sd_part: f64,
 }
 
 impl Prior {
@@ -138,7 +86,7 @@ impl Prior {
                 [one.min(other) / BEYOND_CLASSES, one.max(other) * BEYOND_CLASSES]
             }
         };
-        Some(Self { young_mpa, poisson, travel_sd_mm })
+        Some(Self { young_mpa, poisson, travel_sd_mm, force_sd_part: 0.0 })
     }
 }
 
@@ -149,6 +97,9 @@ pub enum HardnessStatus {
     Ok,
     /// The object is too hard for this dome: a rigid one may feel the same. The interval reaches to the range's end.
     Saturated,
+    /// No object of the range gives way by so little or by so much: the travel is of another sign, unit or moment, something slipped, or
+    /// dome and springs are not as they are taken to be. The numbers are the range's nearest.
+    Impossible,
     /// Nothing touched for long enough, or a number is missing: the interval is the range.
     NotMeasured,
 }
@@ -159,6 +110,7 @@ impl HardnessStatus {
         match self {
             Self::Ok => "ok",
             Self::Saturated => "saturated",
+            Self::Impossible => "impossible",
             Self::NotMeasured => "not_measured",
         }
     }
@@ -175,13 +127,6 @@ pub struct Hardness {
     pub status: HardnessStatus,
 }
 
-/// A frame in contact.
-struct Pressed {
-    force_n: f64,
-    depth_mm: f64,
-    radius_mm: f64,
-}
-
 /// Hardness of what is pressed on in the frames of a video.
 pub fn hardness(rows: &[PressRow], dome: &Dome, prior: &Prior) -> Hardness {
     let places = log_places(prior);
@@ -196,19 +141,34 @@ pub fn hardness(rows: &[PressRow], dome: &Dome, prior: &Prior) -> Hardness {
         };
     };
     let own = (1.0 - dome.poisson * dome.poisson) / dome.young_mpa;
+    let as_read = yields;
     // What yields less than the dome itself says no more than that the object is hard: the rest is noise, or the formula's.
     let yields = yields.max(own * (-2.0 * MODEL_PART).exp());
-    let spread = MODEL_PART.hypot(sd / yields);
+    // what the dome's own modulus leaves open counts by its share of the yield
+    let spread = |share: f64| {
+        let own_part = share * dome.young_sd_mpa / dome.young_mpa;
+        MODEL_PART.hypot(sd / yields).hypot(prior.force_sd_part).hypot(own_part)
+    };
+    let with_object = |log10: f64| own + (1.0 - prior.poisson * prior.poisson) / 10_f64.powf(log10);
     let log_likelihood = |log10: &f64| {
-        let object = (1.0 - prior.poisson * prior.poisson) / 10_f64.powf(*log10);
-        -0.5 * ((yields / (own + object)).ln() / spread).powi(2)
+        let total = with_object(*log10);
+        let spread = spread(own / total);
+        -0.5 * ((yields / total).ln() / spread).powi(2) - spread.ln()
     };
     let logs: Vec<f64> = places.iter().map(log_likelihood).collect();
     let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = logs.iter().map(|log| (log - top).exp()).collect();
     let [low, log10_young, high] = quantiles(&places, &weights, [0.05, 0.5, 0.95]);
-    let rigid = (yields / own).ln() < RIGID_SD * spread;
-    let status = if rigid { HardnessStatus::Saturated } else { HardnessStatus::Ok };
+    let softest = with_object(places[0]);
+    let too_little = as_read < own * (-IMPOSSIBLE_SD * spread(1.0)).exp();
+    let too_much = yields > softest * (IMPOSSIBLE_SD * spread(own / softest)).exp();
+    let status = if too_little || too_much {
+        HardnessStatus::Impossible
+    } else if (yields / own).ln() < RIGID_SD * spread(1.0) {
+        HardnessStatus::Saturated
+    } else {
+        HardnessStatus::Ok
+    };
     Hardness { log10_young, interval: [low, high], status }
 }
 
@@ -231,73 +191,23 @@ fn quantiles<const N: usize>(places: &[f64], weights: &[f64], parts: [f64; N]) -
     })
 }
 
-/// Force, approach and contact's radius of a frame; `None` where nothing touches or a number is missing.
-fn pressed(row: &PressRow, dome: &Dome) -> Option<Pressed> {
-    let vector = |at: usize| DVec3::new(row[at], row[at + 1], row[at + 2]);
-    let (force, moment, shift, turn) = (vector(0), vector(3), vector(6), vector(9));
-    let [travel_mm, radius_mm] = [row[12], row[13]];
-    let force_n = force.length();
-    let known = force_n > MIN_FORCE_N && travel_mm.is_finite() && radius_mm > 0.0;
-    if !(known && moment.is_finite() && shift.is_finite() && turn.is_finite()) {
-        return None;
-    }
-    // The force's line: its nearest point to where moments are about, and from there back to the dome.
-    let way = force / force_n;
-    let near = dome.at_mm + force.cross(moment) / (force_n * force_n);
-    let behind = near.dot(way);
-    let room = behind * behind - near.length_squared() + dome.radius_mm * dome.radius_mm;
-    let at_mm = near - way * (behind + room.max(0.0).sqrt());
-    let platform = shift + turn.cross(at_mm - dome.at_mm);
-    Some(Pressed { force_n, depth_mm: travel_mm - platform.dot(way), radius_mm })
-}
-
-/// 1/E* and its standard deviation by noise: the slope of the approach over the integral of 1/(2 a) - HELD/R over the force.
-fn yields(frames: &[Pressed], dome: &Dome, travel_sd_mm: f64) -> Option<(f64, f64)> {
-    let count = frames.len() as f64;
-    if frames.len() < 3 {
-        return None;
-    }
-    let (scale, power) = growth(frames);
-    let integral = |frame: &Pressed| {
-        frame.force_n.powf(1.0 - power) / ((1.0 - power) * 2.0 * scale)
-            - HELD * frame.force_n / dome.radius_mm
-    };
-    let points: Vec<(f64, f64)> = frames.iter().map(|frame| (integral(frame), frame.depth_mm)).collect();
-    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
-    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    let xx: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
-    let xy: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
-    let slope = xy / xx;
-    let left: f64 = points.iter().map(|p| (p.1 - y - slope * (p.0 - x)).powi(2)).sum();
-    // what the line leaves counts where it is more than the noise
-    let sd_mm = travel_sd_mm.max((left / (count - 2.0)).sqrt());
-    let sd = sd_mm / xx.sqrt();
-    (slope.is_finite() && sd.is_finite()).then_some((slope, sd))
-}
-
-/// Radius of the contact, `a = scale F^power`, from the radii by the pressure's moments.
-fn growth(frames: &[Pressed]) -> (f64, f64) {
-    // a radius is read to a part of a millimetre, its logarithm the better the larger it is
-    let weight = |frame: &Pressed| (frame.radius_mm / RADIUS_SD_MM).powi(2);
-    let all: f64 = frames.iter().map(weight).sum();
-    let mean = |of: &dyn Fn(&Pressed) -> f64| frames.iter().map(|f| weight(f) * of(f)).sum::<f64>() / all;
-    let (force, radius) = (mean(&|f| f.force_n.ln()), mean(&|f| f.radius_mm.ln()));
-    let [usual, sd] = USUAL_POWER;
-    let known = 1.0 / (sd * sd);
-    let along = all * mean(&|f| (f.force_n.ln() - force) * (f.radius_mm.ln() - radius));
-    let square = all * mean(&|f| (f.force_n.ln() - force).powi(2));
-    let [low, high] = POWERS;
-    let power = ((along + known * usual) / (square + known)).clamp(low, high);
-    ((radius - power * force).exp() * (0.6 * (1.0 + 2.0 * power)).sqrt(), power)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
-    const DOME: Dome =
-        Dome { radius_mm: 10.0, young_mpa: 0.56, poisson: 0.49, at_mm: DVec3::new(0.0, 0.0, -10.0) };
-    const PRIOR: Prior = Prior { young_mpa: [0.01, 10.0], poisson: 0.47, travel_sd_mm: 0.005 };
+    use crate::approach::HELD;
+
+    const DOME: Dome = Dome {
+        radius_mm: 10.0,
+        center_mm: DVec3::ZERO,
+        young_mpa: 0.56,
+        young_sd_mpa: 0.0,
+        poisson: 0.49,
+        at_mm: DVec3::new(0.0, 0.0, -10.0),
+    };
+    const PRIOR: Prior =
+        Prior { young_mpa: [0.01, 10.0], poisson: 0.47, travel_sd_mm: 0.005, force_sd_part: 0.0 };
 
     /// A frame on the pole of a dome on springs of 8.4 N/mm.
     fn pressed_by(force_n: f64, depth_mm: f64, radius_mm: f64) -> PressRow {
@@ -343,8 +253,14 @@ mod tests {
         let mut harder = ball(2e5, 8.0);
         harder.iter_mut().for_each(|row| row[12] = 3.0 - 0.2 * row[12]);
         let harder = hardness(&harder, &DOME, &PRIOR);
-        assert_eq!(harder.status, HardnessStatus::Saturated, "{harder:?}");
+        assert_eq!(harder.status, HardnessStatus::Impossible, "{harder:?}");
         assert!(harder.interval[1] > 0.8 && harder.interval[0] > 0.0, "{harder:?}");
+        // another sign, metres, micrometres: what yields less than the dome, or more than any foam
+        for unit in [-1.0, 1e-3, 1e3] {
+            let mut other = ball(1.0, 8.0);
+            other.iter_mut().for_each(|row| row[12] *= unit);
+            assert_eq!(hardness(&other, &DOME, &PRIOR).status, HardnessStatus::Impossible, "{unit}");
+        }
         let mut still = ball(1.0, 8.0);
         still.iter_mut().for_each(|row| row[12] = f64::NAN);
         let nothing = hardness(&still, &DOME, &PRIOR);

@@ -6,6 +6,7 @@ use crate::error::ModelError;
 use crate::metadata::{Class, Metadata};
 use crate::network::Network;
 use crate::onnx_read::read_onnx;
+use crate::physics::Hardness;
 use crate::picture::{FrameView, Shrinker, rest_profile};
 
 /// Bytes of a model's file at most.
@@ -194,6 +195,19 @@ impl HardnessReader {
     /// A class of [`HardnessEstimate::class`].
     pub fn class(&self, class: usize) -> Option<&Class> {
         self.metadata.classes.get(class)
+    }
+
+    /// Whether contact mechanics says something else than the network: a modulus out of its interval where the model states one, else
+    /// another class.
+    pub fn contradicts(&self, found: &HardnessEstimate, by_contact: &Hardness) -> bool {
+        if self.states_modulus() {
+            let [low, high] = by_contact.interval;
+            return found.interval[1] < low || high < found.interval[0];
+        }
+        let off = |class: &Class| Some((class.youngs_modulus_mpa?.log10() - by_contact.log10_young).abs());
+        let others = self.metadata.classes.iter().filter_map(off);
+        let nearest = others.fold(f64::INFINITY, f64::min);
+        self.class(found.class).and_then(off).is_some_and(|own| own > nearest)
     }
 
     /// Why nothing is stated, in words.

@@ -1,8 +1,9 @@
 //! A small model of every kind of node: what it refuses, when it is unsure, that it allocates nothing.
 
+use crate::physics::{Hardness, HardnessStatus};
 use crate::{
-    Attribute, Class, FrameView, Graph, HardnessReader, Metadata, ModelReading, Network, Port, REST_NUMBERS,
-    Unsure, read_onnx, rest_profile, write_onnx,
+    Attribute, Class, FrameView, Graph, HardnessEstimate, HardnessReader, Metadata, ModelReading, Network,
+    Port, REST_NUMBERS, Unsure, read_onnx, rest_profile, write_onnx,
 };
 
 const WINDOW: usize = 4;
@@ -82,7 +83,9 @@ fn model_of(interval_quantile: f64) -> Vec<u8> {
     let profile = rest_profile(&levels, [SIDE, SIDE]);
     let metadata = Metadata {
         version: 1,
-        classes: ["soft", "hard"].map(|name| Class { name: name.into(), youngs_modulus_mpa: None }).to_vec(),
+        classes: [("soft", 0.1), ("hard", 1.0)]
+            .map(|(name, mpa)| Class { name: name.into(), youngs_modulus_mpa: Some(mpa) })
+            .to_vec(),
         readings: vec![
             reading("fx_n", [-0.2, 0.2]),
             reading("fz_n", [-1.5, -0.4]),
@@ -171,6 +174,40 @@ fn a_class_that_is_no_more_than_a_guess_is_not_stated_alone() {
     assert!(reader.set_rest(&view(&frame(100))) && !reader.states_modulus());
     assert_eq!(stated(&mut reader, 110, &TOUCH), Some(Err(Unsure::Undecided)));
     assert_eq!(reader.reason(Unsure::Undecided), "undecided");
+}
+
+#[test]
+fn contact_mechanics_has_a_say_where_it_says_something_else() {
+    let of = |log10_young: f64| Hardness {
+        log10_young,
+        interval: [log10_young - 0.1, log10_young + 0.1],
+        status: HardnessStatus::Ok,
+    };
+    let found = |class, interval: [f64; 2]| HardnessEstimate {
+        class,
+        probability: 0.95,
+        log10_e_mpa: 0.5 * (interval[0] + interval[1]),
+        interval,
+    };
+    // a modulus: where the intervals have nothing in common
+    let moduli = HardnessReader::new(&model()).expect("a model");
+    for (interval, contradicts) in
+        [([-0.6, -0.3], false), ([-0.35, 0.0], false), ([-0.2, 0.0], true), ([-0.9, -0.7], true)]
+    {
+        assert_eq!(moduli.contradicts(&found(0, interval), &of(-0.4)), contradicts, "{interval:?}");
+    }
+    // classes alone: the nearest one
+    let classes = HardnessReader::new(&model_of(0.0)).expect("a model");
+    for (class, log10_young, contradicts) in [
+        (0, -1.5, false),
+        (0, -0.51, false),
+        (0, -0.49, true),
+        (1, -0.49, false),
+        (1, 0.9, false),
+        (1, -0.9, true),
+    ] {
+        assert_eq!(classes.contradicts(&found(class, [0.0; 2]), &of(log10_young)), contradicts, "{class}");
+    }
 }
 
 #[test]

@@ -76,6 +76,14 @@ pub struct TrackArguments {
     /// The model sees each so many-th frame: its window should last about as long as the videos that it was trained with.
     #[arg(long, requires = "hardness", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..), value_name = "N")]
     pub hardness_every: u64,
+    /// How far the hand has moved towards what it presses, or that towards the sensor: a file (or a pipe) with mm, a line a frame, from
+    /// anywhere. With it each line states `contact_hardness`: Young's modulus of what is touched by contact mechanics, with its 90 %
+    /// interval, over the frames of the touch so far.
+    #[arg(long, requires_all = ["rest", "traction", "shape"], value_name = "FILE")]
+    pub travel: Option<PathBuf>,
+    /// Standard deviation of that travel, mm: of encoders and wrist.
+    #[arg(long, requires = "travel", default_value_t = 0.02, value_parser = deviation, value_name = "MM")]
+    pub travel_sd: f64,
     /// A frame of the untouched sensor, which shape, forces on the skin and hardness are read against.
     #[arg(long, requires = "read_against_rest", value_name = "FRAME")]
     pub rest: Option<PathBuf>,
@@ -101,6 +109,11 @@ pub struct TrackArguments {
     no_blur: bool,
     #[arg(long, hide = true)]
     open: bool,
+}
+
+fn deviation(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|v: &f64| (1e-6..=10.0).contains(v));
+    number.ok_or_else(|| "a number of mm from 1e-6 to 10".into())
 }
 
 /// A field by its name.

@@ -10,7 +10,9 @@ use super::rest_frame::RestFrame;
 use crate::commands::input::input_fault;
 use crate::commands::output::Failure;
 use domecast_dataset::{COLUMNS, DOT_COLUMNS, RIGID_COLUMNS, SeenDot, TrackedRest, dots_features};
+use domecast_hardness::physics::Hardness;
 use domecast_hardness::{FrameView, HardnessEstimate, HardnessReader, Unsure};
+use domecast_runtime::shape::ShapeMap;
 use domecast_runtime::track::{CameraFrame, Tracked};
 
 /// A model, and which of the frames it sees.
@@ -23,6 +25,8 @@ pub(super) struct HardnessLines {
     every: u64,
     readings: Vec<f64>,
     seen: Vec<Option<SeenDot>>,
+    /// A frame's skin lay above its shape at rest: what is counted from the frame at rest is wrong.
+    is_rest_touched: bool,
 }
 
 fn columns(model: &Path, reader: &HardnessReader) -> Result<Vec<usize>, Failure> {
@@ -82,7 +86,7 @@ impl HardnessLines {
         }
         let (every, height_px) = (arguments.hardness_every, frame.height() as f64);
         let (readings, seen) = (Vec::new(), Vec::new());
-        Ok(Some(Self { reader, columns, rest, height_px, every, readings, seen }))
+        Ok(Some(Self { reader, columns, rest, height_px, every, readings, seen, is_rest_touched: false }))
     }
 
     /// The frame's numbers as the data sets have them: less those at rest.
@@ -100,7 +104,14 @@ impl HardnessLines {
     }
 
     /// Takes the frame in; what its line says of hardness, or nothing of a frame that the model does not look at.
-    pub(super) fn member(&mut self, frame: Option<&CameraFrame<'_>>, tracked: &Tracked) -> Option<Value> {
+    pub(super) fn member(
+        &mut self,
+        frame: Option<&CameraFrame<'_>>,
+        tracked: &Tracked,
+        skin: Option<&ShapeMap>,
+        by_contact: Option<&Hardness>,
+    ) -> Option<Value> {
+        self.is_rest_touched |= skin.is_some_and(|map| map.is_raised);
         if !tracked.frame.is_multiple_of(self.every) {
             return None;
         }
@@ -111,11 +122,22 @@ impl HardnessLines {
         }
         self.read(tracked);
         let found = self.reader.push(whole.as_ref(), &self.readings);
-        Some(found.map_or(Value::Null, |found| self.stated(found)))
+        Some(found.map_or(Value::Null, |found| self.stated(found, by_contact)))
     }
 
-    fn stated(&self, found: Result<HardnessEstimate, Unsure>) -> Value {
+    fn stated(&self, found: Result<HardnessEstimate, Unsure>, by_contact: Option<&Hardness>) -> Value {
+        let unsure = |reason: &str| {
+            json!({
+                "status": "unsure",
+                "reason": reason,
+                "class": null, "probability": null, "log10_youngs_modulus_mpa": null, "interval_90": null,
+            })
+        };
         match found {
+            Ok(_) if self.is_rest_touched => unsure("raised"),
+            Ok(found) if by_contact.is_some_and(|other| self.reader.contradicts(&found, other)) => {
+                unsure("contradicts_contact_mechanics")
+            }
             Ok(found) => {
                 let modulus = self.reader.states_modulus();
                 json!({
@@ -126,11 +148,7 @@ impl HardnessLines {
                     "interval_90": modulus.then_some(found.interval),
                 })
             }
-            Err(unsure) => json!({
-                "status": "unsure",
-                "reason": self.reader.reason(unsure),
-                "class": null, "probability": null, "log10_youngs_modulus_mpa": null, "interval_90": null,
-            }),
+            Err(why) => unsure(&self.reader.reason(why)),
         }
     }
 }

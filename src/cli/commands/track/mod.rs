@@ -2,14 +2,15 @@
 
 mod arguments;
 mod colours;
+mod contact_hardness;
 mod hardness;
+mod number_lines;
 mod pictures;
 mod rest_frame;
 mod results;
 mod shape;
 mod source;
 mod tally;
-mod times;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -21,11 +22,11 @@ use domecast_live::decode::Picture;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{CameraFrame, CameraTurn, Tracker};
 use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
+use number_lines::NumberLines;
 use rest_frame::RestFrame;
 use results::Results;
 use source::FrameSource;
 use tally::Tally;
-use times::FrameTimes;
 
 pub use arguments::{TrackArguments, field};
 pub use shape::shape_members;
@@ -65,7 +66,7 @@ fn warn_without_key(output: &Output, arguments: &TrackArguments, constants: &Con
 /// The files that are read: none may be written.
 fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
     let named = arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times);
-    let named = named.chain(&arguments.rest).chain(&arguments.hardness);
+    let named = named.chain(&arguments.rest).chain(&arguments.hardness).chain(&arguments.travel);
     named.map(PathBuf::as_path).collect()
 }
 
@@ -119,7 +120,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     let mut results = Results::open(output, arguments, &rules, &constants, &tracker, rest.as_ref())?;
     let mut forces = forces_of(arguments, &constants, rest.as_ref())?;
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
-    let mut times = FrameTimes::open(arguments.times.as_deref())?;
+    let mut times = NumberLines::open(arguments.times.as_deref(), "seconds")?;
     results.begin(arguments)?;
     let mut tally = Tally::new(arguments.tracker.has_reference(), rest.as_ref().map(|rest| &rest.tracked));
     warn_without_key(output, arguments, &constants);
@@ -135,7 +136,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         }
         output.step(&format!("frame {}", next.number));
         let picture = frame_of(&next.picture);
-        if let Some(time_s) = times.next_s()? {
+        if let Some(time_s) = times.read_next()? {
             tracker.stamp(time_s);
         }
         let began = Instant::now();

@@ -7,6 +7,7 @@ use glam::DVec3;
 use serde_json::Value;
 
 use super::arguments::{Format, TrackArguments};
+use super::contact_hardness::ContactHardness;
 use super::hardness::HardnessLines;
 use super::pictures::Pictures;
 use super::rest_frame::RestFrame;
@@ -93,6 +94,7 @@ pub(super) struct Results {
     sink: Sink,
     pictures: Pictures,
     shape: Option<ShapeFiles>,
+    contact_hardness: Option<ContactHardness>,
     hardness: Option<HardnessLines>,
     page: Option<(StagedFile, TrackReport)>,
     recording: Option<Recording>,
@@ -113,6 +115,7 @@ impl Results {
         let at_mm = tracker.springs().map_or(DVec3::ZERO, Springs::at_mm);
         let pictures = Pictures::new(arguments, rules, constants, tracker)?;
         let shape = ShapeFiles::open(output, arguments, rules, constants, tracker, rest)?;
+        let contact_hardness = ContactHardness::open(arguments, constants, rest, at_mm)?;
         let hardness = HardnessLines::open(arguments, rest, at_mm)?;
         let sink = Sink::new(arguments.out.as_deref(), rules)?;
         let page = match &arguments.report {
@@ -127,7 +130,17 @@ impl Results {
         let pace = RecordingPace::WithFrames;
         let begin = |path: &PathBuf| Recording::begin(output, path, "track", rules, constants, tracker, pace);
         let recording = arguments.mcap.as_ref().map(begin).transpose()?;
-        Ok(Self { sink, pictures, shape, hardness, page, recording, at_mm, line: Vec::new() })
+        Ok(Self {
+            sink,
+            pictures,
+            shape,
+            contact_hardness,
+            hardness,
+            page,
+            recording,
+            at_mm,
+            line: Vec::new(),
+        })
     }
 
     /// Writes what stands before the lines.
@@ -162,11 +175,18 @@ impl Results {
             let line = (arguments.format == Format::Jsonl).then_some(&mut self.line);
             shape.write(number, line, forces.as_deref_mut())?;
         }
-        if let Some(member) = self.hardness.as_mut().and_then(|lines| lines.member(frame, tracked)) {
+        let skin = frame.and(self.shape.as_ref()).map(ShapeFiles::map);
+        if let (Some(touch), Some(forces)) = (&mut self.contact_hardness, forces.as_deref()) {
+            let member = touch.member(tracked, forces.result(), skin)?;
+            add_member(&mut self.line, "contact_hardness", &member);
+        }
+        let by_contact = self.contact_hardness.as_ref().and_then(ContactHardness::last);
+        if let Some(lines) = &mut self.hardness
+            && let Some(member) = lines.member(frame, tracked, skin, by_contact)
+        {
             add_member(&mut self.line, "hardness", &member);
         }
         self.sink.put(&self.line)?;
-        let skin = frame.and(self.shape.as_ref()).map(ShapeFiles::map);
         if let Some(frame) = frame {
             let dots = forces.as_deref().map_or(&[][..], |forces| &forces.result().dots);
             let tractions: Vec<_> = dots.iter().map(|dot| (dot.surface_mm, dot.traction_n_mm2)).collect();
@@ -185,6 +205,9 @@ impl Results {
     pub fn end(self, output: &Output) -> Result<(), Failure> {
         self.sink.end(output)?;
         self.pictures.end(output)?;
+        if let Some(touch) = self.contact_hardness {
+            touch.warn(output);
+        }
         if let Some(shape) = self.shape {
             shape.end(output)?;
         }

@@ -22,8 +22,10 @@ from scipy.spatial.transform import Rotation
 
 ROOT = Path(__file__).resolve().parent.parent
 DESIGNS = ("thumb24", "picam-r20", "digit-rigid")
+ELEMENTS = 20
 FRAMES, NOISE, TRAVEL_SD_MM = 12, 1.0, 0.02
-RANGE_MPA, OWN_MPA = (0.05, 5.0), 0.56
+# Below half of the dome's modulus log E is well known; above, yields are nearly the dome's own, and the interval alone is judged.
+RANGE_MPA, SOFT_MPA = (0.05, 5.0), 0.28
 # between soft and hard, as the shipped sets have them (0.07 and 0.9 MPa)
 BORDER_MPA = 0.25
 # A cap's coarse elements are stiff, and its thin base is taken off the object's yield by the simulator as well.
@@ -194,7 +196,7 @@ class Bench:
         as_built(self.design, rng, sensor)
         kind, solid, moved = press(rng, self.dome, young, 0.1 * np.arange(FRAMES))
         leds = {"level_per_mw_mm2": self.grey, "stray_level": 0.005, "crosstalk": 0.08, "why": "choice: as lit.json"}
-        level = {"level": "linear", "element_mm": self.dome["radius"] / 20} if self.level == "linear" else {"level": self.level}
+        level = {"level": "linear", "element_mm": self.dome["radius"] / ELEMENTS} if self.level == "linear" else {"level": self.level}
         scene = {"version": 1, "name": name, "design": str(sensor), "frames": {"count": FRAMES, "rate_hz": 10},
                  "tolerance": {"px": 0.02, "grey": 4}, "contact": level, "objects": [solid], "light": {"surround_level": 0.02, "leds": leds}}
         file, frames = self.place / f"{name}.json", self.place / name
@@ -212,6 +214,7 @@ class Bench:
         said = [line["contact_hardness"] for line in lines]
         ok = said[0] is None and all((one is None) == (line["contact"] is None) for one, line in zip(said, lines) if line["status"] == "ok")
         check(ok, f"{name}: hardness is stated where something touches, and nowhere else")
+        check(not any(one and one["status"] == "impossible" for one in said), f"{name}: no frame of the press is called impossible")
         last, other = said[-1], second_opinion(lines, np.loadtxt(travel), lines[0], self.constants)
         if last is None or last["status"] == "not_measured":
             check(other is None or last is None, f"{name}: nothing is measured where the second opinion has nothing either")
@@ -275,12 +278,12 @@ def main():
                     continue
                 (median, low, high), status = found
                 held, measured = held + (low <= np.log10(young) <= high), measured + 1
-                if young < OWN_MPA:
+                if young < SOFT_MPA:
                     off.append(median - np.log10(young))
                 if not BORDER_MPA / 2 < young < 2 * BORDER_MPA:
                     check((median > np.log10(BORDER_MPA)) == (young > BORDER_MPA), f"{design}-{number}: soft or hard")
             rms = float(np.sqrt(np.mean(np.square(off)))) if off else 0.0
-            check(rms < MAX_RMS[design], f"{design}: log10 E of {len(off)} objects softer than the dome is {rms:.3f} of a decade rms off, "
+            check(rms < MAX_RMS[design], f"{design}: log10 E of {len(off)} objects softer than half of the dome is {rms:.3f} of a decade rms off, "
                   f"{np.mean(off) if off else 0.0:+.3f} in the mean")
             if design == "thumb24":
                 judge_touches(bench)

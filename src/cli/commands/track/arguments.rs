@@ -76,9 +76,9 @@ pub struct TrackArguments {
     /// The model sees each so many-th frame: its window should last about as long as the videos that it was trained with.
     #[arg(long, requires = "hardness", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..), value_name = "N")]
     pub hardness_every: u64,
-    /// How far the hand has moved towards what it presses, or that towards the sensor: a file (or a pipe) with mm, a line a frame, from
-    /// anywhere. With it each line states `contact_hardness`: Young's modulus of what is touched by contact mechanics, with its 90 %
-    /// interval, over the frames of the touch so far.
+    /// How far the hand has brought sensor and object together: a file (or a pipe) with mm, a line a frame, from anywhere. With it
+    /// each line states `contact_hardness`: Young's modulus of what is touched by contact mechanics, with its 90 % interval, over the
+    /// frames of the touch so far.
     #[arg(long, requires_all = ["rest", "traction", "shape"], value_name = "FILE")]
     pub travel: Option<PathBuf>,
     /// Standard deviation of that travel, mm: of encoders and wrist.

@@ -134,7 +134,8 @@ impl ContactHardness {
     pub fn warn(&self, output: &Output) {
         if self.impossible > 0 {
             output.warn(&format!(
-                "--travel: frames in which the hand came nearer by less than a rigid object lets it, or by more than any foam: {}; is it in mm,                  growing towards the sensor, a line for each frame, of the hand and not of what slips in it?",
+                "--travel: frames in which the hand came nearer by less than a rigid object lets it, or by more than any foam: {}; is it in mm, \
+                 growing towards the sensor, a line for each frame, of the hand and not of what slips in it?",
                 self.impossible
             ));
         }

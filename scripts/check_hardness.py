@@ -248,9 +248,9 @@ def with_metadata(model, ranges, interval_quantile=1.6):
     return model.SerializeToString()
 
 
-def tracked(domecast, build, frames, rest, model):
+def tracked(domecast, build, frames, rest, model, *more):
     done = subprocess.run([domecast, "track", *frames, "--constants", build / "constants/constants.json", "--hardness", model,
-                           "--rest", rest, "--quiet"], capture_output=True, text=True)
+                           "--rest", rest, "--quiet", *more], capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"FAULT: track ends with {done.returncode}: {done.stderr[:500]}")
     return [json.loads(line) for line in done.stdout.splitlines()]
@@ -298,6 +298,7 @@ def check_track(domecast, build, folder):
     print(f"track: {states.count('ok')} windows stated, {states.count('unsure')} unsure; off by {worst:.1e} from ONNX Runtime and OpenCV")
     check_unsure(domecast, build, frames, folder, data)
     check_beside_travel(domecast, build, frames, folder, data, lines)
+    check_touched_at_rest(domecast, build, frames, folder, data)
 
 
 def sure_of(data, label):
@@ -313,29 +314,22 @@ def sure_of(data, label):
 
 def check_beside_travel(domecast, build, frames, folder, data, lines):
     """The same frames, and a hand that came as near as a soft object lets it, or as a hard one: the model's class is stated beside one of them only."""
-    constants = build / "constants/constants.json"
-    rest, shown = frames[0], frames[: WINDOW + 4]
+    rest, shown, travel = frames[0], frames[: WINDOW + 4], folder / "travel.txt"
+    # by Hertz' punch of some 3 mm on a dome of 0.56 MPa, on the springs that the lines have
+    force = np.array([np.linalg.norm(np.array(line["wrench"][:3]) - lines[0]["wrench"][:3]) for line in lines])
+    sunk = np.array([lines[0]["pose"][2][3] - line["pose"][2][3] for line in lines])
     for name in CLASSES:
         sure = sure_of(data, list(CLASSES).index(name))
         path = folder / f"sure-{name}.onnx"
         path.write_bytes(with_metadata(sure, rest_ranges(shrunk(rest)), 0.0))
         for other, young in CLASSES.items():
-            # by Hertz' punch of some 3 mm on a dome of 0.56 MPa, on the springs that the lines have
-            force = np.array([np.linalg.norm(np.array(line["wrench"][:3]) - lines[0]["wrench"][:3]) for line in lines])
-            sunk = np.array([lines[0]["pose"][2][3] - line["pose"][2][3] for line in lines])
-            travel = folder / "travel.txt"
             travel.write_text("".join(f"{mm}\n" for mm in sunk + force * 0.77 * (1 / 0.56 + 1 / young) / 6.0))
-            done = subprocess.run([domecast, "track", *shown, "--constants", constants, "--hardness", path, "--rest", rest, "--traction",
-                                   "--shape", folder / "skin", "--travel", travel, "--force", "--quiet"], capture_output=True, text=True)
-            if done.returncode:
-                sys.exit(f"FAULT: track ends with {done.returncode}: {done.stderr[:500]}")
-            last = json.loads(done.stdout.splitlines()[-1])
+            last = tracked(domecast, build, shown, rest, path, "--traction", "--shape", folder / "skin", "--travel", travel, "--force")[-1]
             found, contact = last["hardness"], last["contact_hardness"]
             wanted = ("ok", name) if name == other else ("unsure", "contradicts_contact_mechanics")
             if (found["status"], found["class"] or found["reason"]) != wanted:
                 sys.exit(f"FAULT: the model is sure that it is {name}, the travel that of a {other} object: {found}, {contact}")
     print("travel: a class that contact mechanics has otherwise is not stated")
-    check_touched_at_rest(domecast, build, frames, folder, data)
 
 
 def check_touched_at_rest(domecast, build, frames, folder, data):
@@ -343,13 +337,9 @@ def check_touched_at_rest(domecast, build, frames, folder, data):
     rest, path = frames[WINDOW], folder / "touched.onnx"
     model = sure_of(data, 0)
     path.write_bytes(with_metadata(model, rest_ranges(shrunk(rest))))
-    command = [domecast, "track", *frames, "--constants", build / "constants/constants.json", "--hardness", path, "--rest", rest, "--quiet"]
     said = []
     for more in ([], ["--shape", folder / "skin", "--force"]):
-        done = subprocess.run([*command, *more], capture_output=True, text=True)
-        if done.returncode:
-            sys.exit(f"FAULT: track ends with {done.returncode}: {done.stderr[:500]}")
-        found = [json.loads(line)["hardness"] for line in done.stdout.splitlines()]
+        found = [line["hardness"] for line in tracked(domecast, build, frames, rest, path, *more)]
         said.append([one.get("reason", one["status"]) for one in found if one])
     if "ok" not in said[0] or "ok" in said[1] or "raised" not in said[1]:
         sys.exit(f"FAULT: touched at rest: {said}")

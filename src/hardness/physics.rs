@@ -105,6 +105,11 @@ pub enum HardnessStatus {
 }
 
 impl HardnessStatus {
+    /// Whether the numbers beside it are of the object, and not of the range alone.
+    pub fn is_measured(self) -> bool {
+        matches!(self, Self::Ok | Self::Saturated)
+    }
+
     /// The name that files carry.
     pub fn as_str(self) -> &'static str {
         match self {

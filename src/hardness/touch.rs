@@ -13,10 +13,10 @@ const MAX_FRAMES: usize = 256;
 ///
 /// let at_mm = glam::DVec3::ZERO;
 /// let dome = Dome { radius_mm: 10.0, center_mm: at_mm, young_mpa: 0.56, young_sd_mpa: 0.03, poisson: 0.49, at_mm };
-/// let prior = Prior { young_mpa: [0.01, 10.0], poisson: 0.47, travel_sd_mm: 0.02, force_sd_part: 0.05 };
+/// let prior = Prior { young_mpa: [0.01, 10.0], poisson: 0.47, travel_sd_mm: 0.02, force_sd_part: 0.0 };
 /// let mut touch = TouchHardness::new(dome, prior);
 /// // one frame says nothing yet
-/// assert_eq!(touch.push(&PressRow::default()).status, HardnessStatus::NotMeasured);
+/// assert_eq!(touch.push(&PressRow::default(), 0.05).status, HardnessStatus::NotMeasured);
 /// ```
 #[derive(Debug, Clone)]
 pub struct TouchHardness {
@@ -34,11 +34,6 @@ impl TouchHardness {
         Self { dome, prior, rows: Vec::with_capacity(MAX_FRAMES + 1), every: 1, frames: 0 }
     }
 
-    /// How unsure the forces' scale is, as a part of them: as the last frame has it.
-    pub fn set_force_sd_part(&mut self, part: f64) {
-        self.prior.force_sd_part = part;
-    }
-
     /// Nothing touches: what comes is another touch.
     pub fn end(&mut self) {
         self.rows.clear();
@@ -50,11 +45,12 @@ impl TouchHardness {
         self.frames
     }
 
-    /// Takes a frame of the touch in; what all of them say. A row with numbers that are not finite says nothing.
-    pub fn push(&mut self, row: &PressRow) -> Hardness {
+    /// Takes a frame of the touch in, with the standard deviation of its forces' scale as a part of them ([`Prior::force_sd_part`]); what
+    /// all frames say. A row with numbers that are not finite says nothing.
+    pub fn push(&mut self, row: &PressRow, force_sd_part: f64) -> Hardness {
         self.rows.push(*row);
         // the newest frame is looked at in any case
-        let found = hardness(&self.rows, &self.dome, &self.prior);
+        let found = hardness(&self.rows, &self.dome, &Prior { force_sd_part, ..self.prior });
         if !self.frames.is_multiple_of(self.every) {
             self.rows.pop();
         } else if self.rows.len() > MAX_FRAMES {

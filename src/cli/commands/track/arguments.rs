@@ -1,6 +1,6 @@
 //! The options of `domecast track`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::source::RawSize;
 use crate::commands::input::input_fault;
@@ -126,6 +126,14 @@ impl TrackArguments {
     /// Constants that cannot be tracked with.
     pub fn unfit(&self, error: &TrackError) -> Failure {
         input_fault(&self.constants, error.to_string(), "constants of a sensor")
+    }
+
+    /// Refuses a file whose numbers only JSON lines have a place for.
+    pub fn need_jsonl(&self, path: &Path) -> Result<(), Failure> {
+        if self.format == Format::Jsonl {
+            return Ok(());
+        }
+        Err(input_fault(path, "has no place in this --format", "--format jsonl"))
     }
 
     /// Says so where an option is given that has no effect any more.

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::arguments::{Format, TrackArguments};
+use super::arguments::TrackArguments;
 use super::number_lines::NumberLines;
 use super::rest_frame::RestFrame;
 use crate::commands::input::input_fault;
@@ -32,12 +32,10 @@ const MAX_WIDER: f64 = 2.0;
 pub(super) struct ContactHardness {
     travel: NumberLines,
     touch: TouchHardness,
-    rest: TrackedRest,
+    /// Where springs say the force.
+    rest: Option<TrackedRest>,
     rest_sd: Option<Wrench>,
     at_mm: DVec3,
-    has_springs: bool,
-    /// What the last frame says.
-    last: Option<Hardness>,
     /// Frames in which no object can give way as the travel has it.
     impossible: u64,
 }
@@ -51,18 +49,12 @@ impl ContactHardness {
         at_mm: DVec3,
     ) -> Result<Option<Self>, Failure> {
         let (Some(path), Some(at_rest)) = (&arguments.travel, at_rest) else { return Ok(None) };
-        if arguments.format != Format::Jsonl {
-            return Err(input_fault(path, "has no place in this --format", "--format jsonl"));
-        }
+        arguments.need_jsonl(path)?;
         let Some(elastomer) = &constants.elastomer else {
             let problem = "holds no `elastomer`, which --travel reads hardness by";
             return Err(input_fault(&arguments.constants, problem, "constants of a new build"));
         };
-        let rest = TrackedRest::new(&at_rest.tracked, at_mm);
-        let has_springs = constants.springs.is_some();
-        if has_springs && !rest.is_known() {
-            return Err(at_rest.fault(format!("has no wrench (status \"{}\")", at_rest.tracked.status())));
-        }
+        let rest = constants.springs.as_ref().map(|_| at_rest.counted_from(at_mm)).transpose()?;
         let shape = constants.optics.dome();
         let dome = Dome {
             radius_mm: shape.radius_mm(),
@@ -84,27 +76,24 @@ impl ContactHardness {
             rest,
             rest_sd: at_rest.tracked.wrench_sd,
             at_mm,
-            has_springs,
-            last: None,
             impossible: 0,
         }))
     }
 
-    /// Takes the frame in, with its line of the travel; what its line says.
-    pub fn member(
+    /// Takes the frame in, with its line of the travel; what the touch so far says, `None` where there is none or the frame is not `ok`.
+    pub fn take(
         &mut self,
         tracked: &Tracked,
         forces: &LocalForces,
         skin: Option<&ShapeMap>,
-    ) -> Result<Value, Failure> {
+    ) -> Result<Option<Hardness>, Failure> {
         let travel_mm = self.travel.read_next()?.unwrap_or(f64::NAN);
-        self.last = None;
         if tracked.status() != "ok" || forces.status != TractionStatus::Ok {
-            return Ok(Value::Null);
+            return Ok(None);
         }
         let Some(contact) = &forces.contact else {
             self.touch.end();
-            return Ok(Value::Null);
+            return Ok(None);
         };
         let (mut row, force_sd_part) = self.row(tracked, contact, travel_mm);
         // a light touch is not seen, or its forces lie all over the dome
@@ -112,22 +101,21 @@ impl ContactHardness {
         if !wide.is_some_and(|wide| (1.0 / MAX_WIDER..=MAX_WIDER).contains(&wide)) {
             row[13] = f64::NAN;
         }
-        self.touch.set_force_sd_part(force_sd_part);
-        let found = self.touch.push(&row);
-        self.last = Some(found);
+        let found = self.touch.push(&row, force_sd_part);
         self.impossible += u64::from(found.status == HardnessStatus::Impossible);
-        let is_measured = is_measured(&found);
-        Ok(json!({
+        Ok(Some(found))
+    }
+
+    /// The member of the frame's line.
+    pub fn member(&self, found: Option<&Hardness>) -> Value {
+        let Some(found) = found else { return Value::Null };
+        let is_measured = found.status.is_measured();
+        json!({
             "status": found.status.as_str(),
             "log10_youngs_modulus_mpa": is_measured.then_some(found.log10_young),
             "interval_90": is_measured.then_some(found.interval),
             "frames": self.touch.frames(),
-        }))
-    }
-
-    /// What the last frame says, where it says something.
-    pub fn last(&self) -> Option<&Hardness> {
-        self.last.as_ref().filter(|found| is_measured(found))
+        })
     }
 
     /// Names travel that is not what it is taken for.
@@ -143,14 +131,14 @@ impl ContactHardness {
 
     /// The frame's numbers, and how unsure the scale of its force is.
     fn row(&self, tracked: &Tracked, contact: &ContactEstimate, travel_mm: f64) -> (PressRow, f64) {
-        let [wrench, platform] = if self.has_springs {
-            self.rest.rigid(tracked)
+        let ([wrench, platform], sd_n) = if let Some(rest) = &self.rest {
+            (rest.rigid(tracked), self.scale_sd_n(tracked))
         } else {
             // nothing yields but the dome, whose dots say the force
             let moment_nmm = (contact.point_mm - self.at_mm).cross(contact.force_n);
-            [Wrench { force_n: contact.force_n, moment_nmm }.to_array(), [0.0; 6]]
+            let wrench = Wrench { force_n: contact.force_n, moment_nmm };
+            ([wrench.to_array(), [0.0; 6]], contact.force_sd_n)
         };
-        let sd_n = if self.has_springs { self.scale_sd_n(tracked) } else { contact.force_sd_n };
         let force = DVec3::from_slice(&wrench[..3]);
         let force_sd_part = (force.normalize_or_zero() * sd_n).length() / force.length();
         let mut row = PressRow::default();
@@ -167,8 +155,4 @@ impl ContactHardness {
         let square = now.force_n * now.force_n - rest.force_n * rest.force_n;
         square.max(DVec3::ZERO).map(f64::sqrt)
     }
-}
-
-fn is_measured(found: &Hardness) -> bool {
-    matches!(found.status, HardnessStatus::Ok | HardnessStatus::Saturated)
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::arguments::{Format, TrackArguments};
+use super::arguments::TrackArguments;
 use super::rest_frame::RestFrame;
 use crate::commands::input::input_fault;
 use crate::commands::output::Failure;
@@ -59,9 +59,7 @@ impl HardnessLines {
         at_mm: DVec3,
     ) -> Result<Option<Self>, Failure> {
         let Some(model) = &arguments.hardness else { return Ok(None) };
-        if arguments.format != Format::Jsonl {
-            return Err(input_fault(model, "has no place in this --format", "--format jsonl"));
-        }
+        arguments.need_jsonl(model)?;
         if arguments.tracker.is_turned() {
             return Err(input_fault(
                 model,
@@ -80,10 +78,7 @@ impl HardnessLines {
         if !reader.set_rest(&view(&frame)) {
             return Err(at_rest.fault("is not whole".into()));
         }
-        let rest = TrackedRest::new(&at_rest.tracked, at_mm);
-        if !rest.is_known() {
-            return Err(at_rest.fault(format!("has no wrench (status \"{}\")", at_rest.tracked.status())));
-        }
+        let rest = at_rest.counted_from(at_mm)?;
         let (every, height_px) = (arguments.hardness_every, frame.height() as f64);
         let (readings, seen) = (Vec::new(), Vec::new());
         Ok(Some(Self { reader, columns, rest, height_px, every, readings, seen, is_rest_touched: false }))

@@ -2,9 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+
 use super::arguments::TrackArguments;
 use crate::commands::input::input_fault;
 use crate::commands::output::Failure;
+use domecast_dataset::TrackedRest;
 use domecast_live::decode::{self, Picture};
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
 
@@ -33,6 +36,15 @@ impl RestFrame {
     /// As trackers take it.
     pub fn frame(&self) -> Result<CameraFrame<'_>, Failure> {
         frame_of(&self.path, &self.picture)
+    }
+
+    /// What wrench and displacement about a point are counted from.
+    pub fn counted_from(&self, at_mm: DVec3) -> Result<TrackedRest, Failure> {
+        let rest = TrackedRest::new(&self.tracked, at_mm);
+        if rest.is_known() {
+            return Ok(rest);
+        }
+        Err(self.fault(format!("has no wrench (status \"{}\")", self.tracked.status())))
     }
 
     /// That it cannot be used.

@@ -176,13 +176,14 @@ impl Results {
             shape.write(number, line, forces.as_deref_mut())?;
         }
         let skin = frame.and(self.shape.as_ref()).map(ShapeFiles::map);
+        let mut by_contact = None;
         if let (Some(touch), Some(forces)) = (&mut self.contact_hardness, forces.as_deref()) {
-            let member = touch.member(tracked, forces.result(), skin)?;
-            add_member(&mut self.line, "contact_hardness", &member);
+            by_contact = touch.take(tracked, forces.result(), skin)?;
+            add_member(&mut self.line, "contact_hardness", &touch.member(by_contact.as_ref()));
         }
-        let by_contact = self.contact_hardness.as_ref().and_then(ContactHardness::last);
+        let by_contact = by_contact.filter(|found| found.status.is_measured());
         if let Some(lines) = &mut self.hardness
-            && let Some(member) = lines.member(frame, tracked, skin, by_contact)
+            && let Some(member) = lines.member(frame, tracked, skin, by_contact.as_ref())
         {
             add_member(&mut self.line, "hardness", &member);
         }

@@ -26,6 +26,7 @@
 //! | replace nominal numbers by measured ones | [`calibrate`] |
 //! | turn frames into markers, pose, wrench and displacement | [`Tracker`]; [`track`] |
 //! | read the skin's shape from their colours | [`ShapeFromColor`]; [`shape`] |
+//! | say how hard what is touched is | [`hardness::ContactHardness`], [`hardness::HardnessModel`]; [`hardness`] |
 //! | draw what was found over a frame | [`overlay`] |
 //! | simulate what the sensor sees | [`Scene`]; [`sim`] |
 //! | look at the lit sensor before it is made | [`light`] |
@@ -53,6 +54,7 @@ pub use domecast_contact as contact;
 pub use domecast_design as design;
 pub use domecast_design::{layout, parts, transfer};
 pub use domecast_fab::{artwork, build, compare, light, report};
+pub use domecast_hardness as hardness;
 pub use domecast_mesh as mesh;
 pub use domecast_optics as optics;
 pub use domecast_optics::{camera, numeric, pose};

@@ -137,7 +137,7 @@ def small(tree):
     return isinstance(tree, dict) and all(isinstance(tree.get(side), int) and tree[side] <= 2000 for side in ("width", "height"))
 
 
-def entries(constants_path, repository, folder):
+def entries(constants_path, repository, model_path, folder):
     """The calls by name; and what tells that the objects they share are as they were."""
     designs, scenes = repository / "designs", repository / "designs/scenes"
     design = domecast.Design.load(designs / "thumb24.json")
@@ -151,6 +151,8 @@ def entries(constants_path, repository, folder):
     shape.set_rest(rest, rgb=True)
     skin = shape.update(rest, reading, rgb=True)
     forces = traction.update(reading, shape=skin)
+    touch, model = domecast.ContactHardness(sensor, reading), domecast.HardnessModel.load(model_path)
+    model.set_rest(rest, reading, rgb=True)
     trees = {"design": json.loads(design.text), "constants": json.loads(little.sensor().json()),
              "scene": json.loads((scenes / "push.json").read_text())}
     trees["scene"]["frames"]["count"] = 1
@@ -224,6 +226,12 @@ def entries(constants_path, repository, folder):
         "Traction.set_rest": Entry(lambda a: traction.set_rest(a), [readings], 0.2),
         "Traction.update": Entry(lambda a, b: traction.update(a, shape=b), [readings, maps], 0.2),
         "Traction.pressure": Entry(lambda a: traction.pressure(a), [maps], 0.5),
+        "ContactHardness": Entry(lambda a, b, c: domecast.ContactHardness(a, b, travel_sd_mm=c), [(sensor, anything), readings, (0.02, numbers)], 0.5),
+        "ContactHardness.update": Entry(lambda a, b, c: touch.update(a, b, travel_mm=c), [touches, maps, (0.1, numbers)], 1),
+        "HardnessModel.load": Entry(domecast.HardnessModel.load, [(str(model_path), files[1])], 0.3),
+        "HardnessModel.set_rest": Entry(plainly(lambda a, b, c: model.set_rest(a, b, rgb=c)), [frames, readings, truth], 0.2),
+        "HardnessModel.update": Entry(plainly(lambda a, b, c, d, e: model.update(a, b, rgb=c, shape=d, contact=e)),
+                                      [frames, readings, truth, maps, (None, anything)], 0.2),
         "Forces.json": Entry(lambda a, b: forces.json(a, shape=b), [fields, maps], 1),
         "Reading.json": Entry(lambda a, b: reading.json(a, shape=b), [fields, maps], 2),
         "Reading.overlay_png": Entry(plainly(lambda a, b, c, d, e: reading.overlay_png(a, rgb=b, magnify=c, shape=d, forces=e)), [frames, truth, (1.0, words), maps, touches], 0.2),

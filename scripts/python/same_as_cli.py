@@ -1,8 +1,8 @@
 """The installed wheel gives what the command line gives, bit for bit; it runs where only the wheel and numpy are installed.
 
-    same_as_cli.py DOMECAST REPOSITORY WORK FRAMES [ACCURACY]
+    same_as_cli.py DOMECAST REPOSITORY WORK MODEL FRAMES [ACCURACY]
 
-FRAMES: how many frames must leave the memory as it was. ACCURACY: the folder of `domecast accuracy --quick` of thumb24, which is made
+MODEL: one of hardness. FRAMES: how many frames must leave the memory as it was. ACCURACY: the folder of `domecast accuracy --quick` of thumb24, which is made
 where it is not given.
 """
 
@@ -25,7 +25,7 @@ NUMPY_CAME_WITH_IT = "numpy" in sys.modules
 
 import numpy as np  # noqa: E402
 
-DOMECAST, REPOSITORY, WORK, FRAMES = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]), int(sys.argv[4])
+DOMECAST, REPOSITORY, WORK, MODEL, FRAMES = sys.argv[1], *map(Path, sys.argv[2:5]), int(sys.argv[5])
 DESIGN = REPOSITORY / "designs/thumb24.json"
 FAULTS = []
 
@@ -222,6 +222,51 @@ def shapes(folder, frames, rest):
             check(False, f"{name}: colours that fit only when swapped are refused")
         except domecast.DomecastError as error:
             check("swapped" in str(error), f"{name}: {error}")
+
+
+def hardness(folder, frames, rest):
+    """By contact mechanics, and by MODEL beside it: the members of the lines that `track` writes."""
+    constants, travel = WORK / "by-cli/constants/constants.json", WORK / "travel.txt"
+    moved = [0.4 * number for number in range(len(frames))]
+    travel.write_text("".join(f"{mm}\n" for mm in moved))
+    sensor = domecast.Sensor.load(constants)
+    lines = cli("track", folder, "--constants", constants, "--shape", WORK / "maps", "--rest", rest, "--traction",
+                "--travel", travel, "--travel-sd", 0.05, "--hardness", MODEL, "--force").splitlines()
+    tracker, plain = domecast.Tracker(sensor), read_png(rest)
+    untouched = tracker.update(plain, rgb=True)
+    tracker.restart()
+    shape, forces = domecast.Shape(sensor, tracker), domecast.Traction(sensor, correlation_mm=1)
+    shape.set_rest(plain, rgb=True)
+    forces.set_rest(untouched)
+    touch, model = domecast.ContactHardness(sensor, untouched, travel_sd_mm=0.05), domecast.HardnessModel.load(MODEL)
+    model.set_rest(plain, untouched, rgb=True)
+    said = set()
+    for frame, travel_mm, line in zip(frames, moved, map(json.loads, lines), strict=True):
+        reading = tracker.update(frame, rgb=True)
+        skin = shape.update(frame, reading, rgb=True)
+        by_contact = touch.update(forces.update(reading, shape=skin), skin, travel_mm=travel_mm)
+        by_model = model.update(frame, reading, rgb=True, shape=skin, contact=by_contact)
+        for found, wanted in ((by_contact, line["contact_hardness"]), (by_model, line["hardness"])):
+            said.add(found and (found.status, found.reason))
+            same = found is None if wanted is None else found is not None and json.loads(found.json()) == wanted
+            if found is not None and wanted is not None:
+                same &= found.log10_youngs_modulus_mpa == wanted["log10_youngs_modulus_mpa"] and found.status == wanted["status"]
+                same &= found.interval_90 == (wanted["interval_90"] and tuple(wanted["interval_90"]))
+                same &= (found.class_name, found.frames) == (wanted.get("class"), wanted.get("frames"))
+            if not same:
+                check(False, f"hardness of frame {reading.frame}: {found and found.json()} of {wanted}")
+    check(len(said) > 3, f"hardness as track --travel --hardness states it: {said}")
+    turned = domecast.Tracker(sensor, camera_turned_deg=90.0).update(plain, rgb=True)
+    refused = [("a turned camera", lambda: model.set_rest(plain, turned, rgb=True)),
+               ("a rest without a wrench", lambda: domecast.ContactHardness(sensor, tracker.skip())),
+               ("a model's hardness for contact mechanics'", lambda: model.update(frame, reading, rgb=True, contact=by_model)),
+               ("travel that is none", lambda: touch.update(forces.update(reading, shape=skin), skin, travel_mm=float("nan")))]
+    for what, call in refused:
+        try:
+            call()
+            check(False, f"{what} is refused")
+        except domecast.DomecastError as error:
+            check(True, f"{what}: {error}")
 
 
 def calibrations(simulated):
@@ -421,10 +466,11 @@ def main():
     balls, pressed = simulated("ball", "--frames", "3", frames=3)
     rest, _ = simulated("lit", "--seed", "7", seed=7)
     shapes(balls, pressed, rest / "frame_0000.png")
+    hardness(*simulated("ball", "--frames", "14", frames=14), rest / "frame_0000.png")
     calibrations(pushed)
     lights(WORK / "by-cli/constants/constants.json", pushed)
     prints()
-    accuracies(Path(sys.argv[5]) if len(sys.argv) > 5 else None)
+    accuracies(Path(sys.argv[6]) if len(sys.argv) > 6 else None)
     threads(sensor, frames, lines)
     memory(sensor, frames, read_png(rest / "frame_0000.png"), pressed)
     overhead(sensor, frames)

@@ -1,6 +1,6 @@
 """Random wrong inputs to every public call: exceptions with words, never a panic, never a crash.
 
-    wrong_inputs.py CONSTANTS REPOSITORY COUNT [--drawn N] [--only NAME]
+    wrong_inputs.py CONSTANTS REPOSITORY MODEL COUNT [--drawn N] [--only NAME]
 
 Every parameter of every entry (python/entries.py) has a good value and wrong ones. A first part of the calls is drawn by hypothesis,
 which shrinks what fails; the rest puts the values that it drew together anew, which costs it nothing: hypothesis' own work is
@@ -123,6 +123,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("constants", type=Path)
     parser.add_argument("repository", type=Path)
+    parser.add_argument("model", type=Path, help="of hardness")
     parser.add_argument("count", type=int)
     parser.add_argument("--drawn", type=float, default=0.08, help="the part that hypothesis draws")
     parser.add_argument("--only")
@@ -133,10 +134,10 @@ def main():
     warnings.simplefilter("ignore", RuntimeWarning)
     with tempfile.TemporaryDirectory() as folder:
         home = os.getcwd()
-        constants, repository = asked.constants.resolve(), asked.repository.resolve()
+        constants, repository, model = asked.constants.resolve(), asked.repository.resolve(), asked.model.resolve()
         # whatever writes by a name alone writes there
         os.chdir(folder)
-        calls, same = entries(constants, repository, Path(folder))
+        calls, same = entries(constants, repository, model, Path(folder))
         missing = public_calls() - set(calls)
         assert not missing, f"no wrong inputs for {sorted(missing)}"
         judge, whole = Judge(), sum(entry.weight for entry in calls.values())

@@ -6,6 +6,7 @@ use crate::deviation::deviation;
 use crate::elastomer::{Elastomer, Indenter};
 use crate::error::ContactError;
 use crate::estimate::{Estimate, estimate};
+use crate::finite_strain::Tried;
 use crate::level::{DEEPEST, Level, elements_of};
 use crate::levels;
 use crate::linear;
@@ -110,6 +111,17 @@ impl Contact {
         sensor_from_object: &Rigid,
         before: Option<&ContactState>,
     ) -> Result<ContactState, ContactError> {
+        self.solve_near(indenter, sensor_from_object, before, None)
+    }
+
+    /// The same with what was found at a place near by, from the same frame before: the finite-strain level begins there.
+    pub(crate) fn solve_near(
+        &self,
+        indenter: &Indenter,
+        sensor_from_object: &Rigid,
+        before: Option<&ContactState>,
+        tried: Option<Tried<'_>>,
+    ) -> Result<ContactState, ContactError> {
         let history = before.map(|state| &state.history);
         let elastomer = &self.elastomer;
         if !elastomer.dome().is_hemisphere() && matches!(self.prepared, Prepared::Nothing) {
@@ -124,7 +136,7 @@ impl Contact {
                 levels::geometric(elastomer, indenter, sensor_from_object, history)
             }
             (Prepared::Nothing, Level::FiniteStrain { across }) => {
-                levels::finite_strain(elastomer, across, indenter, sensor_from_object, before)
+                levels::finite_strain(elastomer, across, indenter, sensor_from_object, before, tried)
             }
             (Prepared::Nothing, _) => levels::closed_form(elastomer, indenter, sensor_from_object, history),
         })

@@ -8,10 +8,10 @@ use sha2::{Digest, Sha256};
 
 use crate::check::{Dataset, sha256_hex};
 use crate::make::Shard;
-use crate::readings::COLUMNS;
 use crate::spec::Split;
 use domecast_design::DesignError;
 use domecast_design::layout::Layout;
+use domecast_hardness::COLUMNS;
 
 /// Name of the file.
 pub const INDEX_NAME: &str = "dataset.json";

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::index::{FORMAT, INDEX_NAME};
-use crate::readings::COLUMNS;
 use domecast_design::DesignError;
+use domecast_hardness::COLUMNS;
 
 const BLOCK: usize = 512;
 

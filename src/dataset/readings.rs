@@ -1,47 +1,15 @@
 //! The numbers beside the frames: what a tracker says, modelled from the truth.
 
-use std::ops::Range;
-
 use glam::{DVec2, Vec3};
 
 use crate::check::Dataset;
 use crate::sensor::BuiltSensor;
 use crate::video::Video;
+use domecast_hardness::{COLUMNS, SeenDot, dots_features};
 use domecast_optics::numeric::SeededRandom;
-
-/// Columns of the readings.
-pub const COLUMNS: [&str; 19] = [
-    "time_s",
-    "fx_n",
-    "fy_n",
-    "fz_n",
-    "mx_nmm",
-    "my_nmm",
-    "mz_nmm",
-    "tx_mm",
-    "ty_mm",
-    "tz_mm",
-    "rx_rad",
-    "ry_rad",
-    "rz_rad",
-    "robot_travel_mm",
-    "dots_mean_px",
-    "dots_radial_px",
-    "dots_divergence",
-    "contact_radius_mm",
-    "dots_found",
-];
-
-/// Those of wrench and platform.
-pub const RIGID_COLUMNS: Range<usize> = 1..13;
-/// Those that say how the dots moved.
-pub const DOT_COLUMNS: Range<usize> = 14..17;
 
 /// Stream of the readings' noise, apart from the frames'.
 const STREAM_READINGS: u64 = 0x7ead;
-/// Spread of the weight about the contact's centre in which the divergence is fitted, part of the picture's height.
-const NEAR_PART: f64 = 0.12;
-
 /// Readings of a video and its dots.
 #[derive(Debug, Clone)]
 pub struct Readings {
@@ -49,15 +17,6 @@ pub struct Readings {
     pub rows: Vec<[f32; COLUMNS.len()]>,
     /// Of each frame, of each dot: motion that the skin's shape makes, px at the design's size, and whether it is found.
     pub dots: Vec<Vec<Vec3>>,
-}
-
-/// Where a dot would be on the undeformed dome, and how far from there it is seen, px at the design's size.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SeenDot {
-    /// On the undeformed dome.
-    pub at_px: DVec2,
-    /// What the skin's shape moves it by.
-    pub moved_px: DVec2,
 }
 
 /// The readings of a video with the noise of the spec.
@@ -125,30 +84,4 @@ pub fn row(
         *to = value as f32;
     }
     out
-}
-
-/// Mean motion of the dots (px), its mean part away from the contact's centre (px), its divergence there, and the part of the dots
-/// that is found. The centre is the mean of the dots' places weighted by the squares of their motions.
-pub fn dots_features(seen: &[Option<SeenDot>], height_px: f64) -> [f64; 4] {
-    let found: Vec<&SeenDot> = seen.iter().flatten().collect();
-    let count = found.len().max(1) as f64;
-    let square = |dot: &SeenDot| dot.moved_px.length_squared();
-    let weight: f64 = found.iter().map(|dot| square(dot)).sum();
-    if weight <= 0.0 {
-        return [0.0, 0.0, 0.0, found.len() as f64 / seen.len().max(1) as f64];
-    }
-    let center = found.iter().map(|dot| dot.at_px * square(dot)).sum::<DVec2>() / weight;
-    let mean = found.iter().map(|dot| dot.moved_px.length()).sum::<f64>() / count;
-    let out = |dot: &SeenDot| (dot.at_px - center).normalize_or_zero().dot(dot.moved_px);
-    let radial = found.iter().map(|dot| out(dot)).sum::<f64>() / count;
-    let near_px = NEAR_PART * height_px;
-    let (mut along, mut squares) = (0.0, 0.0);
-    for dot in &found {
-        let from = dot.at_px - center;
-        let near = (-0.5 * from.length_squared() / (near_px * near_px)).exp();
-        along += near * from.dot(dot.moved_px);
-        squares += near * from.length_squared();
-    }
-    let divergence = if squares > 0.0 { 2.0 * along / squares } else { 0.0 };
-    [mean, radial, divergence, found.len() as f64 / seen.len().max(1) as f64]
 }

@@ -4,11 +4,12 @@ use serde_json::{Value, json};
 
 use crate::check::Dataset;
 use crate::draw::PairDraw;
-use crate::readings::{COLUMNS, Readings};
+use crate::readings::Readings;
 use crate::scene::shape_label;
 use crate::tar::Archive;
 use crate::video::Video;
 use domecast_files::{npy_f32, npy_u8};
+use domecast_hardness::COLUMNS;
 
 /// Bytes of a label for each ten frames: all of a set have the same, so that no size tells anything.
 const LABEL_BYTES: usize = 2048;

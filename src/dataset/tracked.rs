@@ -2,11 +2,11 @@
 
 use crate::check::Dataset;
 use crate::draw::PairDraw;
-use crate::readings::{Readings, SeenDot, row, written};
-use crate::rest::TrackedRest;
+use crate::readings::{Readings, row, written};
 use crate::scene::video_scene;
 use crate::sensor::{BuiltSensor, FullSensor};
 use crate::video::{NoVideo, Refused, Video, touches};
+use domecast_hardness::{SeenDot, TrackedRest};
 use domecast_optics::numeric::SeededRandom;
 use domecast_runtime::track::CameraFrame;
 use domecast_sim::{Around, Renderer, Scratch};

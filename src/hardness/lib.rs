@@ -8,6 +8,7 @@
 //! log10 of the modulus in MPa) and `novelty` `[1, n]` (squared distances from what was trained with).
 
 mod approach;
+mod columns;
 mod compile;
 mod error;
 mod graph;
@@ -26,7 +27,10 @@ mod settings;
 #[cfg(test)]
 mod tests;
 pub mod touch;
+#[cfg(feature = "track")]
+mod tracked;
 
+pub use columns::{COLUMNS, DOT_COLUMNS, PRESS_COLUMNS, RIGID_COLUMNS, SeenDot, dots_features};
 pub use error::ModelError;
 pub use graph::{Attribute, Constant, Graph, GraphNode, Port, Values};
 pub use metadata::{Class, METADATA_KEY, Metadata, ModelReading};
@@ -35,3 +39,5 @@ pub use onnx_read::read_onnx;
 pub use onnx_write::write_onnx;
 pub use picture::{FrameView, REST_NUMBERS, Shrinker, rest_profile};
 pub use reader::{HardnessEstimate, HardnessReader, Unsure};
+#[cfg(feature = "track")]
+pub use tracked::{ContactHardness, HardnessModel, TrackedRest};

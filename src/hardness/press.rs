@@ -3,26 +3,11 @@
 use glam::DVec3;
 use serde_json::Value;
 
-/// The readings of a frame that the formula needs, in the order of a [`PressRow`], by their names in data sets.
-pub const READINGS: [&str; 14] = [
-    "fx_n",
-    "fy_n",
-    "fz_n",
-    "mx_nmm",
-    "my_nmm",
-    "mz_nmm",
-    "tx_mm",
-    "ty_mm",
-    "tz_mm",
-    "rx_rad",
-    "ry_rad",
-    "rz_rad",
-    "robot_travel_mm",
-    "contact_radius_mm",
-];
+use crate::columns::PRESS_COLUMNS;
 
-/// The readings of a frame: wrench, displacement of the platform, travel of the hand, radius of the contact.
-pub type PressRow = [f64; READINGS.len()];
+/// The readings of a frame that the formula needs: wrench, displacement of the platform, travel of the hand, radius of the contact
+/// ([`PRESS_COLUMNS`]).
+pub type PressRow = [f64; PRESS_COLUMNS.len()];
 
 /// The dome that feels.
 #[derive(Debug, Clone, Copy, PartialEq)]

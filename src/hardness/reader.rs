@@ -30,6 +30,10 @@ pub enum Unsure {
     Modulus,
     /// The network's numbers are not finite.
     NotFinite,
+    /// A frame's skin lay above its shape at rest: the frame at rest was touched.
+    Raised,
+    /// Contact mechanics has another class or modulus ([`HardnessReader::contradicts`]).
+    ContradictsContactMechanics,
 }
 
 /// What was read from a window of frames.
@@ -224,6 +228,8 @@ impl HardnessReader {
             Unsure::Undecided => "undecided".into(),
             Unsure::Modulus => "out_of_range_modulus".into(),
             Unsure::NotFinite => "not_finite".into(),
+            Unsure::Raised => "raised".into(),
+            Unsure::ContradictsContactMechanics => "contradicts_contact_mechanics".into(),
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use domecast_hardness::physics::{Dome, PressRow, Prior, READINGS, hardness};
-use domecast_hardness::{FrameView, Shrinker, rest_profile};
+use domecast_hardness::physics::{Dome, PressRow, Prior, hardness};
+use domecast_hardness::{COLUMNS, FrameView, PRESS_COLUMNS, Shrinker, rest_profile};
 use serde_json::Value;
 
 use crate::options::{Leak, Options};
@@ -114,13 +114,13 @@ impl Reading {
 struct Physics {
     dome: Dome,
     prior: Prior,
-    columns: [usize; READINGS.len()],
+    columns: [usize; PRESS_COLUMNS.len()],
 }
 
 impl Physics {
     fn new(set: &Value, columns: &[String]) -> Result<Self, Problem> {
-        let place = |name: &&str| columns.iter().position(|c| c == name);
-        let places: Option<Vec<usize>> = READINGS.iter().map(place).collect();
+        let place = |at: &usize| columns.iter().position(|c| c == COLUMNS[*at]);
+        let places: Option<Vec<usize>> = PRESS_COLUMNS.iter().map(place).collect();
         let places = places.and_then(|places| places.try_into().ok());
         let (dome, prior) = (Dome::of_set(set), Prior::of_set(set));
         let (columns, (dome, prior)) =

@@ -27,6 +27,11 @@ impl PyForces {
         Self { forces, tracked }
     }
 
+    /// What was tracked in their frame.
+    pub fn tracked(&self) -> &Tracked {
+        &self.tracked
+    }
+
     pub fn local(&self) -> &LocalForces {
         &self.forces
     }

@@ -11,6 +11,7 @@ mod design;
 mod error;
 mod forces;
 mod frame;
+mod hardness;
 mod line;
 mod live;
 mod optics;
@@ -38,6 +39,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<shape_map::PyShapeMap>()?;
     module.add_class::<traction::PyTraction>()?;
     module.add_class::<forces::PyForces>()?;
+    module.add_class::<hardness::PyHardness>()?;
+    module.add_class::<hardness::PyContactHardness>()?;
+    module.add_class::<hardness::PyHardnessModel>()?;
     module.add_class::<scene::PyScene>()?;
     module.add_class::<scene::PyFrames>()?;
     module.add_class::<live::PyLive>()?;

@@ -21,6 +21,8 @@ use crate::shape_map::PyShapeMap;
 pub(crate) struct SensorAtRest {
     pub optics: SensorOptics,
     pub at_mm: DVec3,
+    /// Whether the tracker has been given that the picture is turned against the constants.
+    pub is_turned: bool,
 }
 
 /// The result of one frame.
@@ -37,6 +39,10 @@ impl PyReading {
 
     pub fn tracked(&self) -> &Arc<Tracked> {
         &self.tracked
+    }
+
+    pub fn about(&self) -> &SensorAtRest {
+        &self.about
     }
 
     /// The picture over a frame, with further layers where they are given.

@@ -121,7 +121,7 @@ fn channel_of(name: &str) -> Result<Channel, Fault> {
 }
 
 /// A number in a range, or what is wrong with it.
-fn within(name: &str, value: Option<f64>, low: f64, high: f64) -> Result<Option<f64>, Fault> {
+pub(crate) fn within(name: &str, value: Option<f64>, low: f64, high: f64) -> Result<Option<f64>, Fault> {
     match value {
         Some(number) if !(low..=high).contains(&number) => {
             Err(Fault::argument(name, number, "is beyond its range", &format!("{low} to {high}")))
@@ -163,9 +163,11 @@ impl PyTracker {
         };
         let constants = sensor.constants();
         let tracker = py.detach(|| Tracker::new(&constants, options)).map_err(Fault::from)?;
+        let is_turned = camera_turned_deg.is_some_and(|deg| deg != 0.0);
         let about = Arc::new(SensorAtRest {
             optics: tracker.optics().clone(),
             at_mm: tracker.springs().map_or(DVec3::ZERO, Springs::at_mm),
+            is_turned,
         });
         Ok(Self { constants, tracker, about, next: 0, are_colours_checked: !check_colours })
     }

@@ -10,19 +10,19 @@ use crate::{assert_none, crates, members, short, text, workspace};
 /// The crates from the ground up; each may depend on those named beside it and on no others of ours.
 const CRATES: [(&str, &[&str]); 16] = [
     ("files", &[]),
-    ("hardness", &[]),
     ("optics", &[]),
     ("mesh", &[]),
     ("light", &["optics"]),
     ("springs", &["optics"]),
     ("elastic", &["optics"]),
     ("runtime", &["elastic", "light", "optics", "springs"]),
+    ("hardness", &["runtime", "springs"]),
     ("design", &["mesh", "optics", "springs"]),
     ("contact", &["elastic", "mesh", "optics", "springs"]),
     ("sim", &["contact", "design", "files", "light", "mesh", "optics", "springs"]),
     ("fab", &["design", "files", "mesh", "optics", "runtime", "sim", "springs"]),
     ("live", &["optics", "runtime", "springs"]),
-    ("dataset", &["contact", "design", "fab", "files", "optics", "runtime", "sim", "springs"]),
+    ("dataset", &["contact", "design", "fab", "files", "hardness", "optics", "runtime", "sim", "springs"]),
     (
         "cli",
         &[
@@ -30,7 +30,7 @@ const CRATES: [(&str, &[&str]); 16] = [
             "sim", "springs",
         ],
     ),
-    ("python", &["cli", "design", "fab", "files", "live", "optics", "runtime", "sim", "springs"]),
+    ("python", &["cli", "design", "fab", "files", "hardness", "live", "optics", "runtime", "sim", "springs"]),
 ];
 
 /// Where data runs through stages: the crate, the folder of the stages, and they in order.

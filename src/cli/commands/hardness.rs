@@ -6,10 +6,11 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::output::{Failure, Output};
-use domecast_dataset::{COLUMNS, INDEX_NAME, StoredSet};
+use domecast_dataset::{INDEX_NAME, StoredSet};
 use domecast_design::DesignError;
 use domecast_files::StagedFile;
-use domecast_hardness::physics::{Dome, Hardness, PressRow, Prior, READINGS, hardness};
+use domecast_hardness::PRESS_COLUMNS;
+use domecast_hardness::physics::{Dome, Hardness, PressRow, Prior, hardness};
 
 /// What came of a split.
 #[derive(Default)]
@@ -48,13 +49,13 @@ pub fn run(output: &Output, folder: &Path, out: Option<&Path>) -> Result<(), Fai
     };
     let dome = Dome::of_set(&set.index).ok_or_else(|| in_index("dome", "a number of the dome is missing"))?;
     let prior = Prior::of_set(&set.index).ok_or_else(|| in_index("spec.hardness", "no range of hardness"))?;
-    let (border, columns) = (border(&set.index), columns());
+    let border = border(&set.index);
     let mut staged =
         out.map(|path| StagedFile::new(path, "hardness", &output.rules(&[folder]))).transpose()?;
     let mut splits: BTreeMap<String, Tally> = BTreeMap::new();
     let mut lines = String::new();
     set.each(&mut |video| {
-        let rows: Vec<PressRow> = video.rows.iter().map(|row| columns.map(|at| row[at])).collect();
+        let rows: Vec<PressRow> = video.rows.iter().map(|row| PRESS_COLUMNS.map(|at| row[at])).collect();
         let found = hardness(&rows, &dome, &prior);
         let text = |key: &str| video.label.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
         let truth = video.label.get("log10_youngs_modulus_mpa").and_then(Value::as_f64);
@@ -96,25 +97,9 @@ fn add(tally: &mut Tally, found: &Hardness, truth: Option<f64>, class: Option<(u
     *tally.by_status.entry(found.status.as_str()).or_insert(0) += 1;
 }
 
-/// For each reading that the formula needs its number in [`COLUMNS`].
-fn columns() -> [usize; READINGS.len()] {
-    READINGS.map(|name| COLUMNS.iter().position(|other| *other == name).unwrap_or_default())
-}
-
 /// The border between two classes, log10 of MPa.
 fn border(index: &Value) -> Option<f64> {
     let class =
         |k: usize| index.pointer(&format!("/spec/hardness/classes/{k}/young_mpa")).and_then(Value::as_f64);
     Some(0.5 * (class(0)?.log10() + class(1)?.log10()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sets_have_all_that_the_formula_needs() {
-        let names = columns().map(|at| COLUMNS[at]);
-        assert_eq!(names, READINGS);
-    }
 }

@@ -11,6 +11,7 @@ use super::pressed::{PressStatus, Pressed};
 use crate::contact::Contact;
 use crate::elastomer::Indenter;
 use crate::error::ContactError;
+use crate::finite_strain::Tried;
 use crate::state::ContactState;
 use domecast_optics::numeric::Rigid;
 
@@ -131,7 +132,9 @@ impl Contact {
         for count in 1..=MAX_SOLVES {
             let mut object = *rest_from_object;
             object.translation_mm += way * gone_mm;
-            match self.solve(indenter, &object, before.map(|pressed| &pressed.state)) {
+            let tried = best.as_ref().and_then(|best| best.state.history.body.as_deref());
+            let tried = tried.map(|deformed| Tried { deformed, shares_way: false });
+            match self.solve_near(indenter, &object, before.map(|pressed| &pressed.state), tried) {
                 Ok(state) => {
                     let found_n = state.wrench.force_n.dot(way);
                     let off_n = (found_n - force_n).abs();

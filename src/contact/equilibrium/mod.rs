@@ -7,6 +7,7 @@
 mod approach;
 mod held;
 mod meeting;
+mod predicted;
 mod pressed;
 mod roots;
 mod search;
@@ -21,6 +22,7 @@ use crate::error::ContactError;
 use approach::{checked_press, gone_before_mm, touch_mm};
 use domecast_optics::numeric::Rigid;
 use domecast_springs::{Displacement, Suspension};
+use predicted::Predicting;
 pub use pressed::{PressStatus, Pressed};
 use search::Task;
 pub use together::{PressedObject, PressedTogether, Push};
@@ -61,7 +63,11 @@ impl Contact {
             before: before.map(|pressed| &pressed.state),
             force: None,
         };
-        task.run(start(suspension, before, 6), before.and_then(|pressed| pressed.learnt.as_ref()))
+        let mut x = start(suspension, before, 6);
+        if let Some(predicting) = Predicting::new(self, indenter, suspension, rest_from_object) {
+            predicting.held(&mut x, before);
+        }
+        task.run(x, before.and_then(|pressed| pressed.learnt.as_ref()))
     }
 
     /// The object moved along `approach` (rest frame) from a start pose until the contact's force along it is
@@ -97,6 +103,9 @@ impl Contact {
                     + self.first_depth_mm(indenter, force_n)
             }
         };
+        if let Some(predicting) = Predicting::new(self, indenter, suspension, rest_from_object) {
+            predicting.forced(&mut x, (way, force_n), before);
+        }
         // Loading in steps where the whole force is not found at once.
         let whole = task.run(x.clone(), before.and_then(|pressed| pressed.learnt.as_ref()))?;
         if !matches!(whole.status, PressStatus::NotBalanced { residual_n } if residual_n > FAR_OFF * force_n)

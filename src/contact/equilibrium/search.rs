@@ -4,6 +4,8 @@
 //! the contact, or from what the frame before learnt, with shorter steps where the residual grows. A trial's contact is
 //! solved only as closely as the balance is found; the last one to its end.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 use nalgebra::{DMatrix, DVector};
 
@@ -12,6 +14,8 @@ use super::pressed::{PressStatus, Pressed};
 use crate::contact::{Contact, Prepared};
 use crate::elastomer::Indenter;
 use crate::error::ContactError;
+use crate::finite_strain::{Deformed, Tried};
+use crate::level::Level;
 use crate::linear::Solver;
 use crate::state::ContactState;
 use domecast_optics::DomeShape;
@@ -23,6 +27,8 @@ const MAX_SOLVES: u32 = 80;
 /// The search ends when the residual is below this part of the load; ten times that still counts as
 /// balanced.
 const TOLERANCE: f64 = 1e-7;
+/// The same of a first search whose trials are not yet exact.
+const LOOSE: f64 = 1e-2;
 /// Loads below this one are balanced as closely as it is, N.
 const MIN_SCALE_N: f64 = 0.05;
 
@@ -70,8 +76,8 @@ pub(super) struct Task<'a> {
 enum Solves<'a> {
     /// The linear level goes on from trial to trial.
     Linear(Box<Solver<'a>>),
-    /// The others start anew.
-    Each,
+    /// The others start anew, the finite-strain level from the last trial.
+    Each(Option<Arc<Deformed>>),
 }
 
 impl Solves<'_> {
@@ -83,7 +89,13 @@ impl Solves<'_> {
         off_n: Option<f64>,
     ) -> Result<ContactState, ContactError> {
         match self {
-            Self::Each => task.contact.solve(task.indenter, sensor_from_object, task.before),
+            Self::Each(tried) => {
+                let near = tried.as_deref().map(|deformed| Tried { deformed, shares_way: off_n.is_some() });
+                let (object, before) = (sensor_from_object, task.before);
+                let state = task.contact.solve_near(task.indenter, object, before, near)?;
+                *tried = state.history.body.clone().or(tried.take());
+                Ok(state)
+            }
             Self::Linear(solver) => task.contact.checked(task.indenter, sensor_from_object, || {
                 let elastomer = task.contact.elastomer();
                 // Displacements, by the stiffness of a contact of a tenth of the dome.
@@ -200,7 +212,7 @@ impl Task<'_> {
                 self.indenter,
                 self.before,
             ))),
-            _ => Solves::Each,
+            _ => Solves::Each(None),
         };
         let mut search = Search { x: start, count: 1, jacobian: None };
         let first_off = Some(self.scale(0.0));
@@ -230,11 +242,15 @@ impl Task<'_> {
         // What the frame before learnt of the stiffness serves this one.
         search.jacobian =
             learnt.filter(|j| j.nrows() == self.unknowns() && !trial.state.nodes.is_empty()).cloned();
+        // At finite strain trials share the way of the first, until it is walked anew to where they have led.
+        let is_walked = matches!(self.contact.level(), Level::FiniteStrain { .. });
+        let mut tolerance = if is_walked { LOOSE } else { TOLERANCE };
         for _ in 0..MAX_ENDS {
-            trial = self.search(&mut solves, &mut search, trial)?;
-            if matches!(solves, Solves::Each) {
+            trial = self.search(&mut solves, &mut search, trial, tolerance)?;
+            if matches!(solves, Solves::Each(_)) && tolerance == TOLERANCE {
                 break;
             }
+            tolerance = TOLERANCE;
             // The contact to its end; the balance may not notice.
             search.count += 1;
             let last = self.try_at(&mut solves, &search.x, None);
@@ -259,6 +275,7 @@ impl Task<'_> {
         solves: &mut Solves<'_>,
         search: &mut Search,
         mut trial: Trial,
+        tolerance: f64,
     ) -> Result<Trial, ContactError> {
         let mut fresh = search.jacobian.is_none();
         let mut jacobian = match search.jacobian.take() {
@@ -268,7 +285,7 @@ impl Task<'_> {
         let (mut best_size, mut best_count) = (trial.size, search.count);
         // A contact whose forces have steps has no balance to be found.
         while search.count < MAX_SOLVES.min(best_count + MAX_WITHOUT_GAIN) {
-            if trial.size <= 0.3 * TOLERANCE * self.scale(trial.wrench.force_n.length()) {
+            if trial.size <= 0.3 * tolerance * self.scale(trial.wrench.force_n.length()) {
                 break;
             }
             let Some(step) = jacobian.clone().lu().solve(&-&trial.residual) else { break };

@@ -12,7 +12,7 @@ mod way;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use deformed::Deformed;
+pub(crate) use deformed::{Deformed, Tried};
 pub(crate) use mesh::Grading;
 pub(crate) use touch::Law;
 pub(crate) use way::{Way, taken};

@@ -18,7 +18,7 @@ const TOLERANCE: f64 = 1e-9;
 /// What may be left of the residual by a step under sliding friction: the linear system is solved in steps of its own, and a
 /// Newton step leaves more than this but for the last ones.
 const STEP: f64 = 1e-4;
-/// No step moves a node by more than this part of the radius.
+/// No step closes a gap by more than this part of the radius.
 const LONGEST: f64 = 0.15;
 /// Growth of the residual that a whole step may have: points that come to touch bear at once.
 const MAX_GROWTH: f64 = 3.0;
@@ -92,8 +92,9 @@ impl Problem<'_> {
             }
             let step = self.step(&now, &mut tangent)?;
             let longest = step.iter().map(|u| u.length()).fold(0.0, f64::max);
+            let closes_mm = self.law.sharing * longest;
             let mut part =
-                (LONGEST * self.body.mesh.grading.radius_mm / longest.max(f64::MIN_POSITIVE)).min(1.0);
+                (LONGEST * self.body.mesh.grading.radius_mm / closes_mm.max(f64::MIN_POSITIVE)).min(1.0);
             let mut found: Option<(f64, f64)> = None;
             for _ in 0..MAX_HALVINGS {
                 let moved: Vec<DVec3> =

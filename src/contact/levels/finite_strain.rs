@@ -6,7 +6,7 @@ use super::overlap::overlap;
 use crate::elastomer::{Elastomer, Indenter};
 use crate::error::ContactError;
 use crate::field::Field;
-use crate::finite_strain::{Deformed, Grading, Law, Way, taken};
+use crate::finite_strain::{Deformed, Grading, Law, Tried, Way, taken};
 use crate::object::Placed;
 use crate::outcome::{Status, TouchedNode};
 use crate::state::ContactState;
@@ -15,7 +15,7 @@ use domecast_springs::Wrench;
 
 /// Deepest push-out that is modelled, as a part of the radius: proven against an independent solution to a quarter.
 const DEEPEST: f64 = 0.4;
-/// Pressure by depth, over Young's modulus by radius: an object then lies some 1e-4 R inside the dome.
+/// Pressure by depth, over the modulus of object and dome together by radius: an object then lies some 1e-4 R inside the dome.
 const PENALTY: f64 = 6000.0;
 /// What the base may bear more or less than the object, as a part of the contact's force.
 const BALANCE: f64 = 1e-6;
@@ -24,13 +24,14 @@ const PATCH_RAD: [f64; 2] = [0.3, 0.75];
 /// The patch over the angle of what overlaps: Hertz' contact has 0.7 of that.
 const PATCH_BY_OVERLAP: f64 = 1.1;
 
-/// The contact at a pose. See [`crate::Level::FiniteStrain`].
+/// The contact at a pose. See [`crate::Level::FiniteStrain`]. What was found at a place near by, from the same frame before, makes it shorter.
 pub(crate) fn finite_strain(
     elastomer: &Elastomer,
     across: usize,
     indenter: &Indenter,
     sensor_from_object: &Rigid,
     before: Option<&ContactState>,
+    tried: Option<Tried<'_>>,
 ) -> Result<ContactState, ContactError> {
     let radius_mm = elastomer.dome_radius_mm;
     let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
@@ -54,16 +55,19 @@ pub(crate) fn finite_strain(
             let grading = Grading { radius_mm, middle, patch_rad, across };
             let mut from = *sensor_from_object;
             from.translation_mm += middle * depth_mm;
-            (Deformed::new(elastomer, grading)?, from)
+            let known = tried.and_then(|tried| tried.deformed.rested(&grading));
+            (known.map_or_else(|| Deformed::new(elastomer, grading), Ok)?, from)
         }
     };
+    let sharing = 1.0 + indenter.yield_ratio(elastomer);
     let law = Law {
-        penalty: PENALTY * elastomer.young_mpa / radius_mm,
+        penalty: PENALTY * elastomer.young_mpa / (radius_mm * sharing),
         friction: elastomer.friction,
         curved_mm: 2.0 * radius_mm / PENALTY,
-        sharing: 1.0 + indenter.yield_ratio(elastomer),
+        sharing,
     };
-    let way = taken(deformed, &law, &placed, &from, depth_mm)?;
+    let tried = tried.filter(|tried| Arc::ptr_eq(&tried.deformed.body, &deformed.body));
+    let way = taken(deformed, &law, &placed, &from, depth_mm, tried)?;
     Ok(state_of(way, &law, &placed, 30.0 * found.queries as f64))
 }
 

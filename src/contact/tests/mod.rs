@@ -303,6 +303,26 @@ fn soft_objects_yield_their_share() {
     assert!((b.displacement_mm(pole).z / a.displacement_mm(pole).z - 0.5).abs() < 0.06);
 }
 
+/// A gap that closes several times as fast as the dome moves, on springs: held, then dragged on, then pressed with a force.
+#[test]
+fn soft_objects_are_balanced_at_finite_strain() {
+    let contact = Contact::new(silicone(), Level::FiniteStrain { across: 4 }).unwrap();
+    let soft = Indenter { young_mpa: Some(0.1), poisson: 0.47, ..ball(5.0) };
+    let suspension = suspension();
+    let at = |x_mm: f64, z_mm: f64| Rigid::from_translation(DVec3::new(x_mm, 0.0, z_mm));
+    let first = contact.press(&soft, &suspension, &at(0.5, 14.3), None).unwrap();
+    let second = contact.press(&soft, &suspension, &at(0.8, 14.0), Some(&first)).unwrap();
+    let way = -DVec3::Z;
+    let third =
+        contact.press_with_force(&soft, &suspension, &at(0.8, 14.0), way, 0.3, Some(&second)).unwrap();
+    for pressed in [&first, &second, &third] {
+        assert_eq!(pressed.status, PressStatus::Balanced, "{}", pressed.residual_n);
+        assert!(pressed.residual_n < 1e-6 && pressed.iterations < 30, "{pressed:?}");
+    }
+    assert!(second.wrench.force_n.x > 0.0, "dragged along: {}", second.wrench.force_n);
+    assert!((third.wrench.force_n.dot(way) - 0.3).abs() < 1e-6, "{}", third.wrench.force_n);
+}
+
 /// A box of twelve triangles.
 fn box_mesh(size: DVec3) -> TriMesh {
     let corner = |i: u32| {

@@ -7,8 +7,8 @@
 >>> reading.status, reading.wrench, reading.wrench_sd
 
 Lengths are mm, angles rad unless a name says deg, forces N, torques N mm, pixels px with the centre of the top-left one at
-(0, 0). Faults are `DomecastError`, with the field. A `Tracker`, a `Shape` and a `Traction` serve one thread each; the rest is
-free to share. `domecast.mujoco` and `domecast.gym` are for simulators, `domecast.ros` is a node of ROS 2.
+(0, 0). Faults are `DomecastError`, with the field. A `Tracker`, a `Shape`, a `Traction`, a `ContactHardness` and a `HardnessModel` serve one
+thread each; the rest is free to share. `domecast.mujoco` and `domecast.gym` are for simulators, `domecast.ros` is a node of ROS 2.
 """
 
 from ._commands import accuracy, calibrate_force, calibrate_light, calibrate_optics, calibrate_print, main
@@ -16,7 +16,10 @@ from ._design import Design, Optics
 from ._error import DomecastError
 from ._native import (
     Camera,
+    ContactHardness,
     Forces,
+    Hardness,
+    HardnessModel,
     Layout,
     Reading,
     Sensor,
@@ -30,9 +33,12 @@ from ._scene import Scene
 
 __all__ = [
     "Camera",
+    "ContactHardness",
     "Design",
     "DomecastError",
     "Forces",
+    "Hardness",
+    "HardnessModel",
     "Layout",
     "Optics",
     "Reading",

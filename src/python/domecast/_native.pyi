@@ -276,6 +276,76 @@ class Forces:
         """The line that `domecast track --traction` writes of this frame."""
 
 @final
+class Hardness:
+    """What a frame says of how hard the touched object is: the member of the line that `domecast track` writes. What is not said is None."""
+
+    @property
+    def status(self) -> str:
+        """Of a `ContactHardness`: `ok`, `saturated` (too hard for this dome), `impossible` (the travel is not what it is taken for) or `not_measured`;
+        of a `HardnessModel`: `ok` or `unsure`."""
+
+    @property
+    def reason(self) -> str | None:
+        """Why a model is unsure."""
+
+    @property
+    def class_name(self) -> str | None:
+        """The most probable class of a model."""
+
+    @property
+    def probability(self) -> float | None: ...
+    @property
+    def log10_youngs_modulus_mpa(self) -> float | None: ...
+    @property
+    def interval_90(self) -> tuple[float, float] | None:
+        """Within these 90 of 100 moduli lie, log10 of MPa."""
+
+    @property
+    def frames(self) -> int | None:
+        """Frames of the touch so far, of a `ContactHardness`."""
+
+    def json(self) -> str:
+        """The member."""
+
+@final
+class ContactHardness:
+    """Young's modulus of what is touched, by contact mechanics, from how far the hand has moved: each touch for itself. One thread at a time."""
+
+    def __new__(cls, sensor: Sensor, rest: Reading, *, travel_sd_mm: float = 0.02) -> ContactHardness:
+        """`rest`: the reading of a frame of the untouched sensor. `travel_sd_mm`: the noise of the hand's travel."""
+
+    def update(self, forces: Forces, shape: ShapeMap, *, travel_mm: float) -> Hardness | None:
+        """Takes a frame in: its forces, its shape, and how far the hand has brought sensor and object together, mm from anywhere, growing.
+        None where nothing touches or the frame is not `ok`."""
+
+@final
+class HardnessModel:
+    """Class or Young's modulus of what is touched, by a network over a window of frames. One thread at a time."""
+
+    @staticmethod
+    def load(path: str | PathLike[str]) -> HardnessModel:
+        """Reads a model, an ONNX file of `domecast-learn`."""
+
+    def set_rest(self, frame: Bytes, reading: Reading, *, rgb: bool) -> None:
+        """Takes a frame of the untouched sensor, and its reading."""
+
+    def update(
+        self,
+        frame: Bytes,
+        reading: Reading,
+        *,
+        rgb: bool,
+        shape: ShapeMap | None = None,
+        contact: Hardness | None = None,
+    ) -> Hardness | None:
+        """Takes the next frame in. None until the window is full, which begins anew at a frame that is not `ok`. With `shape` the model is unsure
+        once a frame shows that the one at rest was touched; with `contact`, what a `ContactHardness` says of the same frame, it says nothing
+        that this contradicts."""
+
+    def restart(self) -> None:
+        """Forgets the frames, not the rest."""
+
+@final
 class Camera:
     """A camera of Linux with exposure, gain and white balance locked, or `player:FOLDER?rate=60`: frames as they come, the newest first where
     the caller falls behind."""

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::arguments::TrackArguments;
 use crate::commands::input::input_fault;
 use crate::commands::output::Failure;
-use domecast_dataset::TrackedRest;
+use domecast_hardness::TrackedRest;
 use domecast_live::decode::{self, Picture};
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
 

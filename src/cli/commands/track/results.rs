@@ -7,7 +7,7 @@ use glam::DVec3;
 use serde_json::Value;
 
 use super::arguments::{Format, TrackArguments};
-use super::contact_hardness::ContactHardness;
+use super::contact_hardness::ContactHardnessLines;
 use super::hardness::HardnessLines;
 use super::pictures::Pictures;
 use super::rest_frame::RestFrame;
@@ -94,7 +94,7 @@ pub(super) struct Results {
     sink: Sink,
     pictures: Pictures,
     shape: Option<ShapeFiles>,
-    contact_hardness: Option<ContactHardness>,
+    contact_hardness: Option<ContactHardnessLines>,
     hardness: Option<HardnessLines>,
     page: Option<(StagedFile, TrackReport)>,
     recording: Option<Recording>,
@@ -115,7 +115,7 @@ impl Results {
         let at_mm = tracker.springs().map_or(DVec3::ZERO, Springs::at_mm);
         let pictures = Pictures::new(arguments, rules, constants, tracker)?;
         let shape = ShapeFiles::open(output, arguments, rules, constants, tracker, rest)?;
-        let contact_hardness = ContactHardness::open(arguments, constants, rest, at_mm)?;
+        let contact_hardness = ContactHardnessLines::open(arguments, constants, rest, at_mm)?;
         let hardness = HardnessLines::open(arguments, rest, at_mm)?;
         let sink = Sink::new(arguments.out.as_deref(), rules)?;
         let page = match &arguments.report {
@@ -178,10 +178,10 @@ impl Results {
         let skin = frame.and(self.shape.as_ref()).map(ShapeFiles::map);
         let mut by_contact = None;
         if let (Some(touch), Some(forces)) = (&mut self.contact_hardness, forces.as_deref()) {
-            by_contact = touch.take(tracked, forces.result(), skin)?;
-            add_member(&mut self.line, "contact_hardness", &touch.member(by_contact.as_ref()));
+            let member;
+            (by_contact, member) = touch.take(tracked, forces.result(), skin)?;
+            add_member(&mut self.line, "contact_hardness", &member);
         }
-        let by_contact = by_contact.filter(|found| found.status.is_measured());
         if let Some(lines) = &mut self.hardness
             && let Some(member) = lines.member(frame, tracked, skin, by_contact.as_ref())
         {

@@ -3,15 +3,16 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::readings::SeenDot;
+use crate::columns::SeenDot;
 use domecast_runtime::track::Tracked;
-use domecast_springs::Displacement;
+use domecast_springs::{Displacement, Wrench};
 
 /// What is tracked of a frame of the untouched sensor, which is taken off all others.
 #[derive(Debug, Clone)]
 pub struct TrackedRest {
     at_mm: DVec3,
     rigid: [[f64; 6]; 2],
+    wrench_sd: Option<Wrench>,
     /// How far each dot is seen from where it would be on the undeformed dome.
     dots_px: Vec<Option<DVec2>>,
 }
@@ -20,12 +21,24 @@ impl TrackedRest {
     /// Of the frame at rest; wrench and platform are about this point, mm.
     pub fn new(tracked: &Tracked, at_mm: DVec3) -> Self {
         let dots_px = moved_px(tracked).map(|dot| dot.map(|(_, moved_px)| moved_px)).collect();
-        Self { at_mm, rigid: rigid(tracked, at_mm), dots_px }
+        Self { at_mm, rigid: rigid(tracked, at_mm), wrench_sd: tracked.wrench_sd, dots_px }
     }
 
     /// Whether wrench and platform are known at rest.
     pub fn is_known(&self) -> bool {
         self.rigid.iter().flatten().all(|value| value.is_finite())
+    }
+
+    /// What wrench and platform are about, mm.
+    pub fn at_mm(&self) -> DVec3 {
+        self.at_mm
+    }
+
+    /// Deviations of the wrench that the load has brought, N: what stays from frame to frame is in the rest as well.
+    pub fn load_sd_n(&self, tracked: &Tracked) -> DVec3 {
+        let Some((now, rest)) = tracked.wrench_sd.zip(self.wrench_sd) else { return DVec3::ZERO };
+        let square = now.force_n * now.force_n - rest.force_n * rest.force_n;
+        square.max(DVec3::ZERO).map(f64::sqrt)
     }
 
     /// Wrench (N, N mm) and displacement of the platform (mm, rad) of a frame, less those at rest; NaN where the tracker withholds

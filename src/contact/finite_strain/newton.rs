@@ -1,11 +1,12 @@
 //! Newton's method for one pose of the object.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::krylov::gmres;
 use super::system::{Body, Tangent};
 use super::touch::{Anchors, Bearings, Law, Spot};
 use crate::object::Placed;
+use domecast_elastic::Factors;
 
 /// Newton's steps of one pose.
 const MAX_STEPS: usize = 24;
@@ -22,6 +23,12 @@ const STEP: f64 = 1e-4;
 const LONGEST: f64 = 0.15;
 /// Growth of the residual that a whole step may have: points that come to touch bear at once.
 const MAX_GROWTH: f64 = 3.0;
+/// Steps without gain from which on none may grow: points that stick and slide in turn would do so for ever.
+const PATIENCE: usize = 2;
+/// First spring on every node, over shear modulus by radius, where the tangent alone is not positive definite; four times as stiff each time
+/// that it is not enough, and how often.
+const SHIFT: f64 = 1e-3;
+const SHIFTS: u32 = 5;
 
 /// Body, surface and law of one contact.
 pub(crate) struct Problem<'a> {
@@ -96,6 +103,11 @@ impl Problem<'_> {
             let mut part =
                 (LONGEST * self.body.mesh.grading.radius_mm / closes_mm.max(f64::MIN_POSITIVE)).min(1.0);
             let mut found: Option<(f64, f64)> = None;
+            let allowed_n = if without_gain < PATIENCE {
+                MAX_GROWTH * now.size_n.max(scale_n * 1e-3)
+            } else {
+                now.size_n
+            };
             for _ in 0..MAX_HALVINGS {
                 let moved: Vec<DVec3> =
                     now.displaced_mm.iter().zip(&step).map(|(u, s)| *u + *s * part).collect();
@@ -105,7 +117,7 @@ impl Problem<'_> {
                     if size_n.is_finite() && found.is_none_or(|(_, smallest_n)| size_n < smallest_n) {
                         found = Some((part, size_n));
                     }
-                    if size_n < MAX_GROWTH * now.size_n.max(scale_n * 1e-3) {
+                    if size_n < allowed_n {
                         break;
                     }
                 }
@@ -122,6 +134,23 @@ impl Problem<'_> {
         None
     }
 
+    /// Factors of the tangent, or of one with as stiff a spring on each node as it needs: the step is then shorter.
+    fn factored(&self, tangent: &mut Tangent) -> Option<Factors> {
+        let Body { mesh, material, .. } = self.body;
+        let mut spring = SHIFT * material.shear_mpa * mesh.grading.radius_mm;
+        for _ in 0..SHIFTS {
+            if let Some(factors) = self.body.factor(tangent) {
+                return Some(factors);
+            }
+            for node in (0..mesh.is_base.len()).filter(|node| !mesh.is_base[*node]) {
+                let node = node as u32;
+                self.body.add(tangent, node, node, &DMat3::from_diagonal(DVec3::splat(spring)));
+            }
+            spring *= 4.0;
+        }
+        self.body.factor(tangent)
+    }
+
     /// Newton's step.
     fn step(&self, now: &Trial, tangent: &mut Tangent) -> Option<Vec<DVec3>> {
         let mesh = &self.body.mesh;
@@ -136,7 +165,7 @@ impl Problem<'_> {
             }
         }
         self.body.hold_base(tangent);
-        let factors = self.body.factor(tangent)?;
+        let factors = self.factored(tangent)?;
         let mut rhs: Vec<f64> = now.forces_n.iter().flat_map(|force| (-*force).to_array()).collect();
         if now.bearings.is_even {
             self.body.solve(&factors, &mut rhs);

@@ -153,9 +153,9 @@ def main():
         frames = asked.frames or (10_000 if asked.all else 800)
         measured = [asked.accuracy.resolve()] if asked.accuracy else []
         # of random weights, for every light
-        model = with_metadata(network(8, SIZE, len(RIGID), [8, 16]), [[0, 255]] + [[0, 100]] * 12)
-        (base / "hardness.onnx").write_bytes(model)
-        run(python, HERE / "same_as_cli.py", domecast, REPOSITORY, base / "work", base / "hardness.onnx", frames, *measured, cwd=base)
+        model = base / "hardness.onnx"
+        model.write_bytes(with_metadata(network(8, SIZE, len(RIGID), [8, 16]), [[0, 255]] + [[0, 100]] * 12))
+        run(python, HERE / "same_as_cli.py", domecast, REPOSITORY, base / "work", model, frames, *measured, cwd=base)
         # beside the packages of the tests: the installed files alone
         site = base / "site"
         shutil.rmtree(site, ignore_errors=True)
@@ -165,7 +165,7 @@ def main():
         check_types(site)
         constants = base / "work/by-cli/constants/constants.json"
         inputs = asked.inputs or (100_000 if asked.all else 3_000)
-        run(sys.executable, HERE / "wrong_inputs.py", constants, REPOSITORY, base / "hardness.onnx", inputs, env=beside, cwd=base)
+        run(sys.executable, HERE / "wrong_inputs.py", constants, REPOSITORY, model, inputs, env=beside, cwd=base)
         run(sys.executable, HERE / "run_notebooks.py", REPOSITORY, base / "notebooks", env=beside)
         run(sys.executable, HERE / "ros_node.py", constants, base / "work/simulated-push", env=beside, cwd=base)
         if (HERE / "simulators.py").exists():

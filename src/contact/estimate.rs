@@ -3,6 +3,9 @@
 use crate::elastomer::{Elastomer, Indenter};
 use crate::level::{Level, MAX_ELEMENTS, elements_of};
 
+/// Contact solves that a balance with the springs takes, as a rule, where none begins at another's end.
+const SOLVES: f64 = 12.0;
+
 /// What a level costs and how far it may be off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
@@ -10,8 +13,7 @@ pub struct Estimate {
     pub displacement_mm: f64,
     /// The force at a held pose is within this part of the reference's.
     pub force_part: f64,
-    /// Of one solve, in units of about a nanosecond of one core; by the linear and the finite-strain level of a whole balance with springs,
-    /// whose solves begin at each other's end.
+    /// Of a whole balance with springs, in units of about a nanosecond of one core.
     pub work: f64,
     /// Once per dome, in the same units.
     pub setup_work: f64,
@@ -36,7 +38,7 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
     let nodes = |h: f64| 4.0 + 1.5 * std::f64::consts::PI * radius * depth / (h * h);
     let large = 0.8 * deep * depth;
     // A mesh's distance is that of its faces near by.
-    let local_work = if indenter.solid.is_mesh() { 2e7 } else { 1e5 };
+    let local_work = SOLVES * if indenter.solid.is_mesh() { 2e7 } else { 1e5 };
     match level {
         Level::Geometric => Estimate {
             displacement_mm: (0.55 + sharp + 3.0 * deep) * depth,
@@ -48,7 +50,7 @@ pub fn estimate(level: Level, elastomer: &Elastomer, indenter: &Indenter, depth_
         Level::ClosedForm => Estimate {
             displacement_mm: (0.2 + 3.5 * deep) * depth,
             force_part: 0.15 + 2.0 * deep,
-            work: if indenter.solid.is_ball() { 5e3 } else { local_work },
+            work: if indenter.solid.is_ball() { SOLVES * 5e3 } else { local_work },
             setup_work: 0.0,
             applies: !indenter.solid.is_mesh(),
         },

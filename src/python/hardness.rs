@@ -126,6 +126,7 @@ impl PyContactHardness {
     #[pyo3(signature = (forces, shape, *, travel_mm))]
     fn update(
         &mut self,
+        py: Python<'_>,
         forces: &PyForces,
         shape: &PyShapeMap,
         travel_mm: f64,
@@ -133,7 +134,8 @@ impl PyContactHardness {
         if !travel_mm.is_finite() {
             return Err(Fault::argument("travel_mm", travel_mm, "is no travel", "mm, finite").into());
         }
-        let found = self.touch.update(forces.tracked(), forces.local(), Some(shape.map()), travel_mm);
+        let (tracked, local, skin) = (forces.tracked(), forces.local(), Some(shape.map()));
+        let found = py.detach(|| self.touch.update(tracked, local, skin, travel_mm));
         Ok(PyHardness::new(self.touch.to_json(found.as_ref()), found))
     }
 }

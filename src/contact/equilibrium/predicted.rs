@@ -41,24 +41,31 @@ impl<'a> Predicting<'a> {
         std::array::from_fn(|i| if i < 6 { of[i] } else { gone_mm })
     }
 
-    /// Adds to a start what the closed form has moved since the frame before; in a first frame the start is its.
-    fn add(&self, x: &mut DVector<f64>, way: DVec3, now: &Pressed, then: Option<&Pressed>) {
-        let now = self.unknowns(now, way);
-        let then = then.map(|then| self.unknowns(then, way));
+    /// Adds to a start what the closed form has moved since the frame before, where there was one; in a first frame the start is its. What it has
+    /// no answer to leaves the start as it is.
+    fn add(
+        &self,
+        x: &mut DVector<f64>,
+        way: DVec3,
+        now: Option<Pressed>,
+        then: Option<Option<Pressed>>,
+    ) -> Option<()> {
+        let now = self.unknowns(&now?, way);
+        let then = match then {
+            Some(then) => Some(self.unknowns(&then?, way)),
+            None => None,
+        };
         for (i, value) in x.iter_mut().enumerate() {
             *value = then.map_or(now[i], |then| *value + now[i] - then[i]);
         }
+        Some(())
     }
 
     /// Of an object that is held.
     pub fn held(&self, x: &mut DVector<f64>, before: Option<&Pressed>) {
         let press = |at: &Rigid| self.closed_form.press(self.indenter, self.suspension, at, None).ok();
         let then = before.map(|before| press(&before.rest_from_object));
-        match (press(&self.rest_from_object), then) {
-            (Some(now), None) => self.add(x, DVec3::ZERO, &now, None),
-            (Some(now), Some(Some(then))) => self.add(x, DVec3::ZERO, &now, Some(&then)),
-            _ => {}
-        }
+        self.add(x, DVec3::ZERO, press(&self.rest_from_object), then);
     }
 
     /// Of an object that is pressed with a force along a way.
@@ -69,10 +76,6 @@ impl<'a> Predicting<'a> {
         };
         let then = before.filter(|before| !before.state.nodes.is_empty());
         let then = then.map(|before| press(before.wrench.force_n.dot(way)));
-        match (press(force_n), then) {
-            (Some(now), None) => self.add(x, way, &now, None),
-            (Some(now), Some(Some(then))) => self.add(x, way, &now, Some(&then)),
-            _ => {}
-        }
+        self.add(x, way, press(force_n), then);
     }
 }

@@ -16,8 +16,6 @@ pub struct ContactEffect;
 /// Times at which an object's way is looked at.
 const LOOKS: u32 = 257;
 
-/// Contact solves that a balance with the springs takes, as a rule, at the levels whose work is of one.
-const SOLVES: f64 = 12.0;
 /// Balances' worth of work of several contacts until they agree: their trials do not begin at each other's end.
 const TURNS: f64 = 30.0;
 /// Directions of the dome at which its depth in an object is looked at.
@@ -32,9 +30,7 @@ fn per_frame(scene: &Scene, name: LevelName) -> u64 {
     };
     let work: f64 = scene.objects().iter().map(of_object).sum();
     let turns = if scene.objects().len() > 1 { TURNS } else { 1.0 };
-    let is_whole = matches!(name, LevelName::Linear | LevelName::FiniteStrain);
-    let solves = if is_whole { 1.0 } else { SOLVES };
-    (solves * turns * work) as u64
+    (turns * work) as u64
 }
 
 /// A coarser level than the scene's that the plan may take: its name, how far its pictures of dots may be from those

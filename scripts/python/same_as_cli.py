@@ -257,7 +257,8 @@ def hardness(folder, frames, rest):
                 check(False, f"hardness of frame {reading.frame}: {found and found.json()} of {wanted}")
     check(len(said) > 3, f"hardness as track --travel --hardness states it: {said}")
     turned = domecast.Tracker(sensor, camera_turned_deg=90.0).update(plain, rgb=True)
-    refused = [("a turned camera", lambda: model.set_rest(plain, turned, rgb=True)),
+    refused = [("a model without a rest", lambda: domecast.HardnessModel.load(MODEL).update(frame, reading, rgb=True)),
+               ("a turned camera", lambda: model.set_rest(plain, turned, rgb=True)),
                ("a rest without a wrench", lambda: domecast.ContactHardness(sensor, tracker.skip())),
                ("a model's hardness for contact mechanics'", lambda: model.update(frame, reading, rgb=True, contact=by_model)),
                ("travel that is none", lambda: touch.update(forces.update(reading, shape=skin), skin, travel_mm=float("nan")))]

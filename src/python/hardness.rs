@@ -196,6 +196,10 @@ impl PyHardnessModel {
         let array = FrameArray::new(frame, rgb)?;
         let bytes = array.bytes();
         let seen = array.over(&bytes)?;
+        if !self.model.has_rest() {
+            let allowed = "`set_rest` with a frame of the untouched sensor first";
+            return Err(Fault::argument("rest", "", "was not given", allowed).into());
+        }
         if let Some(shape) = shape {
             self.model.see_skin(shape.map());
         }

@@ -63,6 +63,11 @@ impl HardnessModel {
         is_whole
     }
 
+    /// Whether it was given the untouched sensor: it says nothing before.
+    pub fn has_rest(&self) -> bool {
+        self.rest.is_some()
+    }
+
     /// Takes in what a frame's shape says of the frame at rest: of every frame with one, before [`HardnessModel::update`].
     pub fn see_skin(&mut self, skin: &ShapeMap) {
         self.is_rest_touched |= skin.is_raised;
@@ -91,7 +96,7 @@ impl HardnessModel {
         tracked: &Tracked,
         by_contact: Option<&Hardness>,
     ) -> Option<Result<HardnessEstimate, Unsure>> {
-        let whole = frame.filter(|_| self.rest.is_some() && tracked.status() == "ok").map(view);
+        let whole = frame.filter(|_| self.has_rest() && tracked.status() == "ok").map(view);
         if whole.is_none() {
             self.reader.restart();
             return None;

@@ -30,7 +30,6 @@ FRAMES, NOISE, TRAVEL_SD_MM = 12, 1.0, 0.02
 RANGE_MPA, SOFT_MPA = (0.05, 5.0), 0.28
 # between soft and hard, as the shipped sets have them (0.07 and 0.9 MPa)
 BORDER_MPA = 0.25
-# The simulator takes a cap's thin base off the object's yield as well, which the formula does not.
 MAX_RMS = {"thumb24": 0.15, "picam-r20": 0.2, "digit-rigid": 0.35}
 
 
@@ -83,11 +82,10 @@ def noisy(folder, rng):
         cv2.imwrite(str(file), np.clip(np.round(frame + rng.normal(0, NOISE, frame.shape)), 0, 255).astype(np.uint8))
 
 
-def held_beside_hemisphere(center):
-    """What a cap's base holds back beside a hemisphere's, in F/(E* R), from the table of golden_held.py."""
+def held(center):
+    """What a dome's base holds back, in F/(E* R), from the table of golden_held.py."""
     table = json.loads((ROOT / "tests/cases/golden_held.json").read_text())["held"]
-    at, held = [line["center_z"] for line in table], [line["held"] for line in table]
-    return np.interp(center, at, held) - np.interp(0.0, at, held)
+    return np.interp(center, [line["center_z"] for line in table], [line["held"] for line in table])
 
 
 def second_opinion(lines, travel, rest, constants):
@@ -96,7 +94,7 @@ def second_opinion(lines, travel, rest, constants):
     radius, center = optics["dome_radius_mm"], np.array([0, 0, optics.get("dome_center_z_mm", 0.0)])
     at = np.array(springs["at_mm"]) if springs else np.zeros(3)
     own = (1 - elastomer["poisson_ratio"] ** 2) / elastomer["young_modulus_mpa"]
-    base = held_beside_hemisphere(center[2] / radius) * own / radius
+    base = held(center[2] / radius) * own / radius
 
     def motion(line):
         pose = np.array(line["pose"])
@@ -140,14 +138,14 @@ def second_opinion(lines, travel, rest, constants):
     grid = np.linspace(1e-6, force.max(), 4001)
     a = np.exp(y0 + slope * (np.log(grid) - x0)) * np.sqrt(0.6 * (1 + 2 * slope))
     # the integral's part below the first place of the grid is the same for all frames
-    integral = np.concatenate([[0], np.cumsum(np.diff(grid) * (1 / (2 * (a[1:] + a[:-1]) / 2) - 0.33 / radius))])
+    integral = np.concatenate([[0], np.cumsum(np.diff(grid) / (a[1:] + a[:-1]))])
     across = np.interp(force, grid, integral)
     (yields, _), left, *_ = np.polyfit(across, depth, 1, full=True)
     sd = max(TRAVEL_SD_MM, np.sqrt((left[0] if len(left) else 0.0) / (len(force) - 2))) / np.sqrt(((across - across.mean()) ** 2).sum())
     logs = np.linspace(-2, 1, 6001)
     total = own + (1 - 0.47**2) / 10**logs
-    yields = max(yields, own * np.exp(-0.24))
-    spread = np.sqrt(0.12**2 + (sd / yields) ** 2 + gain**2 + (own / total * elastomer["young_modulus_sd_mpa"] / elastomer["young_modulus_mpa"]) ** 2)
+    yields = max(yields, own * np.exp(-0.2))
+    spread = np.sqrt(0.10**2 + (sd / yields) ** 2 + gain**2 + (own / total * elastomer["young_modulus_sd_mpa"] / elastomer["young_modulus_mpa"]) ** 2)
     sums = np.cumsum(np.exp(-0.5 * (np.log(yields / total) / spread) ** 2) / spread)
     return np.interp([0.5, 0.05, 0.95], sums / sums[-1], logs)
 

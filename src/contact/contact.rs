@@ -28,7 +28,12 @@ pub struct Contact {
 pub(crate) enum Prepared {
     Nothing,
     Compliance(Arc<Compliance>),
+    /// Of the finite-strain level, for what a soft object moves beyond its share: coarse, factored where it is asked for.
+    Held(Arc<Compliance>),
 }
+
+/// Elements along the meridian for [`Prepared::Held`].
+const HELD_ELEMENTS: usize = 32;
 
 impl Contact {
     /// Makes a dome ready for a level.
@@ -40,7 +45,9 @@ impl Contact {
         elastomer.check()?;
         let prepared = match level {
             Level::Geometric | Level::ClosedForm => Prepared::Nothing,
-            Level::FiniteStrain { across } if (4..=16).contains(&across) => Prepared::Nothing,
+            Level::FiniteStrain { across } if (4..=16).contains(&across) => {
+                Prepared::Held(Arc::new(Compliance::new(&elastomer.elastic(), HELD_ELEMENTS)?))
+            }
             Level::FiniteStrain { across } => {
                 let (field, allowed) = ("level.across", "4 to 16");
                 return Err(ContactError::Dimension { field, value: across as f64, allowed });
@@ -66,6 +73,9 @@ impl Contact {
             Prepared::Compliance(compliance) if factor != 1.0 => {
                 Prepared::Compliance(Arc::new(compliance.scaled(factor)))
             }
+            Prepared::Held(compliance) if factor != 1.0 => {
+                Prepared::Held(Arc::new(compliance.scaled(factor)))
+            }
             prepared => prepared.clone(),
         };
         Ok(Self { elastomer, prepared, ..self.clone() })
@@ -75,7 +85,7 @@ impl Contact {
     pub fn compliance(&self) -> Option<&Compliance> {
         match &self.prepared {
             Prepared::Compliance(compliance) => Some(compliance),
-            Prepared::Nothing => None,
+            _ => None,
         }
     }
 
@@ -124,7 +134,7 @@ impl Contact {
     ) -> Result<ContactState, ContactError> {
         let history = before.map(|state| &state.history);
         let elastomer = &self.elastomer;
-        if !elastomer.dome().is_hemisphere() && matches!(self.prepared, Prepared::Nothing) {
+        if !elastomer.dome().is_hemisphere() && !matches!(self.prepared, Prepared::Compliance(_)) {
             let (level, kind) = (self.level.name(), elastomer.dome().kind());
             return Err(ContactError::HemisphereOnly { level, kind });
         }
@@ -132,13 +142,11 @@ impl Contact {
             (Prepared::Compliance(compliance), _) => {
                 linear::linear(elastomer, compliance, indenter, sensor_from_object, before)
             }
-            (Prepared::Nothing, Level::Geometric) => {
-                levels::geometric(elastomer, indenter, sensor_from_object, history)
+            (Prepared::Held(held), Level::FiniteStrain { across }) => {
+                levels::finite_strain((elastomer, held), across, indenter, sensor_from_object, before, tried)
             }
-            (Prepared::Nothing, Level::FiniteStrain { across }) => {
-                levels::finite_strain(elastomer, across, indenter, sensor_from_object, before, tried)
-            }
-            (Prepared::Nothing, _) => levels::closed_form(elastomer, indenter, sensor_from_object, history),
+            (_, Level::Geometric) => levels::geometric(elastomer, indenter, sensor_from_object, history),
+            _ => levels::closed_form(elastomer, indenter, sensor_from_object, history),
         })
     }
 

@@ -117,7 +117,7 @@ impl Indenter {
     ///
     /// Both surfaces bear the same pressure, and near the contact both are half-spaces, so the gap closes by
     /// 1 + this ratio times what the dome alone would yield (Hertz' combined modulus, K. L. Johnson, Contact
-    /// Mechanics, 1985, eq. 4.20).
+    /// Mechanics, 1985, eq. 4.20), and by what the dome's base holds back of its own part alone.
     pub fn yield_ratio(&self, elastomer: &Elastomer) -> f64 {
         self.young_mpa.map_or(0.0, |young_mpa| {
             elastomer.plane_strain_mpa() * (1.0 - self.poisson * self.poisson) / young_mpa

@@ -72,7 +72,8 @@ impl OnPole {
         for (number, ring) in revolved.rings().into_iter().enumerate() {
             let parts = NodeParts::whole(number);
             let (at_mm, area_mm2, spread_mm) = (ring.at_mm, ring.area_mm2, ring.spread_mm);
-            let spot = Spot { node: number, parts, at_mm, area_mm2, spread_mm };
+            let beyond = DMat3::ZERO;
+            let spot = Spot { node: number, parts, at_mm, area_mm2, spread_mm, beyond };
             touch.candidates.push(Candidate::new(spot, elastomer, &touch.placed, &way, touch.sharing)?);
         }
         touch.blocks = blocks(&revolved, touch.candidates.len());

@@ -60,6 +60,8 @@ pub(crate) struct History {
     /// Friction force and moment about the normal of a level with one spring for the whole contact, N, N*mm.
     pub tangential_n: DVec3,
     pub torsion_nmm: f64,
+    /// What the object had moved beyond its share of the dome's own displacement, mm.
+    pub beyond_mm: DVec3,
     /// Unknowns of the last solve, by node of the level's grid: force in the node's frame, tangential displacement.
     pub nodes: Vec<NodeMemory>,
     /// The deformed body of the finite-strain level.

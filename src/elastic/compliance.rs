@@ -34,6 +34,7 @@ pub struct Compliance {
 struct Tables {
     /// The dome and its elements, as text.
     of: String,
+    elastic: ElasticDome,
     grid: Grid,
     body: BondedBody,
     hats: Vec<Vec<(usize, f64)>>,
@@ -70,6 +71,7 @@ impl Compliance {
         let last = (0..grid.elements).map(|ring| grid.harmonics(ring)).max().unwrap_or(1);
         let tables = Tables {
             of: format!("{elastomer:?} {elements}"),
+            elastic: *elastomer,
             body: BondedBody::new(elastomer, elements)?,
             hats: (0..grid.elements).map(|ring| grid.hat(ring)).collect(),
             harmonics: (0..last).map(|_| OnceLock::new()).collect(),
@@ -95,6 +97,12 @@ impl Compliance {
     /// All that its numbers depend on, as text.
     pub fn key(&self) -> &str {
         &self.tables.of
+    }
+
+    /// The elastic body that it is of.
+    pub fn elastic(&self) -> ElasticDome {
+        let elastic = self.tables.elastic;
+        ElasticDome { young_mpa: elastic.young_mpa / self.yields, ..elastic }
     }
 
     /// How many harmonics are solved.

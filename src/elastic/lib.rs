@@ -13,6 +13,7 @@ mod dome;
 mod element;
 mod field;
 mod grid;
+mod held;
 mod mesh;
 mod revolved;
 
@@ -22,6 +23,7 @@ pub use compliance::Compliance;
 pub use dome::{ElasticDome, Extent, FactorError};
 pub use field::SurfaceField;
 pub use grid::{Grid, GridNode};
+pub use held::Held;
 pub use revolved::{Revolved, Ring};
 
 #[cfg(test)]

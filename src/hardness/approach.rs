@@ -4,19 +4,19 @@ use glam::DVec3;
 
 use crate::press::{Dome, PressRow};
 
-/// What the bonded base holds back, in F / (E* R): the middle of what finite elements give for a hemisphere of Poisson's ratio 0.49
-/// (`domecast-contact`, closed forms: 0.31 to 0.38).
-pub(crate) const HELD: f64 = 0.33;
-/// What a dome's base holds back, of its own yield, beside a hemisphere's: by the height of the sphere's centre above the base in radii. Fitted to
-/// scikit-fem (`tests/cases/golden_held.json`), which has 0.37 for the hemisphere where the elements that [`HELD`] is from are coarser.
-fn held_beside_hemisphere(center_z: f64) -> f64 {
-    if center_z < 0.0 {
-        // a cap is thin: towards the infinite layer's 0.57 over its height (Dimitriadis et al., Biophys. J. 82, 2002)
-        (-0.72 * center_z - 0.18 * center_z * center_z) / (1.0 + center_z)
-    } else {
-        // a column yields by itself: 1 / (pi (1 - nu^2)) for each radius of its height
-        -0.42 * center_z - 0.11 * center_z / (center_z + 0.25)
-    }
+/// What a hemisphere's bonded base holds back, in F / (E* R).
+const HEMISPHERE: f64 = 0.37;
+/// What a dome's base holds back, in F / (E* R): by the height of the sphere's centre above the base in radii. Fitted to scikit-fem
+/// (`tests/cases/golden_held.json`).
+pub(crate) fn held(center_z: f64) -> f64 {
+    HEMISPHERE
+        + if center_z < 0.0 {
+            // a cap is thin: towards the infinite layer's 0.57 over its height (Dimitriadis et al., Biophys. J. 82, 2002)
+            (-0.72 * center_z - 0.18 * center_z * center_z) / (1.0 + center_z)
+        } else {
+            // a column yields by itself: 1 / (pi (1 - nu^2)) for each radius of its height
+            -0.42 * center_z - 0.11 * center_z / (center_z + 0.25)
+        }
 }
 
 /// A frame is in contact where its force is above this.
@@ -52,23 +52,20 @@ pub(crate) fn pressed(row: &PressRow, dome: &Dome) -> Option<Pressed> {
     let room = behind * behind - near.length_squared() + dome.radius_mm * dome.radius_mm;
     let at_mm = dome.center_mm + near - way * (behind + room.max(0.0).sqrt());
     let platform = shift + turn.cross(at_mm - dome.at_mm);
-    // as deep as a hemisphere would be
+    // as deep as a half-space would be
     let own = (1.0 - dome.poisson * dome.poisson) / dome.young_mpa;
-    let held_mm = held_beside_hemisphere(dome.center_mm.z / dome.radius_mm) * own * force_n / dome.radius_mm;
+    let held_mm = held(dome.center_mm.z / dome.radius_mm) * own * force_n / dome.radius_mm;
     Some(Pressed { force_n, depth_mm: travel_mm - platform.dot(way) + held_mm, radius_mm })
 }
 
-/// 1/E* and its standard deviation by noise: the slope of the approach over the integral of 1/(2 a) - HELD/R over the force.
-pub(crate) fn yields(frames: &[Pressed], dome: &Dome, travel_sd_mm: f64) -> Option<(f64, f64)> {
+/// 1/E* and its standard deviation by noise: the slope of the half-spaces' approach over the integral of 1/(2 a) over the force.
+pub(crate) fn yields(frames: &[Pressed], travel_sd_mm: f64) -> Option<(f64, f64)> {
     let count = frames.len() as f64;
     if frames.len() < 3 {
         return None;
     }
     let (scale, power) = growth(frames);
-    let integral = |frame: &Pressed| {
-        frame.force_n.powf(1.0 - power) / ((1.0 - power) * 2.0 * scale)
-            - HELD * frame.force_n / dome.radius_mm
-    };
+    let integral = |frame: &Pressed| frame.force_n.powf(1.0 - power) / ((1.0 - power) * 2.0 * scale);
     let points: Vec<(f64, f64)> = frames.iter().map(|frame| (integral(frame), frame.depth_mm)).collect();
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
     let (x, y) = (mean(|p| p.0), mean(|p| p.1));
@@ -109,12 +106,11 @@ mod tests {
         let of =
             |line: &serde_json::Value| (line["center_z"].as_f64().unwrap(), line["held"].as_f64().unwrap());
         let lines: Vec<(f64, f64)> = table["held"].as_array().unwrap().iter().map(of).collect();
-        let (_, hemisphere) = *lines.iter().find(|(center_z, _)| *center_z == 0.0).unwrap();
         assert_eq!(lines.len(), 14);
-        for (center_z, held) in lines {
-            let off = held_beside_hemisphere(center_z) - (held - hemisphere);
+        for (center_z, by_elements) in lines {
+            let off = held(center_z) - by_elements;
             // a tenth of F / (E* R) is 2 % of what a touch of a tenth of the radius yields
-            assert!(off.abs() < 0.02 + 0.02 * held.abs(), "{center_z}: {off}");
+            assert!(off.abs() < 0.02 + 0.02 * by_elements.abs(), "{center_z}: {off}");
         }
     }
 }

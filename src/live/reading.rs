@@ -21,6 +21,8 @@ pub struct LiveReading {
     pub rate_hz: f64,
     /// Frames that were pushed out of the queue so far.
     pub dropped: u64,
+    /// What a model says of the hardness, in words; `None` without a model.
+    pub hardness: Option<String>,
     /// What the device is: `ok`, `unplugged`, or what is wrong with all frames.
     pub device: &'static str,
 }

@@ -17,7 +17,7 @@ pub(crate) struct Sunk {
     pub modulus_mpa: f64,
     /// The dome's part of the approach: 1 over 1 + the object's yield ratio.
     pub share: f64,
-    /// Displacement that the finite body takes back at the contact, mm.
+    /// Displacement that the dome's base takes back at the contact, mm: of the dome alone.
     pub held_mm: f64,
     pub shift_mm: DVec3,
     pub turn_rad: f64,
@@ -35,7 +35,7 @@ impl Sunk {
         let q = (x / self.patch.a_mm).powi(2) + (y / self.patch.b_mm).powi(2);
         let sink = self.patch.sink_mm(x, y, self.modulus_mpa) * self.share;
         let fade = rim_fade(at_mm.z / self.dome_radius_mm);
-        let held = self.held_mm * self.share * profile(cosine);
+        let held = self.held_mm * profile(cosine);
         let sideways = if q <= 1.0 { 1.0 } else { std::f64::consts::FRAC_2_PI * q.sqrt().recip().asin() };
         let mut u = self.normal * -((sink - held) * fade);
         u += self.shift_mm * (sideways * fade);

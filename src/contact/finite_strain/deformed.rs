@@ -44,6 +44,8 @@ pub(crate) struct Deformed {
     pub displaced_mm: Vec<DVec3>,
     /// By spot.
     pub anchors: Anchors,
+    /// What the object moved beyond its share, mm: so far it is behind its own pose.
+    pub beyond_mm: DVec3,
     /// The way that led here.
     pub walked: Option<Arc<Walked>>,
 }
@@ -74,7 +76,14 @@ impl Deformed {
     fn at_rest(body: &Arc<Body>, spots: &Arc<Vec<Spot>>) -> Self {
         let displaced_mm = vec![DVec3::ZERO; body.mesh.nodes_mm.len()];
         let anchors = vec![None; spots.len()];
-        Self { body: Arc::clone(body), spots: Arc::clone(spots), displaced_mm, anchors, walked: None }
+        Self {
+            body: Arc::clone(body),
+            spots: Arc::clone(spots),
+            displaced_mm,
+            anchors,
+            beyond_mm: DVec3::ZERO,
+            walked: None,
+        }
     }
 
     /// The same body at rest, where its mesh serves a touch that asks for another of its size: then what is found varies smoothly with the

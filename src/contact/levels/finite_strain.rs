@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use glam::{DMat3, DVec3};
+
 use super::overlap::overlap;
 use crate::elastomer::{Elastomer, Indenter};
 use crate::error::ContactError;
@@ -10,6 +12,7 @@ use crate::finite_strain::{Deformed, Grading, Law, Tried, Way, taken};
 use crate::object::Placed;
 use crate::outcome::{Status, TouchedNode};
 use crate::state::ContactState;
+use domecast_elastic::Compliance;
 use domecast_optics::numeric::Rigid;
 use domecast_springs::Wrench;
 
@@ -19,14 +22,17 @@ const DEEPEST: f64 = 0.4;
 const PENALTY: f64 = 6000.0;
 /// What the base may bear more or less than the object, as a part of the contact's force.
 const BALANCE: f64 = 1e-6;
+/// What the object moves beyond its share is known to this part of the radius, in so many rounds at most.
+const SETTLED: f64 = 1e-9;
+const MAX_SETTLING: u32 = 16;
 /// Half angles of the fine patch, rad.
 const PATCH_RAD: [f64; 2] = [0.3, 0.75];
 /// The patch over the angle of what overlaps: Hertz' contact has 0.7 of that.
 const PATCH_BY_OVERLAP: f64 = 1.1;
 
-/// The contact at a pose. See [`crate::Level::FiniteStrain`]. What was found at a place near by, from the same frame before, makes it shorter.
+/// The contact at a pose; `held` says what a soft object moves beyond its share. See [`crate::Level::FiniteStrain`]. What was found at a place near by, from the same frame before, makes it shorter.
 pub(crate) fn finite_strain(
-    elastomer: &Elastomer,
+    (elastomer, held): (&Elastomer, &Compliance),
     across: usize,
     indenter: &Indenter,
     sensor_from_object: &Rigid,
@@ -34,7 +40,7 @@ pub(crate) fn finite_strain(
     tried: Option<Tried<'_>>,
 ) -> Result<ContactState, ContactError> {
     let radius_mm = elastomer.dome_radius_mm;
-    let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
+    let mut placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
     let found = overlap(&placed, radius_mm);
     let depth_mm = -found.distance_mm;
     if depth_mm > DEEPEST * radius_mm {
@@ -66,9 +72,71 @@ pub(crate) fn finite_strain(
         curved_mm: 2.0 * radius_mm / PENALTY,
         sharing,
     };
-    let tried = tried.filter(|tried| Arc::ptr_eq(&tried.deformed.body, &deformed.body));
-    let way = taken(deformed, &law, &placed, &from, depth_mm, tried)?;
-    Ok(state_of(way, &law, &placed, 30.0 * found.queries as f64))
+    let mut tried = tried.filter(|tried| Arc::ptr_eq(&tried.deformed.body, &deformed.body));
+    let near_mm = tried.map(|tried| tried.deformed.beyond_mm);
+    let mut settling = Settling::new(near_mm.unwrap_or(deformed.beyond_mm));
+    let beyond = if sharing > 1.0 {
+        let grading = &deformed.body.mesh.grading;
+        let along = grading.middle.z.clamp(-1.0, 1.0).acos() / held.grid.dome.meridian_end_rad();
+        let ring = (along * held.grid.elements as f64).round() as usize;
+        held.held(ring)?.matrix(grading.middle) * (sharing - 1.0)
+    } else {
+        DMat3::ZERO
+    };
+    let mut last: Deformed;
+    loop {
+        let mut to = *sensor_from_object;
+        to.translation_mm -= settling.at_mm;
+        placed.move_to(to);
+        let mut way = taken(deformed.clone(), &law, &placed, &from, depth_mm, tried)?;
+        way.deformed.beyond_mm = settling.at_mm;
+        let bearings = way.solved.iter().flat_map(|solved| solved.bearings.of.iter().flatten());
+        let force_n: DVec3 = bearings.map(|bearing| bearing.force_n).sum();
+        let is_settled = settling.take(beyond * force_n) <= SETTLED * radius_mm;
+        if is_settled || settling.count == MAX_SETTLING {
+            let mut state = state_of(way, &law, &placed, 30.0 * found.queries as f64);
+            if !is_settled {
+                state.status = Status::BoundReached;
+            }
+            return Ok(state);
+        }
+        last = way.deformed;
+        tried = Some(Tried { deformed: &last, shares_way: true });
+    }
+}
+
+/// What the object moves beyond its share, until its force keeps it there: Broyden's method on three numbers.
+struct Settling {
+    at_mm: DVec3,
+    inverse: DMat3,
+    /// Step and miss of the time before.
+    before: Option<(DVec3, DVec3)>,
+    count: u32,
+}
+
+impl Settling {
+    fn new(at_mm: DVec3) -> Self {
+        Self { at_mm, inverse: DMat3::IDENTITY, before: None, count: 0 }
+    }
+
+    /// Takes in where the force at this place would bring it; the miss, mm.
+    fn take(&mut self, there_mm: DVec3) -> f64 {
+        let miss = there_mm - self.at_mm;
+        if let Some((step, was)) = self.before {
+            let change = self.inverse * (was - miss);
+            let scale = step.dot(change);
+            if scale.abs() > f64::MIN_POSITIVE {
+                let row = self.inverse.transpose() * step;
+                let left = step - change;
+                self.inverse += DMat3::from_cols(left * row.x, left * row.y, left * row.z) * (1.0 / scale);
+            }
+        }
+        let step = self.inverse * miss;
+        self.before = Some((step, miss));
+        self.at_mm += step;
+        self.count += 1;
+        miss.length()
+    }
 }
 
 fn state_of(way: Way, law: &Law, placed: &Placed, queries: f64) -> ContactState {

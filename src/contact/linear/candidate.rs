@@ -25,7 +25,9 @@ pub(crate) struct Candidate {
     /// Standard deviations of its hat along the meridian and along the ring, mm; four places that have its moments.
     pub spread_mm: [DVec3; 2],
     hat_mm: [DVec3; 4],
-    /// Its displacement (with the object's, see `sharing`), its force, sensor frame.
+    /// What the object moves beyond its share for a force here, mm/N.
+    pub beyond: DMat3,
+    /// Its displacement (with the object's), its force, sensor frame.
     pub u_mm: DVec3,
     pub force_n: DVec3,
     /// The plane that it may not pass: outward normal of the object, signed distance of the resting node.
@@ -50,6 +52,8 @@ pub(crate) struct Spot {
     pub area_mm2: f64,
     /// Standard deviations of its hat along the meridian and along the ring, mm.
     pub spread_mm: [DVec3; 2],
+    /// What the object moves beyond its share for a force there, mm/N.
+    pub beyond: DMat3,
 }
 
 /// How the object came: from the pose of the frame before, or along the normal from the first touch.
@@ -158,7 +162,7 @@ impl Candidate {
         way: &Way<'_>,
         sharing: f64,
     ) -> Result<Self, ContactError> {
-        let Spot { node, parts, at_mm, area_mm2, spread_mm } = spot;
+        let Spot { node, parts, at_mm, area_mm2, spread_mm, beyond } = spot;
         let dome = elastomer.dome();
         let memory = way.memory(node as u32);
         let inward = -dome.outward_mm(at_mm).normalize_or(DVec3::Z);
@@ -170,6 +174,7 @@ impl Candidate {
             area_mm2,
             spread_mm,
             hat_mm: hat_places(dome, at_mm, spread_mm),
+            beyond,
             u_mm: DVec3::ZERO,
             // The old force turns with the object.
             force_n: memory.map_or(DVec3::ZERO, |memory| way.moved.vector(memory.force_n)),
@@ -180,7 +185,7 @@ impl Candidate {
             carried_mm: DVec3::ZERO,
             was_mm: match (memory, way.before) {
                 (Some(memory), _) => memory.displacement_mm,
-                (None, Some(state)) => state.displacement_mm(at_mm) * sharing,
+                (None, Some(state)) => state.displacement_mm(at_mm) * sharing + state.history.beyond_mm,
                 (None, None) => DVec3::ZERO,
             },
             touched: memory.is_some(),

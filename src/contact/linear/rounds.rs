@@ -36,7 +36,8 @@ const MAX_SWEEPS: u32 = 400;
 pub(crate) struct Touch<'a> {
     pub elastomer: &'a Elastomer,
     pub placed: Placed,
-    /// 1 + the object's yield for the dome's 1: the gap closes by this times the dome's displacement.
+    /// 1 + the object's yield for the dome's 1: the gap closes by this times the dome's displacement, and by what the object moves
+    /// beyond that ([`Candidate::beyond`]).
     pub sharing: f64,
     pub candidates: Vec<Candidate>,
     /// Compliance of the gap between candidates, sensor frame, three rows by three columns each.
@@ -143,10 +144,20 @@ impl<'a> Touch<'a> {
         ended
     }
 
+    /// All forces on the dome at rest, N, and what the object moves beyond its share under them, mm.
+    pub fn beyond(&self) -> (DVec3, DVec3) {
+        let each = self.candidates.iter().map(|c| (c.rest_force_n(), c.beyond));
+        each.fold((DVec3::ZERO, DVec3::ZERO), |(all_n, mm), (force_n, beyond)| {
+            (all_n + force_n, mm + beyond * force_n)
+        })
+    }
+
     /// Writes what was found into a state, all but the field.
     pub fn finish(&self, state: &mut ContactState, ended: Rounds) {
         let radius = self.elastomer.dome_radius_mm;
         let mut wrench = Wrench::default();
+        let (all_n, beyond_mm) = self.beyond();
+        state.history.beyond_mm = beyond_mm;
         for candidate in &self.candidates {
             state.penetration_mm = state.penetration_mm.max(-candidate.gap_mm);
             let pressure_n = candidate.force_n.dot(candidate.normal);
@@ -154,7 +165,8 @@ impl<'a> Touch<'a> {
                 continue;
             }
             // Where the dome bears it now.
-            let place_mm = candidate.at_mm + candidate.u_mm / self.sharing;
+            let own_mm = candidate.u_mm - (candidate.beyond * all_n + beyond_mm) * 0.5;
+            let place_mm = candidate.at_mm + own_mm / self.sharing;
             wrench.force_n += candidate.force_n;
             wrench.moment_nmm += place_mm.cross(candidate.force_n);
             let friction_n = (candidate.force_n - candidate.normal * pressure_n).length();

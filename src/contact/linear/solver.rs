@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
+use super::beyond::Beyond;
 use super::candidate::{Candidate, Spot, Way, check_seen};
 use super::faces::{Faces, fine};
 use super::rounds::{PENETRATION, Rounds, Touch};
@@ -32,6 +33,7 @@ pub(crate) struct Solver<'a> {
     looked: Option<(Rigid, DVec3, f64)>,
     /// What takes part instead of the nodes near by where the object is finer than they are.
     fine: Option<Faces>,
+    beyond: Beyond,
 }
 
 impl<'a> Solver<'a> {
@@ -44,7 +46,7 @@ impl<'a> Solver<'a> {
     ) -> Self {
         let placed = Placed::new(indenter.solid.clone(), Rigid::identity());
         let touch = Touch::new(elastomer, placed, 1.0 + indenter.yield_ratio(elastomer));
-        Self { elastomer, compliance, before, touch, looked: None, fine: None }
+        Self { elastomer, compliance, before, touch, looked: None, fine: None, beyond: Beyond::default() }
     }
 
     /// The contact at a pose, until nothing moves by more than `tolerance_mm`. Only with `whole` are nodes looked for
@@ -256,7 +258,11 @@ impl<'a> Solver<'a> {
             let spread_mm =
                 if number < grid.len() { grid.spread(grid.node(number)) } else { [DVec3::ZERO; 2] };
             let at_mm = self.compliance.places.place(grid, number);
-            let spot = Spot { node: number, parts, at_mm, area_mm2, spread_mm };
+            let mut beyond = DMat3::ZERO;
+            for &(node, share) in parts.as_slice() {
+                beyond += self.beyond.at(self.compliance, touch.sharing - 1.0, node)? * share;
+            }
+            let spot = Spot { node: number, parts, at_mm, area_mm2, spread_mm, beyond };
             let mut candidate = Candidate::new(spot, touch.elastomer, &touch.placed, way, touch.sharing)?;
             candidate.face = self.fine.as_ref().and_then(|fine| fine.get(&number)).copied();
             candidate.follow_face(&touch.placed.sensor_from_object());
@@ -264,11 +270,10 @@ impl<'a> Solver<'a> {
         }
         touch.candidates.sort_by_key(|candidate| candidate.node);
         self.compliance.reach(last_ring)?;
-        self.fill_blocks();
-        Ok(())
+        self.fill_blocks()
     }
 
-    fn fill_blocks(&mut self) {
+    fn fill_blocks(&mut self) -> Result<(), ContactError> {
         let touch = &mut self.touch;
         let n = touch.candidates.len();
         let width = 3 * n;
@@ -278,18 +283,17 @@ impl<'a> Solver<'a> {
         numbers.extend(touch.candidates.iter().flat_map(|c| c.parts.as_slice()).map(|(number, _)| *number));
         numbers.sort_unstable();
         numbers.dedup();
-        let framed: Vec<(GridNode, DMat3)> = numbers
-            .iter()
-            .map(|number| {
-                let node = grid.node(*number);
-                (node, grid.frame(node))
-            })
-            .collect();
         let sharing = touch.sharing;
+        let mut framed: Vec<(GridNode, DMat3, DMat3)> = Vec::with_capacity(numbers.len());
+        for &number in &numbers {
+            let node = grid.node(number);
+            let beyond = self.beyond.at(self.compliance, sharing - 1.0, number)?;
+            framed.push((node, grid.frame(node), beyond * 0.5));
+        }
         let compliance = self.compliance;
         let between = |i: usize, j: usize| {
-            let ((at, frame), (by, other)) = (&framed[i], &framed[j]);
-            *frame * compliance.between(*at, *by) * other.transpose() * sharing
+            let ((at, frame, beyond), (by, other, and)) = (&framed[i], &framed[j]);
+            *frame * compliance.between(*at, *by) * other.transpose() * sharing + *beyond + *and
         };
         touch.blocks.clear();
         touch.blocks.resize(width * width, 0.0);
@@ -338,6 +342,7 @@ impl<'a> Solver<'a> {
             }
         }
         touch.work += 60.0 * (n * n) as f64;
+        Ok(())
     }
 
     /// What the forces move, turned back to how the dome lay at rest.
@@ -361,6 +366,7 @@ impl<'a> Solver<'a> {
     /// Nodes beside the candidates that were pressed into the object.
     fn missed(&mut self, field: &SurfaceField) -> Vec<usize> {
         let max_mm = PENETRATION * self.elastomer.dome_radius_mm;
+        let (_, beyond_mm) = self.touch.beyond();
         // A node beside moves less than the most moved candidate.
         let reach_mm = self.touch.candidates.iter().map(|c| c.u_mm.length()).fold(0.0, f64::max);
         let mut near = self.nearer_than(reach_mm);
@@ -369,7 +375,7 @@ impl<'a> Solver<'a> {
         touch.work += 60.0 * near.len() as f64;
         near.retain(|number| {
             let at = grid.place(grid.node(*number));
-            touch.placed.distance(at + field.at(at) * touch.sharing).0 < -max_mm
+            touch.placed.distance(at + field.at(at) * touch.sharing + beyond_mm).0 < -max_mm
         });
         near
     }

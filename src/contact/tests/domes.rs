@@ -195,3 +195,71 @@ fn levels_without_elements_refuse_other_domes_by_name() {
     assert!(matches!(deep, Err(ContactError::TooDeep { .. })), "{deep:?}");
     assert_eq!(cap.dome(), DomeShape::new(11.5, -5.75));
 }
+
+/// An elastic object is a half-space whatever dome it bears on: it has no base of its own.
+#[test]
+fn soft_balls_are_half_spaces_on_every_dome() {
+    let table: Value = serde_json::from_str(include_str!("../../../tests/cases/golden_soft.json")).unwrap();
+    for case in table["cases"].as_array().unwrap() {
+        let number = |name: &str| case[name].as_f64().unwrap();
+        let (radius_mm, ball_mm) = (number("dome_radius_mm"), number("ball_radius_mm"));
+        let elastomer = Elastomer { friction: 0.0, ..dome(radius_mm, number("center_z_mm")) };
+        let element_mm = 0.035 * elastomer.depth_scale_mm();
+        let mut levels = vec![(Level::Linear { element_mm }, 0.02)];
+        if elastomer.dome().is_hemisphere() {
+            levels.extend([(Level::ClosedForm, 0.015), (Level::FiniteStrain { across: 6 }, 0.045)]);
+        }
+        for (level, allowed) in levels {
+            let contact = Contact::new(elastomer, level).unwrap();
+            let presses = case["presses"].as_array().unwrap();
+            // The finite-strain level takes seconds each.
+            let all = if matches!(level, Level::FiniteStrain { .. }) { 1 } else { presses.len() };
+            for press in &presses[..all] {
+                let number = |name: &str| press[name].as_f64().unwrap();
+                let ball = Indenter {
+                    young_mpa: Some(number("young_mpa")),
+                    poisson: table["ball_poisson"].as_f64().unwrap(),
+                    ..ball(ball_mm)
+                };
+                let (depth_mm, force_n) = (number("depth_mm"), number("force_n"));
+                let at = above(elastomer.dome().height_mm() + ball_mm - depth_mm);
+                let state = contact.solve(&ball, &at, None).unwrap();
+                let part = -state.wrench.force_n.z / force_n - 1.0;
+                println!("{level:?} {:?} {depth_mm} mm: {force_n} N, off by {part:.4}", ball.young_mpa);
+                // Deeper, strain and turns count, which scikit-fem leaves out here.
+                let allowed = if depth_mm < 0.06 * radius_mm { allowed } else { allowed + 0.06 };
+                assert!(part.abs() < allowed, "{level:?} {elastomer:?} {ball:?} {depth_mm}: {part}");
+            }
+        }
+    }
+}
+
+/// Sideways as well: a dome sways under a drag, a half-space gives way by Mindlin's law.
+#[test]
+fn soft_balls_are_dragged_as_half_spaces() {
+    for elastomer in [dome(10.0, 0.0), dome(11.5, -5.75)].map(|dome| Elastomer { friction: 10.0, ..dome }) {
+        let contact = Contact::new(elastomer, Level::Linear { element_mm: 0.5 }).unwrap();
+        let height_mm = elastomer.dome().height_mm();
+        // Way by force of a small drag, and the contact's radius.
+        let dragged = |ball: &Indenter, depth_mm: f64| {
+            let at = |x_mm: f64| Rigid::from_translation(DVec3::new(x_mm, 0.0, height_mm + 6.0 - depth_mm));
+            let first = contact.solve(ball, &at(0.0), None).unwrap();
+            let next = contact.solve(ball, &at(0.02), Some(&first)).unwrap();
+            (0.02 / (next.wrench.force_n.x - first.wrench.force_n.x), first.contact_radius_mm)
+        };
+        let soft = Indenter { young_mpa: Some(0.08), poisson: 0.49, ..ball(6.0) };
+        let (soft_mm_per_n, radius_mm) = dragged(&soft, 0.9);
+        // A rigid ball with as wide a contact.
+        let (mut low, mut high) = (0.01, 1.0);
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if dragged(&ball(6.0), middle).1 < radius_mm { low = middle } else { high = middle }
+        }
+        let (dome_mm_per_n, _) = dragged(&ball(6.0), low);
+        let shear_mpa = 0.08 / (2.0 * 1.49);
+        let half_space = (2.0 - 0.49) / (8.0 * radius_mm * shear_mpa);
+        let part = (soft_mm_per_n - dome_mm_per_n) / half_space - 1.0;
+        println!("{elastomer:?}: {soft_mm_per_n} {dome_mm_per_n} {half_space} {part}");
+        assert!(part.abs() < 0.15, "{part}");
+    }
+}

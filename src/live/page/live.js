@@ -106,7 +106,8 @@ async function show(reading) {
   $("status").textContent = what.length ? what.join(", ").replaceAll("_", " ") : "ok";
   $("status").className = isGood ? "" : "bad";
   $("numbers").textContent = `frame ${reading.frame}, ${reading.rate_hz.toFixed(1)} frames/s, age ${reading.age_ms.toFixed(2)} ms, ` +
-    `${reading.dots_ok} of ${reading.dots.length} dots, ${reading.markers.length} markers, ${reading.dropped} dropped`;
+    `${reading.dots_ok} of ${reading.dots.length} dots, ${reading.markers.length} markers, ${reading.dropped} dropped` +
+    (reading.hardness ? `; hardness: ${reading.hardness}` : "");
   await draw($("view"), reading, [reading.image], (to) => overlay(to, reading));
   $("skin-figure").hidden = !reading.skin;
   if (reading.skin) {

@@ -121,6 +121,7 @@ fn event(reading: &LiveReading, samples: &[Sample], deepest_mm: f64) -> Value {
         "age_ms": reading.age_ms,
         "rate_hz": reading.rate_hz,
         "dropped": reading.dropped,
+        "hardness": reading.hardness,
         "skin": map.and_then(|map| skin_png(map, range_mm)).map(|bytes| data_url("png", &bytes)),
         "skin_range_mm": map.map(|_| range_mm),
         "outline": outline.map(|touch| touch.outline_px.iter().map(|at| px(at.as_dvec2())).collect::<Vec<_>>()),

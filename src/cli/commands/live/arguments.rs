@@ -26,9 +26,15 @@ pub struct LiveArguments {
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
     pub show: Option<u16>,
     /// A frame of the untouched sensor: the page then shows the depth of the skin too, and the recording has its heights, of the frames
-    /// that there is time for.
+    /// that there is time for. `--hardness` reads against it as well.
     #[arg(long, value_name = "FRAME")]
     pub rest: Option<PathBuf>,
+    /// State how hard what is touched is, by this model, as `track --hardness` does.
+    #[arg(long, requires = "rest", value_name = "MODEL")]
+    pub hardness: Option<PathBuf>,
+    /// The model sees each so many-th frame.
+    #[arg(long, requires = "hardness", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..), value_name = "N")]
+    pub hardness_every: u64,
     /// Only these members of the JSON lines, separated by commas: `frame`, `time_s`, `status`, `problems`, `age_ms` and
     /// `dropped` are always there.
     #[arg(long, value_name = "NAME,..", value_delimiter = ',', value_parser = field)]

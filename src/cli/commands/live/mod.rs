@@ -5,21 +5,23 @@ mod health;
 mod session;
 mod terminal;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use glam::DVec3;
+
+use super::hardness_lines::HardnessLines;
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
 use super::recording::{Recording, RecordingPace};
+use super::rest_frame::RestFrame;
 use domecast_files::StopWish;
-use domecast_live::decode::picture;
-use domecast_live::frame_files::read_whole;
 use domecast_live::page::{LivePage, ShownSensor};
 use domecast_live::source::{CameraRequest, ControlRequest, LiveSource, open_device as open_named};
 use domecast_live::{HeightReader, LiveEvent, LiveReader};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::ShapeFromColor;
-use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
+use domecast_runtime::track::{Springs, Tracker};
 use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
 use session::{Outlets, Session};
 
@@ -74,31 +76,29 @@ fn check_size(
     }
 }
 
-/// What reads the skin, from a frame at rest, and what is tracked in that.
+/// What reads the skin, where something shows or records it.
 fn skin_of(
     output: &Output,
     arguments: &LiveArguments,
     constants: &Constants,
     tracker: &Tracker,
-) -> Result<Option<(ShapeFromColor, Tracked)>, Failure> {
-    let Some(rest) = &arguments.rest else { return Ok(None) };
+    rest: Option<&RestFrame>,
+) -> Result<Option<ShapeFromColor>, Failure> {
+    let Some((path, rest)) = arguments.rest.as_deref().zip(rest) else { return Ok(None) };
     if arguments.show.is_none() && arguments.record.is_none() {
-        return Err(input_fault(
-            rest,
-            "is of no use: nothing shows or records the skin",
-            "--show or --record",
-        ));
+        let (problem, allowed) =
+            ("is of no use: nothing shows or records the skin", "--show, --record or --hardness");
+        return if arguments.hardness.is_some() {
+            Ok(None)
+        } else {
+            Err(input_fault(path, problem, allowed))
+        };
     }
     let fault = |path: &Path, problem: String| input_fault(path, problem, "what shape from colour needs");
     let mut shape =
         output.shape(constants, tracker).map_err(|error| fault(&arguments.constants, error.to_string()))?;
-    let bytes = read_whole(rest).map_err(|error| fault(rest, format!("cannot be read ({error})")))?;
-    let picture = picture(&bytes).map_err(|problem| fault(rest, problem))?;
-    let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
-    let frame = frame.map_err(|error| fault(rest, error.to_string()))?;
-    let tracked = tracker.clone().track(0, &frame).clone();
-    shape.set_rest(&frame, &tracked).map_err(|error| fault(rest, error.to_string()))?;
-    Ok(Some((shape, tracked)))
+    shape.set_rest(&rest.frame()?, &rest.tracked).map_err(|error| fault(path, error.to_string()))?;
+    Ok(Some(shape))
 }
 
 /// Reads until the source ends, the frames that were asked for are there, or Ctrl-C.
@@ -106,7 +106,13 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
     let constants = read_constants(&arguments.constants)?;
     let unfit = |problem: String| input_fault(&arguments.constants, problem, "constants of a sensor");
     let tracker = Tracker::new(&constants, arguments.tracker.options()).map_err(|e| unfit(e.to_string()))?;
-    let skin = skin_of(output, arguments, &constants, &tracker)?;
+    let rest = RestFrame::open(arguments.rest.as_deref(), arguments.tracker.camera_mirrored, &tracker)?;
+    let skin = skin_of(output, arguments, &constants, &tracker, rest.as_ref())?;
+    let at_mm = tracker.springs().map_or(DVec3::ZERO, Springs::at_mm);
+    let model = |path: &PathBuf| {
+        HardnessLines::open((path, arguments.hardness_every), &arguments.tracker, rest.as_ref(), at_mm)
+    };
+    let hardness = arguments.hardness.as_ref().map(model).transpose()?;
     let device = Device { name: &arguments.device, rate_hz: arguments.rate, controls: arguments.controls() };
     let source = open_device(&device, &constants)?;
     check_size(&*source, arguments, &constants)?;
@@ -115,9 +121,9 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
             let correlation_mm = skin.is_some().then_some(SHAPE_CORRELATION_MM);
             // constants of earlier builds have no dome to press: their page shows no forces on the skin
             let mut forces = ForceDistribution::new(&constants, correlation_mm).ok();
-            if let Some((forces, (_, at_rest))) = forces.as_mut().zip(skin.as_ref()) {
+            if let (Some(forces), Some(_), Some(rest)) = (&mut forces, &skin, &rest) {
                 // the skin was read from it: it has a pose
-                let _ = forces.set_rest(at_rest);
+                let _ = forces.set_rest(&rest.tracked);
             }
             let shown = ShownSensor { optics: tracker.optics().clone(), forces };
             Some(LivePage::start(port, shown).map_err(|error| {
@@ -128,17 +134,20 @@ pub fn run(output: &Output, arguments: &LiveArguments) -> Result<(), Failure> {
         }
         None => None,
     };
-    let inputs = [arguments.constants.as_path()];
+    let inputs: Vec<&Path> = [&arguments.constants]
+        .into_iter()
+        .chain(&arguments.rest)
+        .chain(&arguments.hardness)
+        .map(PathBuf::as_path)
+        .collect();
     let rules = output.rules(&inputs);
     let pace = RecordingPace::BehindFrames;
-    let begin = |path: &std::path::PathBuf| {
-        Recording::begin(output, path, "live", &rules, &constants, &tracker, pace)
-    };
+    let begin = |path: &PathBuf| Recording::begin(output, path, "live", &rules, &constants, &tracker, pace);
     let recording = arguments.record.as_ref().map(begin).transpose()?;
-    let heights = skin.map(|(skin, _)| HeightReader::start(skin)).transpose().map_err(Failure::Print)?;
+    let heights = skin.map(HeightReader::start).transpose().map_err(Failure::Print)?;
     // the first Ctrl-C ends the reading in good order, with the recording's index and the summary
     let wish = StopWish::heed();
-    let outlets = Outlets { page, recording, heights };
+    let outlets = Outlets { page, recording, heights, hardness };
     let mut session = Session::begin(output, arguments, tracker, source.info(), outlets)?;
     let reader = LiveReader::start(source, MAX_WAITING).map_err(Failure::Print)?;
     let mut heard = Instant::now();

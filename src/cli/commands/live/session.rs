@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::arguments::LiveArguments;
 use super::health::Health;
 use super::terminal::{TerminalView, ViewedReading};
+use crate::commands::hardness_lines::{HardnessLines, in_words};
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
 use crate::commands::recording::{Recording, recorded};
@@ -28,6 +29,7 @@ pub struct Outlets {
     pub recording: Option<Recording>,
     /// What measures the skin for both.
     pub heights: Option<HeightReader>,
+    pub hardness: Option<HardnessLines>,
 }
 
 /// A run of `live`.
@@ -38,6 +40,10 @@ pub struct Session<'a> {
     page: Option<LivePage>,
     recording: Option<Recording>,
     heights: Option<HeightReader>,
+    hardness: Option<HardnessLines>,
+    /// What the model last said.
+    felt: Value,
+    is_rest_touched: bool,
     is_recording_lost: bool,
     view: Option<TerminalView>,
     head: String,
@@ -82,7 +88,7 @@ impl<'a> Session<'a> {
         arguments: &'a LiveArguments,
         tracker: Tracker,
         info: &SourceInfo,
-        Outlets { page, recording, heights }: Outlets,
+        Outlets { page, recording, heights, hardness }: Outlets,
     ) -> Result<Self, Failure> {
         let is_seen = io::stdout().is_terminal() && !output.is_json();
         let began = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
@@ -94,6 +100,9 @@ impl<'a> Session<'a> {
             page,
             recording,
             heights,
+            hardness,
+            felt: Value::Null,
+            is_rest_touched: false,
             is_recording_lost: false,
             view: is_seen.then(TerminalView::default),
             head: head(info),
@@ -167,11 +176,15 @@ impl<'a> Session<'a> {
             Err(_) => self.tracker.skip(frame.number),
         };
         *self.counts.entry(tracked.status()).or_default() += 1;
+        let felt =
+            self.hardness.as_mut().and_then(|model| model.member(seen.as_ref().ok(), tracked, None, None));
         if self.view.is_none() {
-            write_reading(&mut self.line, tracked, self.arguments, frame.complete.elapsed(), self.dropped)?;
+            let age = frame.complete.elapsed();
+            write_reading(&mut self.line, tracked, self.arguments, felt.as_ref(), age, self.dropped)?;
             let mut out = io::stdout().lock();
             out.write_all(&self.line).and_then(|()| out.flush())?;
         }
+        self.felt = felt.unwrap_or(std::mem::take(&mut self.felt));
         let age = frame.complete.elapsed();
         // the numbers are out; what follows is of no reading's age but the next one's
         self.ages.add(age);
@@ -245,6 +258,7 @@ impl<'a> Session<'a> {
             age_p50_ms: quantile(0.5),
             age_p99_ms: quantile(0.99),
             dropped: self.dropped,
+            hardness: self.hardness.as_ref().map(|_| in_words(&self.felt)),
         };
         Ok(view.show(tracked, &around)?)
     }
@@ -256,6 +270,7 @@ impl<'a> Session<'a> {
             page.add_sample(self.tracker.result());
         }
         let (age_ms, rate_hz, dropped) = (self.age_ms, self.rate_hz(), self.dropped);
+        let hardness = self.hardness.as_ref().map(|_| in_words(&self.felt));
         let tracked = self.tracker.result();
         let reading = || LiveReading {
             picture,
@@ -265,6 +280,7 @@ impl<'a> Session<'a> {
             rate_hz,
             dropped,
             device,
+            hardness,
         };
         let Some(heights) = &mut self.heights else {
             if let Some(page) = page {
@@ -287,6 +303,16 @@ impl<'a> Session<'a> {
             _ => Ok(()),
         };
         self.keep(added)?;
+        if let Some(skin) = &reading.skin {
+            if let Some(model) = &mut self.hardness {
+                model.see_skin(skin);
+            }
+            if skin.is_raised && !self.is_rest_touched {
+                self.is_rest_touched = true;
+                let message = "the skin lies above its shape at rest: --rest was touched when it was taken, or something pulls at the skin";
+                self.event("raised", json!({}), Some(message))?;
+            }
+        }
         if let Some(page) = &self.page {
             page.show(reading);
         }
@@ -371,6 +397,7 @@ fn write_reading(
     line: &mut Vec<u8>,
     tracked: &Tracked,
     arguments: &LiveArguments,
+    felt: Option<&Value>,
     age: Duration,
     dropped: u64,
 ) -> io::Result<()> {
@@ -378,6 +405,9 @@ fn write_reading(
     write_json_fields(line, tracked, &arguments.fields)?;
     if line.ends_with(b"}\n") {
         line.truncate(line.len() - 2);
+    }
+    if let Some(felt) = felt {
+        write!(line, ",\"hardness\":{felt}")?;
     }
     writeln!(line, ",\"age_ms\":{:.3},\"dropped\":{dropped}}}", 1e3 * age.as_secs_f64())
 }

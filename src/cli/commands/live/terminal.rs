@@ -20,6 +20,8 @@ pub struct ViewedReading<'a> {
     pub age_p50_ms: f64,
     pub age_p99_ms: f64,
     pub dropped: u64,
+    /// What a model says of the hardness; `None` without a model.
+    pub hardness: Option<String>,
 }
 
 /// Draws over its own last view.
@@ -71,7 +73,8 @@ fn view(tracked: &Tracked, around: &ViewedReading<'_>) -> String {
     let status = if problems.is_empty() { "ok".to_owned() } else { problems.join(", ") };
     let (wrench, sd) = (tracked.wrench.map(|w| w.to_array()), tracked.wrench_sd.map(|w| w.to_array()));
     let markers = tracked.white_markers.iter().filter(|m| m.state == MarkState::Ok).count();
-    let ViewedReading { head, device, rate_hz, age_ms, age_p50_ms, age_p99_ms, dropped } = around;
+    let ViewedReading { head, device, rate_hz, age_ms, age_p50_ms, age_p99_ms, dropped, hardness } = around;
+    let hardness = hardness.as_ref().map_or(String::new(), |said| format!("hardness {said}\n"));
     format!(
         "{head}\n\
          device  {device}\n\
@@ -80,7 +83,7 @@ fn view(tracked: &Tracked, around: &ViewedReading<'_>) -> String {
          torque  {} N mm\n\
          marks   {} of {} dots, {markers} of {} markers\n\
          rate    {rate_hz:.1} frames/s, {dropped} dropped\n\
-         age     {age_ms:.2} ms, half of them to {age_p50_ms:.2}, 99 of 100 to {age_p99_ms:.2} ms\n",
+         age     {age_ms:.2} ms, half of them to {age_p50_ms:.2}, 99 of 100 to {age_p99_ms:.2} ms\n{hardness}",
         tracked.frame,
         six(wrench, sd, 0, 4),
         six(wrench, sd, 3, 3),

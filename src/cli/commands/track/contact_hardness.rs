@@ -5,9 +5,9 @@ use serde_json::Value;
 
 use super::arguments::TrackArguments;
 use super::number_lines::NumberLines;
-use super::rest_frame::RestFrame;
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
+use crate::commands::rest_frame::RestFrame;
 use domecast_hardness::physics::{Hardness, HardnessStatus};
 use domecast_hardness::{ContactHardness, TrackedRest};
 use domecast_runtime::constants::Constants;

@@ -3,10 +3,8 @@
 mod arguments;
 mod colours;
 mod contact_hardness;
-mod hardness;
 mod number_lines;
 mod pictures;
-mod rest_frame;
 mod results;
 mod shape;
 mod source;
@@ -17,13 +15,13 @@ use std::time::Instant;
 
 use super::input::{input_fault, read_constants};
 use super::output::{Failure, Output};
+use super::rest_frame::RestFrame;
 use colours::ColourCheck;
 use domecast_live::decode::Picture;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::track::{CameraFrame, CameraTurn, Tracker};
 use domecast_runtime::traction::{ForceDistribution, SHAPE_CORRELATION_MM};
 use number_lines::NumberLines;
-use rest_frame::RestFrame;
 use results::Results;
 use source::FrameSource;
 use tally::Tally;
@@ -116,7 +114,7 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         Tracker::new(&constants, arguments.tracker.options()).map_err(|e| arguments.unfit(&e))?;
     let inputs = inputs_of(arguments);
     let rules = output.rules(&inputs);
-    let rest = RestFrame::open(arguments, &tracker)?;
+    let rest = RestFrame::open(arguments.rest.as_deref(), arguments.tracker.camera_mirrored, &tracker)?;
     let mut results = Results::open(output, arguments, &rules, &constants, &tracker, rest.as_ref())?;
     let mut forces = forces_of(arguments, &constants, rest.as_ref())?;
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;

@@ -8,12 +8,12 @@ use serde_json::Value;
 
 use super::arguments::{Format, TrackArguments};
 use super::contact_hardness::ContactHardnessLines;
-use super::hardness::HardnessLines;
 use super::pictures::Pictures;
-use super::rest_frame::RestFrame;
 use super::shape::ShapeFiles;
+use crate::commands::hardness_lines::HardnessLines;
 use crate::commands::output::{Failure, Output};
 use crate::commands::recording::{Recording, RecordingPace, recorded, time_ns};
+use crate::commands::rest_frame::RestFrame;
 use crate::track_report::{TrackReport, page};
 use domecast_files::{OutputRules, StagedFile};
 use domecast_runtime::constants::Constants;
@@ -116,7 +116,11 @@ impl Results {
         let pictures = Pictures::new(arguments, rules, constants, tracker)?;
         let shape = ShapeFiles::open(output, arguments, rules, constants, tracker, rest)?;
         let contact_hardness = ContactHardnessLines::open(arguments, constants, rest, at_mm)?;
-        let hardness = HardnessLines::open(arguments, rest, at_mm)?;
+        let model = |path: &PathBuf| {
+            arguments.need_jsonl(path)?;
+            HardnessLines::open((path, arguments.hardness_every), &arguments.tracker, rest, at_mm)
+        };
+        let hardness = arguments.hardness.as_ref().map(model).transpose()?;
         let sink = Sink::new(arguments.out.as_deref(), rules)?;
         let page = match &arguments.report {
             Some(path) => {

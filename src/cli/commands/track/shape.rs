@@ -6,9 +6,9 @@ use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::json;
 
 use super::arguments::TrackArguments;
-use super::rest_frame::RestFrame;
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
+use crate::commands::rest_frame::RestFrame;
 use domecast_files::{OutputRules, StagedFolder, npy_f32, npy_u8, ply, png_u16};
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::{ShapeError, ShapeFromColor, ShapeMap};

@@ -1,36 +1,36 @@
-//! `track --rest`: the frame of the untouched sensor that shape, forces and hardness are read against.
+//! `--rest FRAME`: the frame of the untouched sensor that shape, forces and hardness are read against.
 
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::arguments::TrackArguments;
-use crate::commands::input::input_fault;
-use crate::commands::output::Failure;
+use super::input::input_fault;
+use super::output::Failure;
 use domecast_hardness::TrackedRest;
 use domecast_live::decode::{self, Picture};
+use domecast_live::frame_files::read_whole;
 use domecast_runtime::track::{CameraFrame, Tracked, Tracker};
 
 /// The frame, and what is tracked in it by a tracker of its own.
-pub(super) struct RestFrame {
+pub struct RestFrame {
     path: PathBuf,
     picture: Picture,
     pub tracked: Tracked,
 }
 
 impl RestFrame {
-    /// `None` where none is given.
-    pub fn open(arguments: &TrackArguments, tracker: &Tracker) -> Result<Option<Self>, Failure> {
-        let Some(path) = &arguments.rest else { return Ok(None) };
-        let bytes = std::fs::read(path)
+    /// `None` where none is given; `is_mirrored` as the frames are.
+    pub fn open(path: Option<&Path>, is_mirrored: bool, tracker: &Tracker) -> Result<Option<Self>, Failure> {
+        let Some(path) = path else { return Ok(None) };
+        let bytes = read_whole(path)
             .map_err(|error| input_fault(path, format!("cannot be read: {error}"), "a PNG or JPEG frame"))?;
         let mut picture = decode::picture(&bytes).map_err(|problem| fault(path, problem))?;
-        if arguments.tracker.camera_mirrored {
+        if is_mirrored {
             picture.mirror();
         }
         let mut own = tracker.clone();
         let tracked = own.track(0, &frame_of(path, &picture)?).clone();
-        Ok(Some(Self { path: path.clone(), picture, tracked }))
+        Ok(Some(Self { path: path.to_owned(), picture, tracked }))
     }
 
     /// As trackers take it.

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from check_dataset import ROOT, check, run
+from check_hardness_physics import held
 from shape_frames import dome_of
 
 DESIGNS = ("thumb24", "picam-r20", "digit-rigid")
@@ -80,12 +81,6 @@ def noisy(folder, rng):
     for file in sorted(folder.glob("frame_*.png")):
         frame = cv2.imread(str(file)).astype(float)
         cv2.imwrite(str(file), np.clip(np.round(frame + rng.normal(0, NOISE, frame.shape)), 0, 255).astype(np.uint8))
-
-
-def held(center):
-    """What a dome's base holds back, in F/(E* R), from the table of golden_held.py."""
-    table = json.loads((ROOT / "tests/cases/golden_held.json").read_text())["held"]
-    return np.interp(center, [line["center_z"] for line in table], [line["held"] for line in table])
 
 
 def second_opinion(lines, travel, rest, constants):

@@ -42,12 +42,17 @@ def approach(index, video):
     return np.array(force), np.array(depth), np.array(contact)
 
 
-def held_mm(index, force):
-    """What the dome's base holds back of its own yield, from the table of golden_held.py."""
-    dome = index["dome"]
+def held(center):
+    """What a dome's base holds back, in F/(E* R), from the table of golden_held.py."""
     table = json.loads((ROOT / "tests/cases/golden_held.json").read_text())["held"]
-    held = np.interp(dome.get("center_z_mm", 0.0) / dome["radius_mm"], [line["center_z"] for line in table], [line["held"] for line in table])
-    return held * force * (1 - dome["poisson"] ** 2) / (dome["youngs_modulus_mpa"] * dome["radius_mm"])
+    return np.interp(center, [line["center_z"] for line in table], [line["held"] for line in table])
+
+
+def held_mm(index, force):
+    """What the dome's base holds back of its own yield."""
+    dome = index["dome"]
+    own = (1 - dome["poisson"] ** 2) / dome["youngs_modulus_mpa"]
+    return held(dome.get("center_z_mm", 0.0) / dome["radius_mm"]) * own * force / dome["radius_mm"]
 
 
 def by_slope(index, force, depth, contact):

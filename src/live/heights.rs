@@ -8,7 +8,6 @@ use rayon::ThreadPoolBuilder;
 
 use crate::reading::LiveReading;
 use domecast_runtime::shape::ShapeFromColor;
-use domecast_runtime::track::CameraFrame;
 
 /// Measures heights in a thread of its own: of the newest frame whenever it is free, so that no reading waits for it.
 pub struct HeightReader {
@@ -31,9 +30,7 @@ impl HeightReader {
         pool.spawn(move || {
             for mut reading in of_thread {
                 reading.skin = reading.picture.as_deref().and_then(|picture| {
-                    let frame =
-                        CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
-                    let map = skin.measure(&frame.ok()?, &reading.tracked).ok()?;
+                    let map = skin.measure(&picture.frame().ok()?, &reading.tracked).ok()?;
                     Some(Arc::new(map.clone()))
                 });
                 if found.send(reading).is_err() {

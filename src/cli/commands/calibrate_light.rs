@@ -82,8 +82,7 @@ pub fn light_json(found: &LightFit) -> Value {
 
 /// A picture as the camera's frame; the fault is of the file or answer `of`.
 pub fn camera_frame<'a>(picture: &'a Picture, of: &Path) -> Result<CameraFrame<'a>, Failure> {
-    CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes)
-        .map_err(|error| input_fault(of, error.to_string(), FRAMES))
+    picture.frame().map_err(|problem| input_fault(of, problem, FRAMES))
 }
 
 fn say(output: &Output, found: &LightFit) -> Result<(), Failure> {

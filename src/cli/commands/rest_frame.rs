@@ -29,13 +29,13 @@ impl RestFrame {
             picture.mirror();
         }
         let mut own = tracker.clone();
-        let tracked = own.track(0, &frame_of(path, &picture)?).clone();
+        let tracked = own.track(0, &picture.frame().map_err(|problem| fault(path, problem))?).clone();
         Ok(Some(Self { path: path.to_owned(), picture, tracked }))
     }
 
     /// As trackers take it.
     pub fn frame(&self) -> Result<CameraFrame<'_>, Failure> {
-        frame_of(&self.path, &self.picture)
+        self.picture.frame().map_err(|problem| self.fault(problem))
     }
 
     /// What wrench and displacement about a point are counted from.
@@ -51,11 +51,6 @@ impl RestFrame {
     pub fn fault(&self, problem: String) -> Failure {
         fault(&self.path, problem)
     }
-}
-
-fn frame_of<'a>(path: &Path, picture: &'a Picture) -> Result<CameraFrame<'a>, Failure> {
-    let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
-    frame.map_err(|error| fault(path, error.to_string()))
 }
 
 fn fault(path: &Path, problem: String) -> Failure {

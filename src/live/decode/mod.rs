@@ -66,6 +66,15 @@ impl PictureFormat {
 }
 
 impl Picture {
+    /// As trackers take it.
+    ///
+    /// # Errors
+    /// What is wrong with its size.
+    pub fn frame(&self) -> Result<CameraFrame<'_>, String> {
+        let frame = CameraFrame::new(self.width, self.height, self.channels, &self.bytes);
+        frame.map_err(|error| error.to_string())
+    }
+
     /// Mirrors it left to right.
     pub fn mirror(&mut self) {
         for row in self.bytes.chunks_exact_mut(self.width * self.channels) {
@@ -80,10 +89,8 @@ impl Picture {
     }
 
     fn checked(self) -> Result<Self, String> {
-        match CameraFrame::new(self.width, self.height, self.channels, &self.bytes) {
-            Ok(_) => Ok(self),
-            Err(error) => Err(error.to_string()),
-        }
+        self.frame()?;
+        Ok(self)
     }
 }
 

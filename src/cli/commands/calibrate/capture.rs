@@ -13,7 +13,7 @@ use domecast_live::frame_files::{numbered, pictures_in, read_whole};
 use domecast_live::{LiveEvent, LiveReader};
 use domecast_runtime::calibrate::optics::{Kind, Observation};
 use domecast_runtime::constants::Constants;
-use domecast_runtime::track::{CameraFrame, MarkState, TrackOptions, Tracked, Tracker};
+use domecast_runtime::track::{MarkState, TrackOptions, Tracked, Tracker};
 
 /// A device that gives no frame for so long is not waited for.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -132,8 +132,7 @@ pub fn take(wish: &FrameWish, constants: &Constants) -> Result<Taken, Failure> {
     let mut tracker = Tracker::new(constants, TrackOptions::default()).map_err(|e| fault(e.to_string()))?;
     let mut taken = Taken { frames: Vec::new(), marks: Vec::new() };
     for (number, (bytes, picture)) in found.into_iter().enumerate() {
-        let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
-        let frame = frame.map_err(|e| fault(e.to_string()))?;
+        let frame = picture.frame().map_err(fault)?;
         let tracked = tracker.track(number as u64, &frame);
         if let Some(what) = tracked.problems.iter().find_map(|problem| cure_of(problem, tracked)) {
             return Err(fault(format!("frame {number}: {what}")));

@@ -1,6 +1,7 @@
 //! `domecast live DEVICE --constants FILE`
 
 mod arguments;
+mod described;
 mod health;
 mod session;
 mod terminal;

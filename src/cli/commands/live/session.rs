@@ -7,12 +7,14 @@ use std::time::{Duration, Instant, SystemTime};
 use serde_json::{Value, json};
 
 use super::arguments::LiveArguments;
+use super::described::{described, head};
 use super::health::Health;
 use super::terminal::{TerminalView, ViewedReading};
 use crate::commands::hardness_lines::{HardnessLines, in_words};
 use crate::commands::input::input_fault;
 use crate::commands::output::{Failure, Output};
 use crate::commands::recording::{Recording, recorded};
+use crate::commands::track::add_member;
 use domecast_live::decode::Picture;
 use domecast_live::page::LivePage;
 use domecast_live::source::{ArrivedFrame, SourceInfo};
@@ -59,27 +61,6 @@ pub struct Session<'a> {
     counts: BTreeMap<&'static str, u64>,
     dropped: u64,
     reconnects: u64,
-}
-
-/// What a source says of itself, in a line.
-fn head(info: &SourceInfo) -> String {
-    let mut text = format!("domecast live: {}", info.name);
-    if let Some([width, height]) = info.size {
-        text += &format!(", {width} x {height}");
-    }
-    text += &format!(", {}", info.format);
-    for control in &info.controls {
-        text += &format!(", {} {}", control.name, control.value);
-    }
-    text
-}
-
-fn described(info: &SourceInfo) -> Value {
-    let controls: BTreeMap<&str, i32> = info.controls.iter().map(|c| (c.name, c.value)).collect();
-    json!({
-        "device": info.name, "size": info.size, "format": info.format, "rate_hz": info.rate_hz, "controls": controls,
-        "warnings": info.warnings,
-    })
 }
 
 impl<'a> Session<'a> {
@@ -170,7 +151,7 @@ impl<'a> Session<'a> {
             Arc::make_mut(picture).mirror();
         }
         self.tracker.stamp(frame.time_s);
-        let seen = decoded.as_deref().map_err(Clone::clone).and_then(camera_frame);
+        let seen = decoded.as_deref().map_err(Clone::clone).and_then(Picture::frame);
         let tracked = match &seen {
             Ok(seen) => self.tracker.track(frame.number, seen),
             Err(_) => self.tracker.skip(frame.number),
@@ -246,7 +227,7 @@ impl<'a> Session<'a> {
             self.event("no_measurement", about, Some(&found.message))?;
         }
         self.show(picture, device)?;
-        let rate_hz = self.rate_hz();
+        let (rate_hz, hardness) = (self.rate_hz(), self.felt_in_words());
         let tracked = self.tracker.result();
         let Some(view) = &mut self.view else { return Ok(()) };
         let quantile = |share| self.ages.quantile_ms(share).unwrap_or(0.0);
@@ -258,9 +239,14 @@ impl<'a> Session<'a> {
             age_p50_ms: quantile(0.5),
             age_p99_ms: quantile(0.99),
             dropped: self.dropped,
-            hardness: self.hardness.as_ref().map(|_| in_words(&self.felt)),
+            hardness,
         };
         Ok(view.show(tracked, &around)?)
+    }
+
+    /// What the model last said; `None` without one.
+    fn felt_in_words(&self) -> Option<String> {
+        self.hardness.as_ref().map(|_| in_words(&self.felt))
     }
 
     /// To the page, and to what measures the skin: a frame whose skin is measured is shown and recorded with it, once it is.
@@ -270,7 +256,7 @@ impl<'a> Session<'a> {
             page.add_sample(self.tracker.result());
         }
         let (age_ms, rate_hz, dropped) = (self.age_ms, self.rate_hz(), self.dropped);
-        let hardness = self.hardness.as_ref().map(|_| in_words(&self.felt));
+        let hardness = self.felt_in_words();
         let tracked = self.tracker.result();
         let reading = || LiveReading {
             picture,
@@ -387,11 +373,6 @@ impl<'a> Session<'a> {
     }
 }
 
-fn camera_frame(picture: &Picture) -> Result<CameraFrame<'_>, String> {
-    let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
-    frame.map_err(|error| error.to_string())
-}
-
 /// A reading's line: that of `track`, with its age and how many frames were pushed out so far.
 fn write_reading(
     line: &mut Vec<u8>,
@@ -403,11 +384,11 @@ fn write_reading(
 ) -> io::Result<()> {
     line.clear();
     write_json_fields(line, tracked, &arguments.fields)?;
+    if let Some(felt) = felt {
+        add_member(line, "hardness", felt);
+    }
     if line.ends_with(b"}\n") {
         line.truncate(line.len() - 2);
-    }
-    if let Some(felt) = felt {
-        write!(line, ",\"hardness\":{felt}")?;
     }
     writeln!(line, ",\"age_ms\":{:.3},\"dropped\":{dropped}}}", 1e3 * age.as_secs_f64())
 }

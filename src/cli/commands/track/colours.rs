@@ -6,7 +6,7 @@ use super::super::output::Output;
 use domecast_live::decode::Picture;
 use domecast_runtime::constants::Constants;
 use domecast_runtime::shape::are_colours_judged;
-use domecast_runtime::track::{CameraFrame, Tracker};
+use domecast_runtime::track::Tracker;
 
 /// The look at the first good frame.
 pub(super) enum ColourCheck {
@@ -44,7 +44,7 @@ impl ColourCheck {
 }
 
 fn look(constants: &Constants, tracker: &Tracker, picture: &Picture) -> Option<String> {
-    let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes).ok()?;
+    let frame = picture.frame().ok()?;
     let error = are_colours_judged(constants, tracker, &frame).err()?;
     Some(format!("frame {}: {}; {}", tracker.result().frame, error.problem, error.cure))
 }

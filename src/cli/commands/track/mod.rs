@@ -27,6 +27,7 @@ use source::FrameSource;
 use tally::Tally;
 
 pub use arguments::{TrackArguments, field};
+pub use results::add_member;
 pub use shape::shape_members;
 
 /// What cures pictures that lie otherwise than the constants say.
@@ -101,9 +102,7 @@ fn warn_without_rest(output: &Output, arguments: &TrackArguments, constants: &Co
 }
 
 fn frame_of(picture: &Result<Picture, String>) -> Result<CameraFrame<'_>, String> {
-    let picture = picture.as_ref().map_err(String::clone)?;
-    let frame = CameraFrame::new(picture.width, picture.height, picture.channels, &picture.bytes);
-    frame.map_err(|error| error.to_string())
+    picture.as_ref().map_err(String::clone)?.frame()
 }
 
 /// Tracks every frame that there is; a frame that cannot be read is reported and skipped.

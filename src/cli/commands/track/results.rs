@@ -82,7 +82,7 @@ fn write_line(
 }
 
 /// Adds a member to a JSON line, which ends with `}` and a line feed.
-fn add_member(line: &mut Vec<u8>, name: &str, value: &Value) {
+pub fn add_member(line: &mut Vec<u8>, name: &str, value: &Value) {
     if line.ends_with(b"}\n") {
         line.truncate(line.len() - 2);
         line.extend_from_slice(format!(",\"{name}\":{value}}}\n").as_bytes());

@@ -19,14 +19,14 @@ const MIN_ELEMENTS: [f64; 2] = [1.5, 2.8];
 
 /// What a ring's place moves less than a half-space of the same material, under a force there, mm/N.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Held {
+pub struct HeldBack {
     /// Along the normal.
     pub along_mm_per_n: f64,
     /// Across it, the mean of both directions.
     pub across_mm_per_n: f64,
 }
 
-impl Held {
+impl HeldBack {
     /// By force, for a normal of the surface.
     pub fn matrix(&self, normal: DVec3) -> DMat3 {
         let along = DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
@@ -40,7 +40,7 @@ impl Compliance {
     ///
     /// # Errors
     /// A harmonic without factors.
-    pub fn held(&self, ring: usize) -> Result<Held, FactorError> {
+    pub fn held(&self, ring: usize) -> Result<HeldBack, FactorError> {
         let (grid, spacing_mm) = (&self.grid, self.grid.spacing_mm());
         let ring = ring.min(grid.elements - 1);
         let scale_mm = grid.dome.radius_mm().min(grid.dome.height_mm());
@@ -53,7 +53,7 @@ impl Compliance {
         let own = GridNode { ring, step: 0 };
         let (at_mm, frame) = (grid.dome.point_mm(grid.meridian_rad(ring), 0.0), grid.frame(own));
         let normal = grid.dome.normal(at_mm);
-        let (mut sum, mut count) = (Held::default(), 0.0);
+        let (mut sum, mut count) = (HeldBack::default(), 0.0);
         for number in rings.clone().flat_map(|ring| grid.first[ring]..grid.first[ring] + grid.counts[ring]) {
             let node = grid.node(number);
             let there_mm = grid.dome.point_mm(grid.meridian_rad(node.ring), grid.azimuth(node));
@@ -71,7 +71,7 @@ impl Compliance {
                 (1.0 - 0.5 * poisson) * half_space - 0.5 * (u.dot(moved * u) + v.dot(moved * v));
             count += 1.0;
         }
-        Ok(Held {
+        Ok(HeldBack {
             along_mm_per_n: sum.along_mm_per_n / f64::max(count, 1.0),
             across_mm_per_n: sum.across_mm_per_n / f64::max(count, 1.0),
         })

@@ -23,7 +23,7 @@ pub use compliance::Compliance;
 pub use dome::{ElasticDome, Extent, FactorError};
 pub use field::SurfaceField;
 pub use grid::{Grid, GridNode};
-pub use held::Held;
+pub use held::HeldBack;
 pub use revolved::{Revolved, Ring};
 
 #[cfg(test)]

@@ -23,8 +23,8 @@ const PENALTY: f64 = 6000.0;
 /// What the base may bear more or less than the object, as a part of the contact's force.
 const BALANCE: f64 = 1e-6;
 /// What the object moves beyond its share is known to this part of the radius, in so many rounds at most.
-const SETTLED: f64 = 1e-9;
-const MAX_SETTLING: u32 = 16;
+const CONVERGED: f64 = 1e-9;
+const MAX_ROUNDS: u32 = 16;
 /// Half angles of the fine patch, rad.
 const PATCH_RAD: [f64; 2] = [0.3, 0.75];
 /// The patch over the angle of what overlaps: Hertz' contact has 0.7 of that.
@@ -74,7 +74,7 @@ pub(crate) fn finite_strain(
     };
     let mut tried = tried.filter(|tried| Arc::ptr_eq(&tried.deformed.body, &deformed.body));
     let near_mm = tried.map(|tried| tried.deformed.beyond_mm);
-    let mut settling = Settling::new(near_mm.unwrap_or(deformed.beyond_mm));
+    let mut rounds = Rounds::new(near_mm.unwrap_or(deformed.beyond_mm));
     let beyond = if sharing > 1.0 {
         let grading = &deformed.body.mesh.grading;
         let along = grading.middle.z.clamp(-1.0, 1.0).acos() / held.grid.dome.meridian_end_rad();
@@ -86,16 +86,16 @@ pub(crate) fn finite_strain(
     let mut last: Deformed;
     loop {
         let mut to = *sensor_from_object;
-        to.translation_mm -= settling.at_mm;
+        to.translation_mm -= rounds.at_mm;
         placed.move_to(to);
         let mut way = taken(deformed.clone(), &law, &placed, &from, depth_mm, tried)?;
-        way.deformed.beyond_mm = settling.at_mm;
+        way.deformed.beyond_mm = rounds.at_mm;
         let bearings = way.solved.iter().flat_map(|solved| solved.bearings.of.iter().flatten());
         let force_n: DVec3 = bearings.map(|bearing| bearing.force_n).sum();
-        let is_settled = settling.take(beyond * force_n) <= SETTLED * radius_mm;
-        if is_settled || settling.count == MAX_SETTLING {
+        let is_converged = rounds.take(beyond * force_n) <= CONVERGED * radius_mm;
+        if is_converged || rounds.count == MAX_ROUNDS {
             let mut state = state_of(way, &law, &placed, 30.0 * found.queries as f64);
-            if !is_settled {
+            if !is_converged {
                 state.status = Status::BoundReached;
             }
             return Ok(state);
@@ -106,7 +106,7 @@ pub(crate) fn finite_strain(
 }
 
 /// What the object moves beyond its share, until its force keeps it there: Broyden's method on three numbers.
-struct Settling {
+struct Rounds {
     at_mm: DVec3,
     inverse: DMat3,
     /// Step and miss of the time before.
@@ -114,7 +114,7 @@ struct Settling {
     count: u32,
 }
 
-impl Settling {
+impl Rounds {
     fn new(at_mm: DVec3) -> Self {
         Self { at_mm, inverse: DMat3::IDENTITY, before: None, count: 0 }
     }

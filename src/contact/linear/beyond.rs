@@ -2,18 +2,18 @@
 //!
 //! About a contact both bodies are half-spaces, so there the object moves as the dome does, by the ratio of their moduli. The dome is
 //! bonded to a sheet a radius away, the object is not: it is a half-space whichever dome it bears on (Hertz; K. L. Johnson, Contact
-//! Mechanics, 1985, ch. 4). What the dome holds back ([`domecast_elastic::Held`]) the object moves beyond its share, as a whole.
+//! Mechanics, 1985, ch. 4). What the dome holds back ([`domecast_elastic::HeldBack`]) the object moves beyond its share, as a whole.
 
 use std::collections::BTreeMap;
 
 use glam::DMat3;
 
 use crate::error::ContactError;
-use domecast_elastic::{Compliance, Held};
+use domecast_elastic::{Compliance, HeldBack};
 
 /// By ring, as far as it was asked for.
 #[derive(Default)]
-pub(super) struct Beyond(BTreeMap<usize, Held>);
+pub(super) struct Beyond(BTreeMap<usize, HeldBack>);
 
 impl Beyond {
     /// At a node, for an object that yields `ratio` times what the dome does: sensor frame, mm/N.

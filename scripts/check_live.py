@@ -31,6 +31,8 @@ from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 from rosbags.typesys import Stores, get_typestore
 
+from check_hardness import RIGID, SIZE, network, with_metadata
+
 REPOSITORY = Path(__file__).resolve().parent.parent
 RATE = 60
 BAD = {"foreign_constants", "markers_do_not_fit", "markers_missing", "no_marks", "turned", "mirrored", "key_unsure", "beyond_springs"}
@@ -340,6 +342,22 @@ def check_heights(domecast, constants, rest, folder):
     expect(max(off, default=np.inf) < 1e-6, f"heights: off by {off} mm")
 
 
+def check_model(domecast, constants, files, folder):
+    """What a model says (here one of random weights) is what it says in `track`, byte for byte; without a frame at rest it is refused."""
+    model, lines = folder / "model.onnx", folder / "felt.jsonl"
+    model.write_bytes(with_metadata(network(8, SIZE, len(RIGID), [8, 16]), [[0, 255]] + [[0, 100]] * len(RIGID)))
+    named = ("--constants", constants, "--rest", files[0], "--hardness", model)
+    subprocess.run([domecast, "track", files[0].parent, *named, "--out", lines, "--quiet"], check=True)
+    wanted = [json.loads(line)["hardness"] for line in lines.read_text().splitlines()]
+    live = Live(domecast, f"player:{files[0].parent}?rate=10", *named[1:])
+    live.end()
+    found = [reading["hardness"] for reading in live.readings]
+    expect(found == wanted and any(wanted), f"hardness: {found} where track has {wanted}")
+    alone = subprocess.run([domecast, "live", f"player:{files[0].parent}", "--constants", constants, "--hardness", model], capture_output=True, text=True)
+    expect(alone.returncode == 2 and "--rest" in alone.stderr, f"hardness without a frame at rest: {alone.returncode} {alone.stderr}")
+    return sum(one is not None for one in found)
+
+
 def check_full(domecast, constants, files, folder):
     """A disk that takes no more (here: a limit of the file's size, which the system answers alike) ends the recording by name, not the reading."""
     place, limit = folder / "full.mcap", 3_000_000
@@ -392,6 +410,7 @@ def main():
         print("live: with the page: age p50 {age_p50_ms:.2f}, p99 {age_p99_ms:.2f} ms, {dropped} pushed out;".format(**ended), seen or "no Chromium")
         check_ends(domecast, constants, files, base)
         check_heights(domecast, constants, base / "lit/frame_0000.png", base)
+        print(f"live: a model states {check_model(domecast, constants, files, base)} times what it states in track")
         kept = check_full(domecast, constants, files, base)
         print(f"live: a disk that is full ends the recording, not the reading; {kept} readings are in it")
     for fault in faults[:20]:

@@ -31,7 +31,7 @@ FRAMES, NOISE, TRAVEL_SD_MM = 12, 1.0, 0.02
 RANGE_MPA, SOFT_MPA = (0.05, 5.0), 0.28
 # between soft and hard, as the shipped sets have them (0.07 and 0.9 MPa)
 BORDER_MPA = 0.25
-MAX_RMS = {"thumb24": 0.15, "picam-r20": 0.2, "digit-rigid": 0.35}
+MAX_RMS = {"thumb24": 0.15, "picam-r20": 0.2, "digit-rigid": 0.25}
 
 
 def shape(rng, scale):

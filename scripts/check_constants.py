@@ -65,6 +65,8 @@ def unproject(camera, pixel, ray):
         plane = ray[:2] / ray[2]
         at = lambda p: lens_project(camera, np.array([[p[0], p[1], 1.0]]))[0]
         h, left = 1e-6, pixel - at(plane)
+        if np.abs(left).max() < 1e-11:
+            break
         J = np.stack([(at(plane + h * e) - at(plane - h * e)) / (2 * h) for e in np.eye(2)], axis=1)
         plane = plane + np.linalg.solve(J, left)
         ray = np.r_[plane, 1.0]
@@ -278,6 +280,11 @@ def check_kalibr(folder, constants):
     check("kalibr.yaml by its reader's rules", good and cam["distortion_coeffs"] == camera["distortion"][:counts[model]], model)
 
 
+def is_still(data, step):
+    """Whether nothing moves any more, m/s and rad/s; it begins at rest."""
+    return step > 100 and np.abs(data.qvel).max() < 1e-9 and np.abs(data.qacc).max() < 1e-6
+
+
 def check_robots(folder, constants):
     import mujoco
     import yourdfpy
@@ -303,11 +310,13 @@ def check_robots(folder, constants):
     force, moment = np.array([0.3, -0.2, -2.0]), np.array([2e-3, 1e-3, -1e-3])
     mujoco.mj_forward(model, data)
     start = data.sensor("position").data.copy()
-    for _ in range(20000):
+    for step in range(20000):
         # A known wrench about the site: MuJoCo applies forces at the centre of mass.
         lever = data.site("wrench").xpos - data.xipos[body]
         data.xfrc_applied[body] = np.r_[force, moment + np.cross(lever, force)]
         mujoco.mj_step(model, data)
+        if is_still(data, step):
+            break
     R = data.site("wrench").xmat.reshape(3, 3)
     # MuJoCo reports what the body does to its parent at the site: the world's load handed on.
     got_force, got_moment = R @ data.sensor("force").data, R @ data.sensor("torque").data
@@ -318,10 +327,12 @@ def check_robots(folder, constants):
     K = np.array(constants["springs"]["stiffness"])
     small = np.r_[0.02, -0.01, -0.05, 0.2, 0.1, -0.15]
     mujoco.mj_resetData(model, data)
-    for _ in range(20000):
+    for step in range(20000):
         lever = data.site("wrench").xpos - data.xipos[body]
         data.xfrc_applied[body] = np.r_[small[:3], small[3:] * 1e-3 + np.cross(lever, small[:3])]
         mujoco.mj_step(model, data)
+        if is_still(data, step):
+            break
     moved = np.r_[(data.sensor("position").data - start) * 1e3, cv2.Rodrigues(data.site("wrench").xmat.reshape(3, 3))[0][:, 0]]
     want = np.linalg.solve(K, small)
     check("MJCF: the 6x6 gives way as the constants say", np.allclose(moved, want, rtol=2e-3, atol=2e-6), str(np.round(moved, 5)))

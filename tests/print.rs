@@ -131,7 +131,7 @@ fn mean_error_mm(build: &Path, pad: Pad, random: &mut SeededRandom) -> f64 {
 }
 
 #[test]
-fn a_measured_pad_prints_as_well_as_its_noise_allows() {
+fn long_a_measured_pad_prints_as_well_as_its_noise_allows() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     fs::copy(DESIGN, at.join("design.json")).expect("copied");

@@ -22,6 +22,9 @@ const BENT: f64 = 1e-3;
 /// Cells across the tables on the shells.
 pub const SHELL_CELLS: usize = 36;
 
+/// Places across an emitter, each way, of coarser tables.
+const COARSE_PLACES: usize = 2;
+
 /// Radii of the shells for moved points, parts of the dome's; in a flat cap nearer to it ([`Ways::shell`]).
 pub const SHELLS: [f64; 3] = [1.0, 0.86, 0.72];
 
@@ -318,9 +321,9 @@ pub struct SourceTables(Vec<(DomeGrid, Vec<Node>)>);
 
 impl SourceTables {
     /// Computes them for one of the ways' sources, on grids with so many times fewer cells across than those that frames are drawn
-    /// with.
+    /// with; on coarser ones with fewer places of the emitter as well.
     pub fn new(ways: &Ways, source: &Source, coarser: usize) -> Self {
-        let rule = EmitterRule::default();
+        let rule = if coarser > 1 { EmitterRule::with_places(COARSE_PLACES) } else { EmitterRule::default() };
         let of = |(shell, part): (usize, &f64)| {
             let coarser = coarser.max(1);
             if shell == 0 {

@@ -126,7 +126,7 @@ fn faults_of(sweep: &Sweep) -> Vec<String> {
 }
 
 #[test]
-fn sweeps_fall_at_their_orders() {
+fn long_sweeps_fall_at_their_orders() {
     sweeps_of("thumb24", include_str!("../../../designs/thumb24.json"), 0);
 }
 

@@ -170,7 +170,7 @@ fn compare(is_wanted: &dyn Fn(&str, f64, f64) -> bool) {
 }
 
 #[test]
-fn newton_ends_quadratically_in_balance_with_the_base() {
+fn long_newton_ends_quadratically_in_balance_with_the_base() {
     for friction in [0.0, 0.5] {
         let rest = at_rest(5, 0.4);
         let solid = ContactSolid::sphere(5.0).unwrap();
@@ -240,7 +240,7 @@ fn bytes_do_not_depend_on_threads() {
 }
 
 #[test]
-fn hard_cases_end() {
+fn long_hard_cases_end() {
     let near = Elastomer { poisson: 0.499, ..silicone(0.0) };
     let punch = ContactSolid::cylinder(3.0, 10.0).unwrap();
     let ball = || ContactSolid::sphere(5.0).unwrap();

@@ -198,7 +198,7 @@ fn levels_without_elements_refuse_other_domes_by_name() {
 
 /// An elastic object is a half-space whatever dome it bears on: it has no base of its own.
 #[test]
-fn soft_balls_are_half_spaces_on_every_dome() {
+fn long_soft_balls_are_half_spaces_on_every_dome() {
     let table: Value = serde_json::from_str(include_str!("../../../tests/cases/golden_soft.json")).unwrap();
     for case in table["cases"].as_array().unwrap() {
         let number = |name: &str| case[name].as_f64().unwrap();

@@ -305,7 +305,7 @@ fn soft_objects_yield_their_share() {
 
 /// A gap that closes several times as fast as the dome moves, on springs: held, then dragged on, then pressed with a force.
 #[test]
-fn soft_objects_are_balanced_at_finite_strain() {
+fn long_soft_objects_are_balanced_at_finite_strain() {
     let contact = Contact::new(silicone(), Level::FiniteStrain { across: 4 }).unwrap();
     let soft = Indenter { young_mpa: Some(0.1), poisson: 0.47, ..ball(5.0) };
     let suspension = suspension();

@@ -120,9 +120,9 @@ pub struct OptimizationReport {
     pub ratio: Option<f64>,
     /// What each arrangement came to.
     pub arrangements: Vec<ArrangementResult>,
-    /// Lights of which none is worse than another in everything; each went through the build's checks.
+    /// Lights of which none is worse than another in everything; each went through the build's checks. Empty where the search was stopped.
     pub front: Vec<FrontPoint>,
-    /// What being off by a little does to the proposal.
+    /// What being off by a little does to the proposal. Empty where the search was stopped.
     pub sensitivities: Vec<Sensitivity>,
 }
 
@@ -167,8 +167,12 @@ pub(super) fn report(
             .and_then(|one| one.score.as_ref())
             .map(LightScore::objective),
     };
+    // whoever stops a search does not wait for what is beside the proposal
+    let is_whole = found.status != SearchStatus::Interrupted;
     let sensitivities = match (ends.proposal, &best) {
-        (Some(proposal), Some(best)) => sensitivities(proposal, &best.score, options.polar_angle_deg),
+        (Some(proposal), Some(best)) if is_whole => {
+            sensitivities(proposal, &best.score, options.polar_angle_deg)
+        }
         _ => Vec::new(),
     };
     Ok(OptimizationReport {
@@ -186,7 +190,7 @@ pub(super) fn report(
         changes,
         ratio,
         arrangements: found.arrangements.iter().map(arrangement).collect(),
-        front: front(given, found),
+        front: if is_whole { front(given, found) } else { Vec::new() },
         sensitivities,
     })
 }

@@ -159,6 +159,9 @@ impl<'a> Search<'a> {
         let mut starts = Vec::new();
         for adds_hood in [false, true].into_iter().filter(|adds| !adds || self.given.takes_hood()) {
             for arrangement in arrangements.iter().copied() {
+                if self.is_interrupted() {
+                    break;
+                }
                 let choice = LightChoice { arrangement, diffuser, adds_hood };
                 let looked = self.look(&self.first_tries(choice, start), f64::INFINITY);
                 match looked.into_iter().min_by(Looked::order).filter(|one| one.violation.is_none()) {
@@ -171,7 +174,7 @@ impl<'a> Search<'a> {
         let broad = (BROAD_SHARE * self.options.evaluations as f64) as usize;
         let share = broad.saturating_sub(self.found.evaluations) / starts.len().clamp(1, MAX_DESCENTS);
         for (index, Looked { choice, place, .. }) in starts.into_iter().enumerate() {
-            if index < MAX_DESCENTS {
+            if index < MAX_DESCENTS && !self.is_interrupted() {
                 self.descend(choice, place, 1.0, share, index as u64);
             }
             let is_own = |one: &&Looked| {
@@ -181,7 +184,13 @@ impl<'a> Search<'a> {
             let best = self.found.feasible.iter().filter(is_own).min_by(|a, b| a.order(b)).cloned();
             self.found.arrangements.push((choice, best));
         }
-        self.refine();
+        if !self.is_interrupted() {
+            self.refine();
+        }
+        // whoever stops it gets the best of what was looked at
+        if self.is_interrupted() {
+            self.verify_known();
+        }
         self.found
     }
 
@@ -248,12 +257,17 @@ impl<'a> Search<'a> {
         self.found.status = SearchStatus::Converged;
     }
 
-    /// Whether it must end, and why.
-    fn is_over(&mut self) -> bool {
+    /// Whether someone asked it to stop.
+    fn is_interrupted(&mut self) -> bool {
         if (self.is_stopped)() {
             self.found.status = SearchStatus::Interrupted;
         }
-        self.found.status == SearchStatus::Interrupted || self.found.evaluations >= self.options.evaluations
+        self.found.status == SearchStatus::Interrupted
+    }
+
+    /// Whether it must end.
+    fn is_over(&mut self) -> bool {
+        self.is_interrupted() || self.found.evaluations >= self.options.evaluations
     }
 
     /// CMA-ES from a place, with so many evaluations at most.
@@ -282,7 +296,9 @@ impl<'a> Search<'a> {
             ordered.sort_by(|a, b| a.0.order(b.0));
             cma.tell(&ordered.into_iter().map(|(_, point)| point).collect::<Vec<_>>());
         }
-        self.verify_known();
+        if !self.is_interrupted() {
+            self.verify_known();
+        }
     }
 
     /// Looks at lights, in parallel; the best of those that are better than the best by a part of `worth` is verified: none where

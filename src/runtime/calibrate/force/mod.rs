@@ -13,6 +13,7 @@ mod apply;
 mod choice;
 mod fit;
 mod knowledge;
+mod lag;
 mod motion;
 mod plausibility;
 mod reference;

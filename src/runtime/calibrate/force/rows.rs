@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::lag::lag_of;
 use super::statistics::{quantile, sorted, spread};
 use super::types::Pair;
 use crate::constants::WRENCH_AXES;
@@ -12,14 +13,10 @@ use crate::constants::WRENCH_AXES;
 const MAX_REPEATED: f64 = 0.5;
 /// Fewer rows are not judged.
 const MIN_ROWS: usize = 24;
-/// A residual that shrinks by this factor when the rows are shifted, or their zero drifts, says that they do.
+/// A residual that shrinks by this factor when the zero drifts says that it does.
 const CLEAR_FACTOR: f64 = 3.0;
 /// A drift below this part of the readings' range is left to the fit's noise.
 const MIN_DRIFT: f64 = 0.03;
-/// Rows that a shift is looked for over.
-const MAX_SHIFT: isize = 10;
-/// Residuals below this part of the readings' range say nothing of the order.
-const MIN_RESIDUAL: f64 = 1e-3;
 /// Rounds of reweighting.
 const ROUNDS: usize = 4;
 /// Rows that an order is judged by.
@@ -60,35 +57,11 @@ fn residual(terms: &[Vec<f64>], readings: &[f64]) -> Option<(f64, DVector<f64>)>
 }
 
 /// What an affine law is made of, with the row's number beside it.
-fn terms_of(pair: &Pair, number: Option<f64>) -> Vec<f64> {
+pub(super) fn terms_of(pair: &Pair, number: Option<f64>) -> Vec<f64> {
     let d = &pair.displacement;
     // With the compression's products: springs that stiffen are not taken for a drift.
     let products = d.iter().map(|v| d[2] * v);
     d.iter().copied().chain(products).chain([1.0]).chain(number).collect()
-}
-
-/// The shift of one axis's readings against the displacements that fits far better than none.
-fn shift_of(pairs: &[Pair], axis: usize) -> Option<(isize, f64)> {
-    let fitted = |by: isize| {
-        let (mut terms, mut readings) = (Vec::new(), Vec::new());
-        for (row, pair) in pairs.iter().enumerate() {
-            let there =
-                row.checked_add_signed(by).and_then(|row| pairs.get(row)).and_then(|p| p.wrench[axis]);
-            if let Some(reading) = there {
-                terms.push(terms_of(pair, None));
-                readings.push(reading);
-            }
-        }
-        (readings.len() >= MIN_ROWS).then(|| residual(&terms, &readings)).flatten().map(|(left, _)| left)
-    };
-    let readings: Vec<f64> = pairs.iter().filter_map(|pair| pair.wrench[axis]).collect();
-    let now = fitted(0)?;
-    if now <= MIN_RESIDUAL * spread(&readings) {
-        return None;
-    }
-    let shifts = (-MAX_SHIFT..=MAX_SHIFT).filter(|by| *by != 0);
-    let best = shifts.filter_map(|by| Some((by, fitted(by)?))).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (best.1 * CLEAR_FACTOR < now).then_some((best.0, now / best.1.max(1e-12 * now)))
 }
 
 /// How far the zero of one axis drifts over the table, where the row's number explains far more than noise.
@@ -152,18 +125,11 @@ pub(super) fn implausible_rows(pairs: &[Pair], lines: &[usize]) -> Option<String
             WRENCH_AXES[*axis]
         ));
     }
-    let shifts: Vec<(usize, isize)> = (0..6).filter_map(|a| Some((a, shift_of(pairs, a)?.0))).collect();
-    let read = (0..6).filter(|axis| pairs.iter().any(|pair| pair.wrench[*axis].is_some())).count();
-    // Rows that are off are off on all axes.
-    if let Some((_, by)) = shifts.first()
-        && shifts.iter().all(|(_, other)| other == by)
-        && 2 * shifts.len() > read
-    {
-        let way = if *by > 0 { "later" } else { "earlier" };
-        let names: Vec<&str> = shifts.iter().map(|(axis, _)| WRENCH_AXES[*axis]).collect();
+    if let Some(by) = lag_of(pairs) {
+        let way = if by > 0 { "later" } else { "earlier" };
         return Some(format!(
-            "looks like unpaired rows: {} stand {} row(s) {way} than the displacements they belong to",
-            names.join(", "),
+            "looks like unpaired rows: the readings stand {} row(s) {way} than the displacements they belong to; pair them by time, or \
+             read while nothing moves",
             by.abs()
         ));
     }

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
-use super::model::LightModel;
+use super::model::{LightModel, Number};
 use super::observed::{CapPlace, Observed, depth_on_ball};
 use super::physics::{Physics, ShadedDome};
 use super::scatter::{Group, Scatter};
@@ -46,12 +47,14 @@ pub(super) struct Problem<'a> {
     pub start_stray: f64,
     /// Errors of places at rest, and of caps.
     pub scatter: [Scatter; 2],
+    /// Whether the tables for derivatives do for the light itself.
+    pub is_rough: bool,
 }
 
 impl Problem<'_> {
-    /// The same with errors that are taken to be so many times as large.
+    /// The same with errors that are taken to be so many times as large, and coarser tables of the light.
     pub fn rougher(&self, factor: f64) -> Self {
-        Self { scatter: self.scatter.map(|scatter| scatter.rougher(factor)), ..*self }
+        Self { scatter: self.scatter.map(|scatter| scatter.rougher(factor)), is_rough: true, ..*self }
     }
 
     pub fn unknowns(&self) -> usize {
@@ -108,7 +111,8 @@ impl Problem<'_> {
 
     /// The light of some values.
     pub fn lit(&self, values: &Values) -> Option<ShadedDome> {
-        self.physics.lit(self.model.light(&values.numbers))
+        let light = self.model.light(&values.numbers);
+        if self.is_rough { self.physics.lit_for_slopes(light, None) } else { self.physics.lit(light) }
     }
 
     /// Levels that the camera would have at every place: at rest, then the caps.
@@ -205,10 +209,9 @@ impl Problem<'_> {
     /// Derivatives of all levels by the light's numbers, whitened. To both sides where the shape of a light changes: where the platform's
     /// lip begins to hide it, one side says nothing of the other.
     pub fn number_slopes(&self, values: &Values) -> Option<DMatrix<f64>> {
-        let mut slopes = DMatrix::zeros(self.rows_count(), self.unknowns());
         let base = self.physics.lit_for_slopes(self.model.light(&values.numbers), None)?;
         let here = self.rows(values, &base)?;
-        for (k, number) in self.model.numbers.iter().enumerate() {
+        let column = |(k, number): (usize, &Number)| {
             let changed = self.model.reshaped(*number);
             let at = |step: f64| {
                 let mut moved = values.clone();
@@ -216,13 +219,16 @@ impl Problem<'_> {
                 let light = self.model.light(&moved.numbers);
                 self.rows(&moved, &self.physics.lit_for_slopes(light, Some((&base, changed)))?)
             };
-            let column = if changed.is_empty() {
+            Some(if changed.is_empty() {
                 (at(STEP)? - &here) / STEP
             } else {
                 (at(STEP)? - at(-STEP)?) / (2.0 * STEP)
-            };
-            slopes.column_mut(k).copy_from(&column);
-        }
+            })
+        };
+        let columns: Vec<DVector<f64>> =
+            self.model.numbers.par_iter().enumerate().map(column).collect::<Option<_>>()?;
+        let mut slopes = DMatrix::zeros(self.rows_count(), self.unknowns());
+        columns.iter().enumerate().for_each(|(k, column)| slopes.column_mut(k).copy_from(column));
         Some(slopes)
     }
 

@@ -11,7 +11,7 @@ use super::model::LightModel;
 use super::observed::{Observed, SeenPress, rest_places};
 use super::physics::Physics;
 use super::scatter::{FIRST_LENGTHS, Scatter};
-use super::solve::{Open, Solved, scatter, solve};
+use super::solve::{Open, Solved, Start, scatter, solve};
 use super::types::{BallPress, LightFit, LightFitError, LightFitOptions, place_deg};
 use super::verdict;
 use crate::constants::{Constants, LightConstants};
@@ -61,20 +61,20 @@ pub fn fit(
         start_gain: start_gain(&cells, nominal.stray),
         start_stray: nominal.stray,
         scatter: FIRST_LENGTHS.map(|part| Scatter::first(part * dome_mm)),
+        is_rough: false,
     };
     let values = Values { numbers: vec![0.0; model.count()], centers: Vec::new(), radius: 0.0 };
-    let rough = solve(&problem.rougher(ROUGH), values, Open::All)?;
-    let at_rest = solve(&problem, rough.values, Open::All)?;
+    let rough = solve(&problem.rougher(ROUGH), Start { values, lit: None, slopes: None }, Open::All)?;
+    let steps = rough.steps;
+    let at_rest = solve(&problem, Start { lit: None, ..rough.go_on() }, Open::All)?;
+    let steps = steps + at_rest.steps;
     verdict::lights(&model, &at_rest.values.numbers)?;
     let first = model.physical_light(&at_rest.values.numbers);
     let seen = see_presses(constants, &first, (rest, &tracked), presses, options, still.clone())?;
-    let values = Values {
-        numbers: at_rest.values.numbers,
-        centers: vec![DVec3::ZERO; seen.presses.len()],
-        radius: 0.0,
-    };
+    let mut start = Start { slopes: None, ..at_rest.go_on() };
+    start.values.centers = vec![DVec3::ZERO; seen.presses.len()];
     let problem = Problem { seen: &seen, start_stray: first.stray, ..problem };
-    together(constants, problem, values, rough.steps + at_rest.steps)
+    together(constants, problem, start, steps)
 }
 
 /// Looks at one press before a fit: where it lies, from the pole and about the axis, degrees.
@@ -133,25 +133,29 @@ fn see_presses(
 fn together(
     constants: &Constants,
     mut problem: Problem<'_>,
-    start: Values,
+    start: Start,
     steps: u32,
 ) -> Result<LightFit, LightFitError> {
     // With the radius free first: presses of another ball must not be bent to fit this one.
     let balls = solve(&problem, start, Open::Balls)?;
     problem.radius_sd = FREE_RADIUS;
-    let first = solve(&problem, balls.values, Open::All)?;
+    let steps = steps + balls.steps;
+    let first = solve(&problem, Start { slopes: None, ..balls.go_on() }, Open::All)?;
     problem.scatter = scatter(&problem, &first).unwrap_or(problem.scatter);
     // Again with the errors that these frames have: the radius' deviation is theirs.
-    let free = solve(&problem, first.values, Open::All)?;
+    let (steps, rms_before) = (steps + first.steps, first.rms[0]);
+    let free = solve(&problem, first.go_on(), Open::All)?;
     let last = problem.unknowns() - 1;
     let radius = [free.values.radius, FREE_RADIUS * free.covariance[(last, last)].max(0.0).sqrt()];
     verdict::radius(problem.radius_mm, radius)?;
     problem.radius_sd = KNOWN_RADIUS;
-    let solved = solve(&problem, Values { radius: 0.0, ..free.values.clone() }, Open::All)?;
+    let steps = steps + free.steps;
+    let mut start = free.go_on();
+    let free_radius = std::mem::take(&mut start.values.radius);
+    let solved = solve(&problem, start, Open::All)?;
     verdict::lights(problem.model, &solved.values.numbers)?;
-    let steps = steps + balls.steps + first.steps + free.steps + solved.steps;
-    let rms = [first.rms[0], solved.rms[1]];
-    Ok(result(constants, &problem, &solved, rms, free.values.radius, steps))
+    let rms = [rms_before, solved.rms[1]];
+    Ok(result(constants, &problem, &solved, rms, free_radius, steps + solved.steps))
 }
 
 fn with_light(constants: &Constants, light: LightConstants) -> Constants {

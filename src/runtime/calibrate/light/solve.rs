@@ -21,9 +21,19 @@ const END: f64 = 0.1;
 /// By how much the cost may fall otherwise than predicted, a part, before derivatives are taken anew.
 const MAX_MISPREDICTED: f64 = 0.2;
 
+/// Where a fit begins, with what is known there.
+pub(super) struct Start {
+    pub values: Values,
+    /// The light of these values.
+    pub lit: Option<ShadedDome>,
+    /// Derivatives of these places by the light's numbers, at these values or beside them.
+    pub slopes: Option<DMatrix<f64>>,
+}
+
 /// Where a fit ended.
 pub(super) struct Solved {
     pub values: Values,
+    lit: ShadedDome,
     /// What was seen less what the fit gives, three rows to a place.
     pub off: DVector<f64>,
     slopes: DMatrix<f64>,
@@ -32,6 +42,13 @@ pub(super) struct Solved {
     /// Root mean square of the residuals of the places at rest and of the caps before and after, full scale 1.
     pub rms: [[f64; 2]; 2],
     pub steps: u32,
+}
+
+impl Solved {
+    /// From here on, with the same places. What another fit predicts badly by these derivatives it takes anew.
+    pub fn go_on(self) -> Start {
+        Start { values: self.values, lit: Some(self.lit), slopes: Some(self.slopes) }
+    }
 }
 
 fn not_positive() -> LightFitError {
@@ -110,10 +127,10 @@ pub(super) enum Open {
 ///
 /// # Errors
 /// The fit does not end in the steps that are allowed, or the equations leave something open.
-pub(super) fn solve(problem: &Problem<'_>, start: Values, open: Open) -> Result<Solved, LightFitError> {
+pub(super) fn solve(problem: &Problem<'_>, start: Start, open: Open) -> Result<Solved, LightFitError> {
     let weighed = Weighed::new(problem).ok_or_else(not_positive)?;
-    let mut values = start;
-    let mut lit: ShadedDome = problem.lit(&values).ok_or_else(out_of_range)?;
+    let mut values = start.values;
+    let mut lit = start.lit.or_else(|| problem.lit(&values)).ok_or_else(out_of_range)?;
     let mut off = problem.off(&values, &lit);
     let mut cost = weighed.cost(&values, &off);
     let before = rms_of(problem, &off);
@@ -121,7 +138,7 @@ pub(super) fn solve(problem: &Problem<'_>, start: Values, open: Open) -> Result<
         Open::Balls => Some(DMatrix::zeros(problem.rows_count(), problem.unknowns())),
         Open::All => problem.number_slopes(values),
     };
-    let mut slopes = number_slopes(&values).ok_or_else(out_of_range)?;
+    let mut slopes = start.slopes.or_else(|| number_slopes(&values)).ok_or_else(out_of_range)?;
     problem.add_ball_slopes(&values, &lit, &mut slopes);
     let all = |values: &Values, slopes: &DMatrix<f64>, off: &DVector<f64>| {
         let (matrix, mut right) =
@@ -180,7 +197,7 @@ pub(super) fn solve(problem: &Problem<'_>, start: Values, open: Open) -> Result<
         return Err(LightFitError::new(problem, "give frames of this sensor, sharp and at one exposure"));
     }
     let covariance = matrix.cholesky().ok_or_else(not_positive)?.inverse();
-    Ok(Solved { values, off, slopes, covariance, rms: [before, after], steps })
+    Ok(Solved { values, lit, off, slopes, covariance, rms: [before, after], steps })
 }
 
 /// The most likely errors of places at rest and of caps, as a fit has left them.

@@ -262,6 +262,32 @@ def draws(bench, sensors, count, rng):
     return wrong_good, wrong_bad, unnamed
 
 
+def lags(bench, sensors, count, rng):
+    """Slow motions: tables refused though their rows are right, also of springs that stick, and taken though each reading stands a row or
+    three beside its displacement."""
+    wrong_good, stuck, wrong_bad, tried = [], [], [], 0
+    while tried < count:
+        name, constants = sensors[tried % len(sensors)]
+        d, w, words = good(rng, constants)
+        if np.isnan(w).any() or words.split(",")[0] not in ("axis", "slow") or len(d) < 80:
+            continue
+        tried += 1
+        # by the sign of what moves, not of its noise
+        level = d @ np.array(constants["springs"]["stiffness"]).T
+        smooth = np.stack([np.convolve(column, np.ones(7) / 7, "same") for column in level.T], axis=1)
+        sticks = w + 0.02 * np.ptp(w, axis=0) * np.sign(np.gradient(smooth, axis=0))
+        for cases, loads in ((wrong_good, w), (stuck, sticks)):
+            code, answer = bench.run(constants, d, loads)
+            # springs that stick may be refused for what they are
+            if code and (cases is wrong_good or "unpaired" in answer["error"]["problem"]):
+                cases.append(f"{name}, {words}: {answer['error']['problem'][:120]}")
+        for by in (1, -1, 3):
+            code, answer = bench.run(constants, d, np.roll(w, by, axis=0))
+            if not code:
+                wrong_bad.append(f"{by} rows, {name}, {words}")
+    return wrong_good, stuck, wrong_bad
+
+
 def repeats(bench, sensors, count, rng):
     """rms z and mean error of the diagonal over simulated repeats, for noise of motions and loads."""
     lines = []
@@ -304,12 +330,20 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(given.domecast, folder)
         wrong_good, wrong_bad, unnamed = draws(bench, sensors, given.draws, rng)
+        lagging = lags(bench, sensors, given.draws // 2, rng)
         lines = repeats(bench, sensors, given.repeats, rng)
     for title, cases in (("good, refused", wrong_good), ("bad, accepted", wrong_bad), ("bad, refused without its name", unnamed)):
         print(f"{title}: {len(cases)} of {given.draws}")
         for case in cases:
             print(f"    {case}")
-    failed = bool(wrong_bad) or len(wrong_good) > 0.03 * given.draws or len(unnamed) > 0.05 * given.draws
+    for title, cases, tried in (("slow and good, refused", lagging[0], 1), ("the same of springs that stick", lagging[1], 1),
+                                 ("slow and rows shifted, accepted", lagging[2], 3)):
+        print(f"{title}: {len(cases)} of {tried * (given.draws // 2)}")
+        for case in cases:
+            print(f"    {case}")
+    # what is left is shifted by no more than the noise
+    failed = bool(lagging[0]) or len(lagging[1]) > max(1, given.draws // 20) or len(lagging[2]) > 0.06 * 3 * (given.draws // 2)
+    failed |= bool(wrong_bad) or len(wrong_good) > 0.03 * given.draws or len(unnamed) > 0.05 * given.draws
     print("motion sd mm | load, part | stated | rms z | mean error of the diagonal | numbers")
     for motion, load, stated, z, part, count in lines:
         print(f"{motion:12} | {load:10} | {stated!s:6} | {z:5.2f} | {100 * part:+.2f} % | {count}")

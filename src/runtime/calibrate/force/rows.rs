@@ -56,21 +56,14 @@ fn residual(terms: &[Vec<f64>], readings: &[f64]) -> Option<(f64, DVector<f64>)>
     Some((median, scaled))
 }
 
-/// What an affine law is made of, with the row's number beside it.
-pub(super) fn terms_of(pair: &Pair, number: Option<f64>) -> Vec<f64> {
-    let d = &pair.displacement;
-    // With the compression's products: springs that stiffen are not taken for a drift.
-    let products = d.iter().map(|v| d[2] * v);
-    d.iter().copied().chain(products).chain([1.0]).chain(number).collect()
-}
-
 /// How far the zero of one axis drifts over the table, where the row's number explains far more than noise.
 fn drift_of(pairs: &[Pair], axis: usize) -> Option<f64> {
     let (mut plain, mut with, mut readings) = (Vec::new(), Vec::new(), Vec::new());
     for (row, pair) in pairs.iter().enumerate() {
         if let Some(reading) = pair.wrench[axis] {
-            plain.push(terms_of(pair, None));
-            with.push(terms_of(pair, Some(row as f64 / pairs.len() as f64)));
+            plain.push(pair.affine_terms());
+            let number = row as f64 / pairs.len() as f64;
+            with.push(pair.affine_terms().into_iter().chain([number]).collect());
             readings.push(reading);
         }
     }
@@ -156,7 +149,7 @@ fn is_counter(pairs: &[Pair], axis: usize) -> bool {
     };
     let is_even = step != 0.0 && readings.iter().enumerate().all(even);
     // Dead weights rise by equal steps too: then the displacements follow them.
-    let terms: Vec<Vec<f64>> = pairs[..readings.len()].iter().map(|pair| terms_of(pair, None)).collect();
+    let terms: Vec<Vec<f64>> = pairs[..readings.len()].iter().map(Pair::affine_terms).collect();
     let follows = residual(&terms, &readings).is_none_or(|(left, _)| left < 0.1 * spread(&readings));
     is_even && !follows
 }

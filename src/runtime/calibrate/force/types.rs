@@ -14,6 +14,15 @@ pub struct Pair {
     pub wrench: [Option<f64>; 6],
 }
 
+impl Pair {
+    /// What an affine law of the displacement is made of, with the compression's products: springs that stiffen are no drift and no lag.
+    pub(super) fn affine_terms(&self) -> Vec<f64> {
+        let d = &self.displacement;
+        let products = d.iter().map(|v| d[2] * v);
+        d.iter().copied().chain(products).chain([1.0]).collect()
+    }
+}
+
 /// Where the noise of the displacements comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MotionNoise {

@@ -66,6 +66,8 @@ fn a_search_that_is_asked_to_stop_keeps_what_it_has() {
     assert_eq!(found.report.status, SearchStatus::Interrupted);
     assert!(found.report.evaluations < 200, "{}", found.report.evaluations);
     assert_eq!(found.proposal.is_some(), found.report.best.is_some());
+    // what would be found beside it is not waited for
+    assert!(found.report.front.is_empty() && found.report.sensitivities.is_empty());
 }
 
 #[test]

@@ -138,9 +138,10 @@ pub(super) fn solve(problem: &Problem<'_>, start: Start, open: Open) -> Result<S
         Open::Balls => Some(DMatrix::zeros(problem.rows_count(), problem.unknowns())),
         Open::All => problem.number_slopes(values),
     };
+    let mut is_fresh = start.slopes.is_none();
     let mut slopes = start.slopes.or_else(|| number_slopes(&values)).ok_or_else(out_of_range)?;
-    problem.add_ball_slopes(&values, &lit, &mut slopes);
-    let all = |values: &Values, slopes: &DMatrix<f64>, off: &DVector<f64>| {
+    let all = |values: &Values, lit: &ShadedDome, slopes: &mut DMatrix<f64>, off: &DVector<f64>| {
+        problem.add_ball_slopes(values, lit, slopes);
         let (matrix, mut right) =
             weighed.equations(values, slopes, off, |_| true).ok_or_else(not_positive)?;
         if open == Open::Balls {
@@ -148,7 +149,7 @@ pub(super) fn solve(problem: &Problem<'_>, start: Start, open: Open) -> Result<S
         }
         Ok((matrix, right))
     };
-    let (mut matrix, mut right) = all(&values, &slopes, &off)?;
+    let (mut matrix, mut right) = all(&values, &lit, &mut slopes, &off)?;
     let (mut damping, mut steps, mut is_done) = (FIRST_DAMPING, 0, false);
     let end = END * END * problem.unknowns() as f64;
     while steps < MAX_STEPS && !is_done {
@@ -176,11 +177,17 @@ pub(super) fn solve(problem: &Problem<'_>, start: Start, open: Open) -> Result<S
                 if fulfilled > TRUSTED {
                     damping = (0.1 * damping).max(1e-9);
                 }
-                if !is_done && (fulfilled - 1.0).abs() > MAX_MISPREDICTED {
+                is_fresh = !is_done && (fulfilled - 1.0).abs() > MAX_MISPREDICTED;
+                if is_fresh {
                     slopes = number_slopes(&values).ok_or_else(out_of_range)?;
                 }
-                problem.add_ball_slopes(&values, &lit, &mut slopes);
-                (matrix, right) = all(&values, &slopes, &off)?;
+                (matrix, right) = all(&values, &lit, &mut slopes, &off)?;
+            }
+            // Derivatives of another place lead nowhere.
+            None if !is_done && !is_fresh => {
+                is_fresh = true;
+                slopes = number_slopes(&values).ok_or_else(out_of_range)?;
+                (matrix, right) = all(&values, &lit, &mut slopes, &off)?;
             }
             // No step that is small beside what is known of the numbers lowers the cost any further.
             None if !is_done && damping < MAX_DAMPING => damping = (10.0 * damping).max(1e-3),

@@ -30,59 +30,82 @@ const STILL: f64 = 1e-3;
 /// Keeps equations definite that leave something open.
 const RIDGE: f64 = 1e-12;
 
-/// By how many rows the readings stand later than their displacements (below 0: earlier), where that is clear; an axis with missing
-/// readings says nothing.
+/// By how many rows the readings stand later than their displacements (below 0: earlier), where that is clear.
 pub(super) fn lag_of(pairs: &[Pair]) -> Option<isize> {
     let max_shift = MAX_SHIFT.min(pairs.len() / MAX_SHIFT_PART);
-    let axes: Vec<Vec<f64>> = (0..6).filter_map(|axis| log_likelihoods(pairs, axis, max_shift)).collect();
+    let axes: Vec<AxisShifts> = (0..6).filter_map(|axis| AxisShifts::of(pairs, axis, max_shift)).collect();
     // for a shift: how much likelier it is than none, of each axis
-    let likelier = |k: usize| axes.iter().map(move |axis| axis[k] - axis[max_shift]);
+    let likelier =
+        |k: usize| axes.iter().map(move |axis| axis.log_likelihoods[k] - axis.log_likelihoods[max_shift]);
     let best = (0..=2 * max_shift).max_by(|a, b| likelier(*a).sum::<f64>().total_cmp(&likelier(*b).sum()))?;
     let sum: f64 = likelier(best).sum();
     let for_it = likelier(best).filter(|own| *own > MIN_OWN).count();
-    let readings = axes.len() * (pairs.len() - 2 * max_shift);
+    let readings: usize = axes.iter().map(|axis| axis.readings).sum();
     let is_clear = sum > MIN_LIKELIER.max(MIN_LIKELIER_EACH * readings as f64) && 2 * for_it > axes.len();
-    (axes.len() > 1 && is_clear).then_some(best as isize - max_shift as isize)
+    is_clear.then_some(best as isize - max_shift as isize)
 }
 
-/// Logarithm of the likelihood for each shift from `-max_shift` to `max_shift`; `None` of an axis that is not read in every row.
-fn log_likelihoods(pairs: &[Pair], axis: usize, max_shift: usize) -> Option<Vec<f64>> {
-    let read: Option<Vec<f64>> = pairs.iter().map(|pair| pair.wrench[axis]).collect();
-    let read = read?;
-    let order = sorted(&read);
-    let room = ROOM * spread(&read);
-    let (low, high) = (quantile(&order, 0.02) - room, quantile(&order, 0.98) + room);
-    let readings = DVector::from_iterator(read.len(), read.iter().map(|v| v.clamp(low, high)));
-    let rows: Vec<Vec<f64>> = pairs.iter().map(|pair| pair.affine_terms()).collect();
-    let width = rows.first()?.len();
-    let plain = DMatrix::from_fn(rows.len(), width, |i, j| rows[i][j]);
-    let level = &readings - residuals(&plain, &readings)?;
-    let last = level.len() - 1;
-    let change = DVector::from_fn(level.len(), |i, _| level[(i + 1).min(last)] - level[i.saturating_sub(1)]);
-    let still = STILL * change.amax();
-    let mut terms = plain.insert_column(width, 0.0);
-    terms.set_column(width, &change.map(|v| if v.abs() > still { v.signum() } else { 0.0 }));
-    let count = level.len() - 2 * max_shift;
-    let middle = readings.rows(max_shift, count).into_owned();
-    let shifted = |k: usize| residuals(&terms.rows(2 * max_shift - k, count).into_owned(), &middle);
-    let left: Vec<DVector<f64>> = (0..=2 * max_shift).map(shifted).collect::<Option<_>>()?;
-    let median = |left: &DVector<f64>| quantile(&sorted(left.abs().as_slice()), 0.5);
-    let noise = SD_OVER_MEDIAN * left.iter().map(median).fold(f64::INFINITY, f64::min);
-    let noise = noise.max(MIN_RESIDUAL * spread(&read)).max(1e-300);
-    let of = |v: f64| -0.5 * (FREEDOM + 1.0) * ((v / noise).powi(2) / FREEDOM).ln_1p();
-    Some(left.iter().map(|left| left.iter().map(|v| of(*v)).sum()).collect())
+/// What one axis says of shifts.
+struct AxisShifts {
+    /// For each shift from the largest one earlier to the largest one later.
+    log_likelihoods: Vec<f64>,
+    /// Readings that say it.
+    readings: usize,
 }
 
-/// What a linear fit leaves of the readings; `None` where the rows do not determine it.
-fn residuals(terms: &DMatrix<f64>, readings: &DVector<f64>) -> Option<DVector<f64>> {
+impl AxisShifts {
+    /// `None` of an axis that too few rows read.
+    fn of(pairs: &[Pair], axis: usize, max_shift: usize) -> Option<Self> {
+        let read: Vec<(usize, f64)> =
+            pairs.iter().enumerate().filter_map(|(row, pair)| Some((row, pair.wrench[axis]?))).collect();
+        let all: Vec<f64> = read.iter().map(|(_, reading)| *reading).collect();
+        let order = sorted(&all);
+        let room = ROOM * spread(&all);
+        let (low, high) = (quantile(&order, 0.02) - room, quantile(&order, 0.98) + room);
+        if !(low.is_finite() && high.is_finite()) {
+            return None;
+        }
+        let rows: Vec<Vec<f64>> = pairs.iter().map(Pair::affine_terms).collect();
+        let width = rows.first()?.len();
+        let plain = DMatrix::from_fn(rows.len(), width, |i, j| rows[i][j]);
+        let taken = |read: &[(usize, f64)]| {
+            DVector::from_iterator(read.len(), read.iter().map(|(_, reading)| reading.clamp(low, high)))
+        };
+        let of_rows = |terms: &DMatrix<f64>, by: usize, read: &[(usize, f64)]| {
+            DMatrix::from_fn(read.len(), terms.ncols(), |i, j| terms[(read[i].0 + max_shift - by, j)])
+        };
+        let (_, fit) = fitted(&of_rows(&plain, max_shift, &read), &taken(&read))?;
+        let level = &plain * fit;
+        let last = level.len() - 1;
+        let change =
+            DVector::from_fn(level.len(), |i, _| level[(i + 1).min(last)] - level[i.saturating_sub(1)]);
+        let still = STILL * change.amax();
+        let mut terms = plain.insert_column(width, 0.0);
+        terms.set_column(width, &change.map(|v| if v.abs() > still { v.signum() } else { 0.0 }));
+        // always the same readings
+        let middle = max_shift..pairs.len() - max_shift;
+        let read: Vec<(usize, f64)> = read.into_iter().filter(|(row, _)| middle.contains(row)).collect();
+        let shifted = |by: usize| Some(fitted(&of_rows(&terms, by, &read), &taken(&read))?.0);
+        let left: Vec<DVector<f64>> = (0..=2 * max_shift).map(shifted).collect::<Option<_>>()?;
+        let median = |left: &DVector<f64>| quantile(&sorted(left.abs().as_slice()), 0.5);
+        let noise = SD_OVER_MEDIAN * left.iter().map(median).fold(f64::INFINITY, f64::min);
+        let noise = noise.max(MIN_RESIDUAL * spread(&all)).max(1e-300);
+        let of = |v: f64| -0.5 * (FREEDOM + 1.0) * ((v / noise).powi(2) / FREEDOM).ln_1p();
+        let log_likelihoods = left.iter().map(|left| left.iter().map(|v| of(*v)).sum()).collect();
+        Some(Self { log_likelihoods, readings: read.len() })
+    }
+}
+
+/// What a linear fit leaves of the readings, and the fit; `None` where the rows do not determine it.
+fn fitted(terms: &DMatrix<f64>, readings: &DVector<f64>) -> Option<(DVector<f64>, DVector<f64>)> {
     if terms.nrows() <= 2 * terms.ncols() || terms.iter().chain(readings.iter()).any(|v| !v.is_finite()) {
         return None;
     }
-    let mut scaled = terms.clone();
-    scaled.column_iter_mut().for_each(|mut column| column /= column.norm().max(1e-300));
+    let sizes = DVector::from_fn(terms.ncols(), |j, _| terms.column(j).norm().max(1e-300));
+    let scaled = DMatrix::from_fn(terms.nrows(), terms.ncols(), |i, j| terms[(i, j)] / sizes[j]);
     let gram = scaled.tr_mul(&scaled) + DMatrix::identity(terms.ncols(), terms.ncols()) * RIDGE;
     let fit = gram.cholesky()?.solve(&scaled.tr_mul(readings));
-    Some(readings - scaled * fit)
+    Some((readings - scaled * &fit, fit.component_div(&sizes)))
 }
 
 #[cfg(test)]
@@ -114,7 +137,12 @@ mod tests {
     fn readings_that_stand_beside_their_rows_are_found() {
         for later in [-7, -2, -1, 1, 3] {
             for noise in [0.001, 0.1, 0.2] {
-                assert_eq!(lag_of(&swept(later, noise, 0.0)), Some(later as isize), "{later} {noise}");
+                let mut pairs = swept(later, noise, 0.0);
+                assert_eq!(lag_of(&pairs), Some(later as isize), "{later} {noise}");
+                // cells that are empty, and an axis that is never read
+                pairs.iter_mut().step_by(7).for_each(|pair| pair.wrench[1] = None);
+                pairs.iter_mut().for_each(|pair| pair.wrench[3] = None);
+                assert_eq!(lag_of(&pairs), Some(later as isize), "{later} {noise}, with gaps");
             }
         }
     }
@@ -125,5 +153,10 @@ mod tests {
             assert_eq!(lag_of(&swept(0, noise, sticks)), None, "{noise} {sticks}");
         }
         assert_eq!(lag_of(&[]), None);
+        let mut wild = swept(0, 0.1, 0.0);
+        wild.iter_mut().step_by(3).for_each(|pair| pair.wrench = [Some(f64::INFINITY); 6]);
+        assert_eq!(lag_of(&wild), None);
+        wild.iter_mut().step_by(2).for_each(|pair| pair.wrench = [Some(f64::NAN); 6]);
+        assert_eq!(lag_of(&wild), None);
     }
 }

@@ -280,9 +280,16 @@ def check_kalibr(folder, constants):
     check("kalibr.yaml by its reader's rules", good and cam["distortion_coeffs"] == camera["distortion"][:counts[model]], model)
 
 
-def is_still(data, step):
-    """Whether nothing moves any more, m/s and rad/s; it begins at rest."""
-    return step > 100 and np.abs(data.qvel).max() < 1e-9 and np.abs(data.qacc).max() < 1e-6
+def hold(model, data, body, force, moment):
+    """A known wrench about the site, N and N m, until nothing moves any more: MuJoCo applies forces at the centre of mass."""
+    import mujoco
+
+    for step in range(20000):
+        lever = data.site("wrench").xpos - data.xipos[body]
+        data.xfrc_applied[body] = np.r_[force, moment + np.cross(lever, force)]
+        mujoco.mj_step(model, data)
+        if step > 100 and np.abs(data.qvel).max() < 1e-9 and np.abs(data.qacc).max() < 1e-6:
+            break
 
 
 def check_robots(folder, constants):
@@ -310,13 +317,7 @@ def check_robots(folder, constants):
     force, moment = np.array([0.3, -0.2, -2.0]), np.array([2e-3, 1e-3, -1e-3])
     mujoco.mj_forward(model, data)
     start = data.sensor("position").data.copy()
-    for step in range(20000):
-        # A known wrench about the site: MuJoCo applies forces at the centre of mass.
-        lever = data.site("wrench").xpos - data.xipos[body]
-        data.xfrc_applied[body] = np.r_[force, moment + np.cross(lever, force)]
-        mujoco.mj_step(model, data)
-        if is_still(data, step):
-            break
+    hold(model, data, body, force, moment)
     R = data.site("wrench").xmat.reshape(3, 3)
     # MuJoCo reports what the body does to its parent at the site: the world's load handed on.
     got_force, got_moment = R @ data.sensor("force").data, R @ data.sensor("torque").data
@@ -327,12 +328,7 @@ def check_robots(folder, constants):
     K = np.array(constants["springs"]["stiffness"])
     small = np.r_[0.02, -0.01, -0.05, 0.2, 0.1, -0.15]
     mujoco.mj_resetData(model, data)
-    for step in range(20000):
-        lever = data.site("wrench").xpos - data.xipos[body]
-        data.xfrc_applied[body] = np.r_[small[:3], small[3:] * 1e-3 + np.cross(lever, small[:3])]
-        mujoco.mj_step(model, data)
-        if is_still(data, step):
-            break
+    hold(model, data, body, small[:3], small[3:] * 1e-3)
     moved = np.r_[(data.sensor("position").data - start) * 1e3, cv2.Rodrigues(data.site("wrench").xmat.reshape(3, 3))[0][:, 0]]
     want = np.linalg.solve(K, small)
     check("MJCF: the 6x6 gives way as the constants say", np.allclose(moved, want, rtol=2e-3, atol=2e-6), str(np.round(moved, 5)))

@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::statistics::{quantile, sorted, spread};
+use super::statistics::{MEDIAN_TO_SD, held_to_usual, quantile, sorted, spread, weighed_fit};
 use super::types::Pair;
 
 /// Rows that a shift is looked for over, and of how many rows one at most.
@@ -19,21 +19,18 @@ const MIN_LIKELIER_EACH: f64 = 0.05;
 const MIN_OWN: f64 = 2.0;
 /// Degrees of freedom of Student's t.
 const FREEDOM: f64 = 4.0;
-/// A normal deviation over the median of its absolute values.
-const SD_OVER_MEDIAN: f64 = 1.4826;
 /// Residuals below this part of the readings' range say nothing of the order.
 const MIN_RESIDUAL: f64 = 1e-3;
-/// Readings are held to their usual range and this part of it more.
-const ROOM: f64 = 0.3;
 /// Changes below this part of the largest have no sign.
 const STILL: f64 = 1e-3;
-/// Keeps equations definite that leave something open.
-const RIDGE: f64 = 1e-12;
 
 /// By how many rows the readings stand later than their displacements (below 0: earlier), where that is clear.
 pub(super) fn lag_of(pairs: &[Pair]) -> Option<isize> {
     let max_shift = MAX_SHIFT.min(pairs.len() / MAX_SHIFT_PART);
-    let axes: Vec<AxisShifts> = (0..6).filter_map(|axis| AxisShifts::of(pairs, axis, max_shift)).collect();
+    let rows: Vec<Vec<f64>> = pairs.iter().map(Pair::affine_terms).collect();
+    let terms = DMatrix::from_fn(rows.len(), rows.first()?.len(), |i, j| rows[i][j]);
+    let of_axis = |axis| AxisShifts::of(pairs, &terms, axis, max_shift);
+    let axes: Vec<AxisShifts> = (0..6).filter_map(of_axis).collect();
     // for a shift: how much likelier it is than none, of each axis
     let likelier =
         |k: usize| axes.iter().map(move |axis| axis.log_likelihoods[k] - axis.log_likelihoods[max_shift]);
@@ -55,40 +52,29 @@ struct AxisShifts {
 
 impl AxisShifts {
     /// `None` of an axis that too few rows read.
-    fn of(pairs: &[Pair], axis: usize, max_shift: usize) -> Option<Self> {
+    fn of(pairs: &[Pair], plain: &DMatrix<f64>, axis: usize, max_shift: usize) -> Option<Self> {
         let read: Vec<(usize, f64)> =
             pairs.iter().enumerate().filter_map(|(row, pair)| Some((row, pair.wrench[axis]?))).collect();
         let all: Vec<f64> = read.iter().map(|(_, reading)| *reading).collect();
-        let order = sorted(&all);
-        let room = ROOM * spread(&all);
-        let (low, high) = (quantile(&order, 0.02) - room, quantile(&order, 0.98) + room);
-        if !(low.is_finite() && high.is_finite()) {
-            return None;
-        }
-        let rows: Vec<Vec<f64>> = pairs.iter().map(Pair::affine_terms).collect();
-        let width = rows.first()?.len();
-        let plain = DMatrix::from_fn(rows.len(), width, |i, j| rows[i][j]);
-        let taken = |read: &[(usize, f64)]| {
-            DVector::from_iterator(read.len(), read.iter().map(|(_, reading)| reading.clamp(low, high)))
-        };
-        let of_rows = |terms: &DMatrix<f64>, by: usize, read: &[(usize, f64)]| {
-            DMatrix::from_fn(read.len(), terms.ncols(), |i, j| terms[(read[i].0 + max_shift - by, j)])
-        };
-        let (_, fit) = fitted(&of_rows(&plain, max_shift, &read), &taken(&read))?;
-        let level = &plain * fit;
+        let read: Vec<(usize, f64)> =
+            read.into_iter().zip(held_to_usual(&all)?).map(|((row, _), held)| (row, held)).collect();
+        let (fit, _) = fitted(plain, &read, 0)?;
+        let level = plain * fit;
         let last = level.len() - 1;
         let change =
             DVector::from_fn(level.len(), |i, _| level[(i + 1).min(last)] - level[i.saturating_sub(1)]);
         let still = STILL * change.amax();
-        let mut terms = plain.insert_column(width, 0.0);
-        terms.set_column(width, &change.map(|v| if v.abs() > still { v.signum() } else { 0.0 }));
+        let mut terms = plain.clone().insert_column(plain.ncols(), 0.0);
+        let sign = change.map(|v| if v.abs() > still { v.signum() } else { 0.0 });
+        terms.set_column(plain.ncols(), &sign);
         // always the same readings
         let middle = max_shift..pairs.len() - max_shift;
         let read: Vec<(usize, f64)> = read.into_iter().filter(|(row, _)| middle.contains(row)).collect();
-        let shifted = |by: usize| Some(fitted(&of_rows(&terms, by, &read), &taken(&read))?.0);
-        let left: Vec<DVector<f64>> = (0..=2 * max_shift).map(shifted).collect::<Option<_>>()?;
+        let max_shift = max_shift as isize;
+        let shifted = |by: isize| Some(fitted(&terms, &read, by)?.1);
+        let left: Vec<DVector<f64>> = (-max_shift..=max_shift).map(shifted).collect::<Option<_>>()?;
         let median = |left: &DVector<f64>| quantile(&sorted(left.abs().as_slice()), 0.5);
-        let noise = SD_OVER_MEDIAN * left.iter().map(median).fold(f64::INFINITY, f64::min);
+        let noise = MEDIAN_TO_SD * left.iter().map(median).fold(f64::INFINITY, f64::min);
         let noise = noise.max(MIN_RESIDUAL * spread(&all)).max(1e-300);
         let of = |v: f64| -0.5 * (FREEDOM + 1.0) * ((v / noise).powi(2) / FREEDOM).ln_1p();
         let log_likelihoods = left.iter().map(|left| left.iter().map(|v| of(*v)).sum()).collect();
@@ -96,16 +82,16 @@ impl AxisShifts {
     }
 }
 
-/// What a linear fit leaves of the readings, and the fit; `None` where the rows do not determine it.
-fn fitted(terms: &DMatrix<f64>, readings: &DVector<f64>) -> Option<(DVector<f64>, DVector<f64>)> {
-    if terms.nrows() <= 2 * terms.ncols() || terms.iter().chain(readings.iter()).any(|v| !v.is_finite()) {
+/// A linear fit of readings, each with its row, by the terms of rows so many before them, and what it leaves; `None` where they do not
+/// determine it.
+fn fitted(terms: &DMatrix<f64>, read: &[(usize, f64)], later: isize) -> Option<(DVector<f64>, DVector<f64>)> {
+    if read.len() <= 2 * terms.ncols() {
         return None;
     }
-    let sizes = DVector::from_fn(terms.ncols(), |j, _| terms.column(j).norm().max(1e-300));
-    let scaled = DMatrix::from_fn(terms.nrows(), terms.ncols(), |i, j| terms[(i, j)] / sizes[j]);
-    let gram = scaled.tr_mul(&scaled) + DMatrix::identity(terms.ncols(), terms.ncols()) * RIDGE;
-    let fit = gram.cholesky()?.solve(&scaled.tr_mul(readings));
-    Some((readings - scaled * &fit, fit.component_div(&sizes)))
+    let rows: Vec<usize> =
+        read.iter().map(|(row, _)| row.checked_add_signed(-later)).collect::<Option<_>>()?;
+    let readings = DVector::from_iterator(read.len(), read.iter().map(|(_, reading)| *reading));
+    weighed_fit(&terms.select_rows(&rows), &readings, &DVector::from_element(read.len(), 1.0))
 }
 
 #[cfg(test)]

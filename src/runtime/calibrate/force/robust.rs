@@ -9,12 +9,11 @@
 use domecast_optics::numeric::{pseudo_inverse, singular_values, symmetric_eigen};
 use nalgebra::{DMatrix, DVector};
 
+use super::statistics::MEDIAN_TO_SD;
 use super::types::{ForceModel, Pair};
 
 /// Tukey's constant: full efficiency of 95 % for normal noise.
 const TUKEY: f64 = 4.685;
-/// Median absolute deviation to standard deviation for normal noise.
-const MAD_TO_SD: f64 = 1.4826;
 const MAX_ROUNDS: usize = 60;
 /// A coefficient whose term varies by less than this part of the others, once scaled, is not determined.
 const MIN_SINGULAR: f64 = 1e-3;
@@ -99,7 +98,7 @@ impl Terms {
             // Columns have a root mean square of one.
             let is_moved = |row: &usize| self.design[(*row, term)].abs() > 1.0;
             let mut sizes: Vec<f64> = (0..left.len()).filter(is_moved).map(|row| left[row].abs()).collect();
-            if sizes.len() < MIN_GROUP { 0.0 } else { MAD_TO_SD * median(&mut sizes) }
+            if sizes.len() < MIN_GROUP { 0.0 } else { MEDIAN_TO_SD * median(&mut sizes) }
         };
         let largest = (0..self.used.len()).map(of_group).fold(0.0, f64::max);
         if largest > MAX_GROUP * sd { largest } else { sd }
@@ -215,7 +214,7 @@ pub(super) fn robust(
         determined = flags;
         let left = &terms.target - &terms.design * &next;
         let mut sizes: Vec<f64> = left.iter().map(|v| v.abs()).collect();
-        sd = (MAD_TO_SD * median(&mut sizes)).max(1e-13 * terms.target.amax());
+        sd = (MEDIAN_TO_SD * median(&mut sizes)).max(1e-13 * terms.target.amax());
         scatter = terms.scatter(&left, sd);
         // The first round's scale is that of plain least squares, which outliers widen: it only lets them go
         // more slowly.

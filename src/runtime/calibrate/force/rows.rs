@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use nalgebra::{DMatrix, DVector};
 
 use super::lag::lag_of;
-use super::statistics::{quantile, sorted, spread};
+use super::statistics::{held_to_usual, quantile, sorted, spread, weighed_fit};
 use super::types::Pair;
 use crate::constants::WRENCH_AXES;
 
@@ -29,31 +29,19 @@ fn residual(terms: &[Vec<f64>], readings: &[f64]) -> Option<(f64, DVector<f64>)>
     if readings.len() < 2 * width + 4 {
         return None;
     }
-    let order = sorted(readings);
-    let (low, high) = (quantile(&order, 0.02), quantile(&order, 0.98));
-    let room = 0.3 * (high - low);
-    let size: Vec<f64> =
-        (0..width).map(|j| terms.iter().map(|t| t[j] * t[j]).sum::<f64>().sqrt().max(1e-300)).collect();
-    let design = DMatrix::from_fn(readings.len(), width, |i, j| terms[i][j] / size[j]);
-    let target = DVector::from_fn(readings.len(), |i, _| readings[i].clamp(low - room, high + room));
-    if design.iter().chain(target.iter()).any(|v| !v.is_finite()) {
-        return None;
-    }
+    let design = DMatrix::from_fn(readings.len(), width, |i, j| terms[i][j]);
+    let target = DVector::from_vec(held_to_usual(readings)?);
     // Wild readings are let go in a few rounds of the biweight.
     let mut weights = DVector::from_element(readings.len(), 1.0);
-    let mut fitted = None;
+    let mut found = None;
     for _ in 0..ROUNDS {
-        let weighted = DMatrix::from_fn(readings.len(), width, |i, j| design[(i, j)] * weights[i]);
-        let gram = weighted.transpose() * &design + DMatrix::identity(width, width) * 1e-10;
-        let found = gram.cholesky()?.solve(&(weighted.transpose() * &target));
-        let left = (&target - &design * &found).map(f64::abs);
+        let (fit, left) = weighed_fit(&design, &target, &weights)?;
+        let left = left.abs();
         let median = quantile(&sorted(left.as_slice()), 0.5);
         weights = left.map(|v| (1.0 - (v / (7.0 * median).max(1e-300)).powi(2)).max(0.0).powi(2));
-        fitted = Some((median, found));
+        found = Some((median, fit));
     }
-    let (median, found) = fitted?;
-    let scaled = DVector::from_fn(width, |j, _| found[j] / size[j]);
-    Some((median, scaled))
+    found
 }
 
 /// How far the zero of one axis drifts over the table, where the row's number explains far more than noise.

@@ -1,5 +1,7 @@
 //! Quantiles, and how one series follows another, whatever a tenth of wild values says.
 
+use nalgebra::{DMatrix, DVector};
+
 /// The value below which a part of the values lies; 0 of none.
 pub(super) fn quantile(sorted: &[f64], part: f64) -> f64 {
     let at = (part * sorted.len().saturating_sub(1) as f64).round() as usize;
@@ -16,6 +18,38 @@ pub(super) fn sorted(values: &[f64]) -> Vec<f64> {
 pub(super) fn spread(values: &[f64]) -> f64 {
     let values = sorted(values);
     quantile(&values, 0.98) - quantile(&values, 0.02)
+}
+
+/// Values held to where they usually lie, and 0.3 of that range beside; `None` where that is not finite.
+pub(super) fn held_to_usual(values: &[f64]) -> Option<Vec<f64>> {
+    let order = sorted(values);
+    let (low, high) = (quantile(&order, 0.02), quantile(&order, 0.98));
+    let room = 0.3 * (high - low);
+    let (low, high) = (low - room, high + room);
+    (low.is_finite() && high.is_finite()).then(|| values.iter().map(|v| v.clamp(low, high)).collect())
+}
+
+/// Median of absolute values to standard deviation, of normal noise.
+pub(super) const MEDIAN_TO_SD: f64 = 1.4826;
+/// Keeps equations definite that leave something open.
+const RIDGE: f64 = 1e-10;
+
+/// A linear fit of weighed rows, and what it leaves of the target; `None` where a number is not finite.
+pub(super) fn weighed_fit(
+    terms: &DMatrix<f64>,
+    target: &DVector<f64>,
+    weights: &DVector<f64>,
+) -> Option<(DVector<f64>, DVector<f64>)> {
+    if terms.iter().chain(target.iter()).any(|v| !v.is_finite()) {
+        return None;
+    }
+    let sizes = DVector::from_fn(terms.ncols(), |j, _| terms.column(j).norm().max(1e-300));
+    let scaled = DMatrix::from_fn(terms.nrows(), terms.ncols(), |i, j| terms[(i, j)] / sizes[j]);
+    let weighed = DMatrix::from_fn(terms.nrows(), terms.ncols(), |i, j| scaled[(i, j)] * weights[i]);
+    let gram = weighed.tr_mul(&scaled) + DMatrix::identity(terms.ncols(), terms.ncols()) * RIDGE;
+    let fit = gram.cholesky()?.solve(&weighed.tr_mul(target));
+    let left = target - scaled * &fit;
+    Some((fit.component_div(&sizes), left))
 }
 
 /// How readings follow predictions: over pairs of rows whose predictions lie far apart, the ratio of the differences.

@@ -8,7 +8,9 @@ use crate::contact::{Contact, Prepared};
 use crate::elastomer::Indenter;
 use crate::error::ContactError;
 use crate::field::Field;
+use crate::missed::missed;
 use crate::object::{Placed, deepest};
+use crate::outcome::Status;
 use crate::state::ContactState;
 use domecast_elastic::{Compliance, NodeParts, SurfaceField};
 use domecast_optics::numeric::Rigid;
@@ -107,7 +109,18 @@ impl Contact {
             parts.as_slice().iter().map(|(node, share)| grid.offset(*node) * *share).sum()
         };
         let contact = self.with_prepared(Prepared::Compliance(Arc::new(moved.clone())));
+        // The dome at rest reaches into the object; moved, it may not.
+        let free = || {
+            let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
+            let (at_mm, _, _) = deepest(&placed, self.elastomer().dome());
+            let shift_mm = beside.at(at_mm);
+            let mut pose = *sensor_from_object;
+            pose.translation_mm -= shift_mm;
+            let deviation = missed(self.elastomer(), indenter, &pose, grid.spacing_mm(), (0.0, 0.0));
+            (-placed.distance(at_mm + shift_mm).0, deviation)
+        };
         match contact.solve(indenter, sensor_from_object, before.as_ref()) {
+            Ok(state) if state.status == Status::Free => Ok(ContactState { deviation: free().1, ..state }),
             Ok(mut state) => {
                 // Nodes are named by where they lie at rest, as those of a dome that nothing else moves.
                 for (node, memory) in state.nodes.iter_mut().zip(&state.history.nodes) {
@@ -116,11 +129,9 @@ impl Contact {
                 Ok(state)
             }
             Err(ContactError::Unseen { depth_mm, spacing_mm }) => {
-                // The dome at rest reaches into the object; moved, it may not.
-                let placed = Placed::new(indenter.solid.clone(), *sensor_from_object);
-                let (at_mm, _, _) = deepest(&placed, self.elastomer().dome());
-                if placed.distance(at_mm + beside.at(at_mm)).0 > -0.5 * spacing_mm {
-                    return Ok(ContactState::free(sensor_from_object));
+                let (reaches_mm, deviation) = free();
+                if reaches_mm < 0.5 * spacing_mm {
+                    return Ok(ContactState { deviation, ..ContactState::free(sensor_from_object) });
                 }
                 Err(ContactError::Unseen { depth_mm, spacing_mm })
             }

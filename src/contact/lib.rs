@@ -43,6 +43,7 @@ mod half_space;
 mod level;
 mod levels;
 mod linear;
+mod missed;
 mod object;
 mod on_pole;
 mod outcome;

@@ -10,3 +10,4 @@ mod overlap;
 pub(crate) use closed_form::closed_form;
 pub(crate) use finite_strain::finite_strain;
 pub(crate) use geometric::geometric;
+pub(crate) use overlap::{FOUNDATION, overlap};

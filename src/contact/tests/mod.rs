@@ -3,6 +3,7 @@
 mod domes;
 mod faces;
 mod reference;
+mod small;
 mod tasks;
 mod together;
 

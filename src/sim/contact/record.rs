@@ -4,7 +4,9 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::work::FollowedRays;
-use domecast_contact::{ContactState, Pressed, PressedObject, PressedTogether, Status, TouchedNode};
+use domecast_contact::{
+    ContactState, Deviation, Pressed, PressedObject, PressedTogether, Status, TouchedNode,
+};
 
 /// How far a frame's contact may be from that of a dome at large strain, as measured against the finite-strain level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -32,7 +34,8 @@ pub struct ContactTruth {
     pub penetration_mm: Option<f64>,
     /// Iterations of the last contact solve; null where nothing was solved.
     pub iterations: Option<u32>,
-    /// How far the contact's level may be off here; null where nothing touches.
+    /// How far the contact's level may be off here, of several objects all together; null where nothing touches, nor reaches into the
+    /// dome between the level's nodes.
     pub estimated_error: Option<ContactErrorTruth>,
     /// What springs and contact are out of balance by, N (moments counted over the springs' reach), on a rigid mount what
     /// a force that is asked for is missed by; null where nothing was solved.
@@ -76,6 +79,19 @@ pub struct ObjectTruth {
     pub peak_pressure_mpa: f64,
 }
 
+impl ContactErrorTruth {
+    /// What the states of all objects leave open together; `None` where they touch nothing and miss nothing.
+    fn of<'s>(states: impl Iterator<Item = &'s ContactState>, px_per_mm: f64) -> Option<Self> {
+        let (mut is_any, mut displacement_mm, mut force_n) = (false, 0.0, 0.0);
+        for state in states {
+            is_any |= !state.nodes.is_empty() || state.deviation != Deviation::default();
+            displacement_mm += state.deviation.displacement_mm;
+            force_n += state.deviation.force_n;
+        }
+        is_any.then_some(Self { displacement_mm, px: displacement_mm * px_per_mm, force_n })
+    }
+}
+
 impl ContactTruth {
     /// No object is near: there was nothing to solve.
     pub(crate) fn away() -> Self {
@@ -100,12 +116,10 @@ impl ContactTruth {
     /// Of a contact in balance with the springs.
     pub(crate) fn of(pressed: &Pressed, px_per_mm: f64) -> Self {
         let state = &pressed.state;
-        let estimated_error = (!state.nodes.is_empty()).then_some(ContactErrorTruth {
-            displacement_mm: state.deviation.displacement_mm,
-            px: state.deviation.displacement_mm * px_per_mm,
-            force_n: state.deviation.force_n,
-        });
-        Self { estimated_error, ..Self::of_state(state, pressed.residual_n, pressed.iterations) }
+        Self {
+            estimated_error: ContactErrorTruth::of([state].into_iter(), px_per_mm),
+            ..Self::of_state(state, pressed.residual_n, pressed.iterations)
+        }
     }
 
     /// Of several contacts in balance with the springs, or those of a slow gel; the objects' own are written where they are
@@ -113,11 +127,15 @@ impl ContactTruth {
     pub(crate) fn of_several<'n>(
         pressed: &PressedTogether,
         names: impl ExactSizeIterator<Item = &'n str>,
+        px_per_mm: f64,
     ) -> Self {
         let several = names.len() > 1;
         let objects = names.zip(&pressed.objects).filter(|_| several);
         let objects = objects.map(|(name, object)| ObjectTruth::of(name, object.as_ref())).collect();
-        Self { objects, ..Self::of_state(&pressed.state, pressed.residual_n, pressed.iterations) }
+        let states = pressed.objects.iter().flatten().map(|object| &object.state);
+        let estimated_error = ContactErrorTruth::of(states, px_per_mm);
+        let solved = Self::of_state(&pressed.state, pressed.residual_n, pressed.iterations);
+        Self { objects, estimated_error, ..solved }
     }
 
     fn of_state(state: &ContactState, residual_n: f64, solves: u32) -> Self {

@@ -48,6 +48,8 @@ fn the_truth_of_several_objects_adds_up() {
     }
     assert!((contact.objects[0].wrench[2] + 0.8).abs() < 1e-6);
     assert!((contact.objects[1].wrench[2] + 0.5).abs() < 1e-6);
+    let said = contact.estimated_error.expect("how far two contacts may be off");
+    assert!(said.force_n > 0.01 && said.px > 0.1, "{said:?}");
 }
 
 #[test]

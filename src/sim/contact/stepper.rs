@@ -275,7 +275,7 @@ impl<'a> Stepper<'a> {
         let state = State { pose: pressed.rest_from_platform, wrench: pressed.wrench, held };
         let contact = pressed.state.is_moved().then(|| Arc::new(pressed.state.clone()));
         let names = scene.objects().iter().map(|object| object.name.as_str());
-        let solved = ContactTruth::of_several(&pressed, names);
+        let solved = ContactTruth::of_several(&pressed, names, self.px_per_mm);
         let places =
             pressed.objects.iter().map(|object| object.as_ref().map(|object| object.rest_from_object));
         let rest_from_objects = places.collect();

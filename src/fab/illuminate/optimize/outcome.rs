@@ -53,7 +53,7 @@ pub struct ArrangementResult {
     /// Whether a hood was added.
     pub adds_hood: bool,
     /// The least error of normals found with it, degrees a grey level, by the search's own tests of room: the build, which judges
-    /// what is proposed, may still refuse it. Null where boards, springs and walls leave no room.
+    /// what is proposed, may still refuse it. Null where boards, springs and walls leave room at none of the first places.
     pub normal_error_p95_deg_per_level: Option<f64>,
 }
 
@@ -118,7 +118,7 @@ pub struct OptimizationReport {
     pub changes: Vec<FieldChange>,
     /// Error of normals of the best over that of the start, both as `illuminate` has them.
     pub ratio: Option<f64>,
-    /// What each arrangement came to.
+    /// What each arrangement came to; of those that the search did not get to nothing is said.
     pub arrangements: Vec<ArrangementResult>,
     /// Lights of which none is worse than another in everything; each went through the build's checks. Empty where the search was stopped.
     pub front: Vec<FrontPoint>,

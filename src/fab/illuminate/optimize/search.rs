@@ -21,7 +21,6 @@ use domecast_sim::light::setup;
 const POPULATION: usize = 8;
 /// A search whose distribution is narrower than this, in the units of its coordinates, has converged: below what a file says.
 const NARROW: f64 = 0.02;
-
 /// A candidate must be better than the best by this part to be worth the build's checks: while the search is broad, and when
 /// it refines.
 const WORTH_BROAD: f64 = 0.05;
@@ -102,7 +101,7 @@ pub struct FoundLights {
     pub best: Option<Looked>,
     /// All that nothing is known against, in the order in which they were looked at.
     pub feasible: Vec<Looked>,
-    /// The best of each arrangement, with and without a hood, where it fits.
+    /// The best of each arrangement that was looked at, with and without a hood; `None` where no first try fits.
     pub arrangements: Vec<(LightChoice, Option<Looked>)>,
     /// How many lights were looked at.
     pub evaluations: usize,
@@ -163,10 +162,14 @@ impl<'a> Search<'a> {
                     break;
                 }
                 let choice = LightChoice { arrangement, diffuser, adds_hood };
-                let looked = self.look(&self.first_tries(choice, start), f64::INFINITY);
+                let tries = self.first_tries(choice, start);
+                let looked = self.look(&tries, f64::INFINITY);
+                // of what the evaluations did not reach nothing is said
+                let is_whole = looked.len() == tries.len();
                 match looked.into_iter().min_by(Looked::order).filter(|one| one.violation.is_none()) {
                     Some(first) => starts.push(first),
-                    None => self.found.arrangements.push((choice, None)),
+                    None if is_whole => self.found.arrangements.push((choice, None)),
+                    None => {}
                 }
             }
         }

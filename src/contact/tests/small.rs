@@ -45,14 +45,14 @@ fn what_two_small_objects_miss_is_said_and_what_does_not_reach_the_dome_misses_n
     let elastomer = silicone();
     let contact = Contact::new(elastomer, Level::Linear { element_mm: 1.0 }).unwrap();
     let (object, large) = (ball(0.2), ball(5.0));
-    // where a large ball has pushed the dome away, a small one in its dent touches nothing
-    let dent = contact.solve(&large, &ball_at(5.0, 0.0, 1.2), None).unwrap();
-    let beside = Beside::default().with(std::iter::once(&dent));
+    // where a large ball has pushed the dome away, a small one in its place touches nothing
+    let moved = contact.solve(&large, &ball_at(5.0, 0.0, 1.2), None).unwrap();
+    let beside = Beside::default().with(std::iter::once(&moved));
     let pose = ball_at(0.2, 0.03, 0.05);
     let alone = contact.solve(&object, &pose, None).unwrap();
     assert!(alone.status == Status::Free && alone.deviation.force_n > 0.0, "{alone:?}");
-    let in_dent = contact.solve_beside(&object, &pose, None, &beside).unwrap();
-    assert_eq!((in_dent.status, in_dent.deviation), (Status::Free, Deviation::default()));
+    let in_its_place = contact.solve_beside(&object, &pose, None, &beside).unwrap();
+    assert_eq!((in_its_place.status, in_its_place.deviation), (Status::Free, Deviation::default()));
     // outside of it
     let outside = contact.solve(&object, &ball_at(0.2, 0.03, -0.01), None).unwrap();
     assert_eq!((outside.status, outside.deviation), (Status::Free, Deviation::default()));

@@ -146,6 +146,7 @@ def entries(constants_path, repository, model_path, folder):
     lit, pushed = domecast.Scene.load(scenes / "lit.json"), domecast.Scene.load(scenes / "push.json", frames=2)
     rest = np.array(first(lit.frames())[0])
     tracker, shape, traction = domecast.Tracker(sensor), None, domecast.Traction(sensor)
+    referred = domecast.Tracker(sensor, reference=1)
     reading = tracker.update(rest, rgb=True)
     shape = domecast.Shape(sensor, tracker)
     shape.set_rest(rest, rgb=True)
@@ -217,6 +218,7 @@ def entries(constants_path, repository, model_path, folder):
             a, channel=b, reference=c, search_every=d, max_residual_px=e, max_misplaced=f, camera_turned_deg=g, temperature_c=h, check_colours=i),
             [(sensor, anything), ("luma", words), (None, anything), (30, words), (2.0, numbers), (0.5, numbers), (None, words), (None, words), truth], 0.3),
         "Tracker.update": Entry(plainly(lambda a, b, c, d: tracker.update(a, rgb=b, time=c, number=d)), [frames, truth, (0.1, words), (3, words)], 0.5),
+        "Tracker.set_gravity": Entry(lambda a: referred.set_gravity(a), [((0.0, 0.0, -9.81), some.one_of(words, some.lists(numbers, max_size=4)))], 1),
         "Tracker.skip": Entry(lambda a, b: tracker.skip(time=a, number=b), [(1.0, words), (1, words)], 4),
         "Tracker.benchmark": Entry(plainly(lambda a, b, c: tracker.benchmark(a, rgb=b, repeats=c)), [frames, truth, (1, some.one_of(words, some.integers(-3, 2)))], 0.3),
         "Shape": Entry(lambda a, b, c, d: domecast.Shape(a, b, cell_px=c, max_passes=d), [(sensor, anything), (tracker, anything), (2, numbers), (2, numbers)], 0.15),

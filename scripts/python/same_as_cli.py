@@ -165,6 +165,20 @@ def tracks(folder, frames):
     check([reading.json(["wrench", "pose"]) for reading in readings] == some, "track: chosen fields")
     gray = cli("track", folder, "--constants", constants, "--channel", "green", "--reference", "2").splitlines()
     check([reading.json() for reading in lines_of(frames, True, channel="green", reference=2)] == gray, "track: options")
+    gravity = [(9.81 * np.sin(k), 0.1 * k, -9.81 * np.cos(k)) for k in range(len(frames))]
+    (WORK / "gravity.txt").write_text("".join(" ".join(repr(float(v)) for v in one) + "\n" for one in gravity))
+    weighed = cli("track", folder, "--constants", constants, "--reference", "2", "--gravity", WORK / "gravity.txt").splitlines()
+    tracker = domecast.Tracker(sensor, reference=2)
+    told = []
+    for frame, one in zip(frames, gravity):
+        tracker.set_gravity(one)
+        told.append(tracker.update(frame, rgb=True).json())
+    check(told == weighed, "track --gravity: lines")
+    try:
+        domecast.Tracker(sensor).set_gravity((0, 0, -9.81))
+        check(False, "gravity without a reference is refused")
+    except domecast.DomecastError as error:
+        check("reference" in str(error), f"gravity without a reference: {error}")
     forces = domecast.Traction(sensor)
     pressed = cli("track", folder, "--constants", constants, "--traction").splitlines()
     check([forces.update(reading).json() for reading in readings] == pressed, "track --traction: lines")

@@ -202,6 +202,11 @@ impl PyTracker {
         Ok(PyReading::new(tracked, Arc::clone(&self.about)))
     }
 
+    /// How gravity lies in the frames from now on.
+    fn set_gravity(&mut self, acceleration_mps2: Option<[f64; 3]>) -> PyResult<()> {
+        Ok(self.tracker.set_gravity(acceleration_mps2.map(DVec3::from)).map_err(Fault::from)?)
+    }
+
     /// A frame that could not be had.
     #[pyo3(signature = (*, time = None, number = None))]
     fn skip(&mut self, time: Option<f64>, number: Option<u64>) -> PyResult<PyReading> {

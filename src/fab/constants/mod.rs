@@ -18,6 +18,8 @@ mod envelope_picture;
 mod force_report;
 pub mod formats;
 mod light;
+mod mass;
+mod moving;
 mod resolution;
 mod sight;
 mod springs;

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::moving::moving_mass;
 use super::sight::{MarkerSight, markers_of};
 use domecast_design::{Design, DesignError};
 use domecast_design::{limits_of, suspension_of};
@@ -94,6 +95,7 @@ pub fn springs_of(design: &Design, sight: MarkerSight) -> Result<DesignSprings, 
             modulus_per_k: wire.modulus_per_k,
             modulus_per_k_sd: wire.modulus_per_k_sd,
         }),
+        moving: moving_mass(design),
         plain_runtime,
     };
     Ok(DesignSprings { constants: Some(constants), plain, sight })

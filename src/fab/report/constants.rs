@@ -2,8 +2,11 @@
 
 use super::subject::ReportSubject;
 use crate::html::{Html, html, table};
-use crate::numbers::dimension;
+use crate::numbers::{dimension, significant};
 use domecast_runtime::constants::{POSE_AXES, SpringConstants, WRENCH_AXES};
+
+/// CGPM 1901, m/s^2.
+const STANDARD_GRAVITY_MPS2: f64 = 9.806_65;
 
 fn list(values: &[f64]) -> String {
     values.iter().map(|v| dimension(*v)).collect::<Vec<_>>().join(", ")
@@ -57,7 +60,15 @@ fn stiffness(springs: &SpringConstants) -> Html {
     let rows: Vec<Vec<Html>> = WRENCH_AXES.iter().zip(&springs.stiffness).map(row).collect();
     let mut heads = vec![""];
     heads.extend(POSE_AXES);
-    table(
+    let moving = springs.moving.as_ref().map_or_else(Html::default, |moving| {
+        html!(
+            "<p>The springs carry {} g. A sensor that is turned over reports twice their weight, {} N, as a load, unless \
+             <code>domecast track --gravity</code> takes it off.</p>\n",
+            dimension(moving.mass_g),
+            significant(2.0 * STANDARD_GRAVITY_MPS2 * 1e-3 * moving.mass_g)
+        )
+    });
+    let stiffness = table(
         &format!(
             "Stiffness at rest ({}), N, N·mm against mm, rad, about {} mm",
             springs.source,
@@ -65,5 +76,6 @@ fn stiffness(springs: &SpringConstants) -> Html {
         ),
         &heads,
         &rows,
-    )
+    );
+    html!("{}{}", stiffness, moving)
 }

@@ -116,6 +116,10 @@ class Tracker:
         as in OpenCV's frames. `time`, s: when it was taken. `number`: its number, where one may be missing before it. A frame of
         contiguous rows with red first is not copied."""
 
+    def set_gravity(self, acceleration_mps2: Sequence[float] | None) -> None:
+        """Gravity less the sensor's own acceleration, sensor frame, m/s2 (upright: 0, 0, -9.81), of the frames from now on: the weight of
+        what the springs carry is taken off the wrench. None, as at first, leaves it in. It needs `reference`."""
+
     def skip(self, *, time: float | None = None, number: int | None = None) -> Reading:
         """A frame that could not be had."""
 

@@ -16,6 +16,7 @@ mod law;
 mod light;
 mod loads;
 mod model;
+mod moving;
 mod plain;
 mod plain_input;
 mod plain_pnp;
@@ -36,6 +37,7 @@ pub use model::{
     KeyImageConstants, LayerConstants, MaskConstants, Matrix4, OpticsConstants, PlainRuntime,
     SpringConstants, StiffnessAt, VERSION, WhiteMarker,
 };
+pub use moving::MovingMass;
 pub use plain::{Bias, PlainFit};
 pub use plain_input::{PlainError, PlainInput};
 pub use plain_pnp::PlainRuntimeSolver;

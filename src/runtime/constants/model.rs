@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::law::SpringLaw;
 use super::light::LightConstants;
+use super::moving::MovingMass;
 use super::uncertainty::{OpticsUncertainty, SpringTemperature, SpringTolerances, SpringUncertainty};
 use domecast_optics::DomeShape;
 
@@ -302,6 +303,9 @@ pub struct SpringConstants {
     /// How the stiffness follows the temperature, where the design says it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<SpringTemperature>,
+    /// What the springs carry.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moving: Option<MovingMass>,
     /// For a runtime that runs plain solvePnP on the apparent positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plain_runtime: Option<PlainRuntime>,

@@ -7,7 +7,7 @@ use super::error::TrackError;
 use super::frame::{CameraFrame, ExposureMeter, Plane, sharpness};
 use super::identities::{DotFrame, DotIdentities, MarkerFrame, MarkerIdentities};
 use super::model::SensorModel;
-use super::options::TrackOptions;
+use super::options::{Reference, TrackOptions};
 use super::pose::PoseFinder;
 use super::report::{FrameFindings, Problem, Reporter, Tracked};
 use super::wrench::{DotDisplacements, Springs, WrenchEstimator};
@@ -89,6 +89,7 @@ impl Tracker {
     /// Forgets everything but the constants, the reference too.
     pub fn restart(&mut self) {
         self.exposure.forget();
+        self.wrench.restart();
         self.markers.restart();
         self.pose.restart();
         self.dots.restart();
@@ -105,6 +106,21 @@ impl Tracker {
     /// numbers that are left out are.
     pub fn stamp(&mut self, time_s: f64) {
         self.time_s = Some(time_s).filter(|time_s| time_s.is_finite());
+    }
+
+    /// Gravity less the sensor's own acceleration, rest frame, m/s^2 (a sensor that stands upright: 0, 0, -9.81): of the frames from
+    /// now on. The weight of what the springs carry is then taken off the wrench; without it, as at first, it is in the wrench, and
+    /// a sensor that is turned over reports twice that as a load.
+    ///
+    /// # Errors
+    /// [`TrackError`] for constants that do not say what the springs carry, an acceleration that is none, and for a tracker that
+    /// counts from the constants' rest: how the sensor stood then is not known.
+    pub fn set_gravity(&mut self, acceleration_mps2: Option<DVec3>) -> Result<(), TrackError> {
+        if acceleration_mps2.is_some() && !matches!(self.options.reference, Reference::Frames(1..)) {
+            let problem = "needs reference frames to count from: how the sensor stood at the constants' rest is not known";
+            return Err(TrackError::at("gravity", problem));
+        }
+        self.wrench.set_gravity(acceleration_mps2)
     }
 
     fn begin(&mut self, number: u64) {

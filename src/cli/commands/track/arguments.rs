@@ -94,6 +94,11 @@ pub struct TrackArguments {
     /// their times are gaps.
     #[arg(long, value_name = "FILE")]
     pub times: Option<PathBuf>,
+    /// How gravity lies: a file (or a pipe) with three numbers a line, a line a frame: gravity less the sensor's own acceleration,
+    /// sensor frame, m/s^2 (upright: 0 0 -9.81; an accelerometer reads the opposite). The weight of what the springs carry is then taken off the wrench. Without it a
+    /// sensor that is turned over reports twice its own weight as a load.
+    #[arg(long, requires = "reference", value_name = "FILE")]
+    pub gravity: Option<PathBuf>,
     #[command(flatten)]
     pub tracker: TrackerArguments,
     // taken for one version more, without effect
@@ -126,6 +131,16 @@ impl TrackArguments {
     /// Constants that cannot be tracked with.
     pub fn unfit(&self, error: &TrackError) -> Failure {
         input_fault(&self.constants, error.to_string(), "constants of a sensor")
+    }
+
+    /// What is wrong with a frame's gravity: in its own file, or in the constants.
+    pub fn unfit_gravity(&self, error: &TrackError, frame: u64) -> Failure {
+        match &self.gravity {
+            Some(path) if error.field == "gravity" => {
+                input_fault(path, format!("frame {frame}: {error}"), "gravity in the sensor frame")
+            }
+            _ => self.unfit(error),
+        }
     }
 
     /// Refuses a file whose numbers only JSON lines have a place for.

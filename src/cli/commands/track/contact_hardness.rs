@@ -17,7 +17,7 @@ use domecast_runtime::traction::LocalForces;
 
 /// The touch that goes on, with its lines of travel.
 pub(super) struct ContactHardnessLines {
-    travel: NumberLines,
+    travel: NumberLines<1>,
     touch: ContactHardness,
     /// Frames in which no object can give way as the travel has it.
     impossible: u64,
@@ -52,7 +52,7 @@ impl ContactHardnessLines {
         forces: &LocalForces,
         skin: Option<&ShapeMap>,
     ) -> Result<(Option<Hardness>, Value), Failure> {
-        let travel_mm = self.travel.read_next()?.unwrap_or(f64::NAN);
+        let travel_mm = self.travel.read_next()?.map_or(f64::NAN, |[mm]| mm);
         let found = self.touch.update(tracked, forces, skin, travel_mm);
         self.impossible += u64::from(found.is_some_and(|found| found.status == HardnessStatus::Impossible));
         Ok((found, self.touch.to_json(found.as_ref())))

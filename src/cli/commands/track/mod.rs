@@ -65,7 +65,11 @@ fn warn_without_key(output: &Output, arguments: &TrackArguments, constants: &Con
 /// The files that are read: none may be written.
 fn inputs_of(arguments: &TrackArguments) -> Vec<&Path> {
     let named = arguments.frames.iter().chain([&arguments.constants]).chain(&arguments.times);
-    let named = named.chain(&arguments.rest).chain(&arguments.hardness).chain(&arguments.travel);
+    let named = named
+        .chain(&arguments.rest)
+        .chain(&arguments.hardness)
+        .chain(&arguments.travel)
+        .chain(&arguments.gravity);
     named.map(PathBuf::as_path).collect()
 }
 
@@ -117,7 +121,8 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
     let mut results = Results::open(output, arguments, &rules, &constants, &tracker, rest.as_ref())?;
     let mut forces = forces_of(arguments, &constants, rest.as_ref())?;
     let mut source = FrameSource::open(&arguments.frames, arguments.raw)?;
-    let mut times = NumberLines::open(arguments.times.as_deref(), "seconds")?;
+    let mut times = NumberLines::<1>::open(arguments.times.as_deref(), "seconds")?;
+    let mut gravity = NumberLines::<3>::open(arguments.gravity.as_deref(), "m/s^2")?;
     results.begin(arguments)?;
     let mut tally = Tally::new(arguments.tracker.has_reference(), rest.as_ref().map(|rest| &rest.tracked));
     warn_without_key(output, arguments, &constants);
@@ -133,8 +138,12 @@ pub fn run(output: &Output, arguments: &TrackArguments) -> Result<(), Failure> {
         }
         output.step(&format!("frame {}", next.number));
         let picture = frame_of(&next.picture);
-        if let Some(time_s) = times.read_next()? {
+        if let Some([time_s]) = times.read_next()? {
             tracker.stamp(time_s);
+        }
+        if let Some(acceleration_mps2) = gravity.read_next()? {
+            let set = tracker.set_gravity(Some(acceleration_mps2.into()));
+            set.map_err(|error| arguments.unfit_gravity(&error, next.number))?;
         }
         let began = Instant::now();
         match &picture {

@@ -1,13 +1,13 @@
 //! All the forms of the constants, as files beside `constants.json`.
 
-use glam::DVec3;
-
 use super::kalibr::kalibr_yaml;
-use super::mass::{MassProperties, mass_of_mesh};
+
 use super::mjcf::mjcf;
 use super::opencv::opencv_yaml;
 use super::robot::{BodyPart, DOME_MESH, Robot, dome_obj, urdf};
 use super::ros::camera_info_yaml;
+use crate::constants::mass::{MassProperties, mass_of_mesh};
+use crate::constants::moving::moving_body;
 use domecast_design::Design;
 use domecast_design::parts::Part;
 use domecast_runtime::constants::Constants;
@@ -45,29 +45,19 @@ pub fn format_files(design: &Design, constants: &Constants, parts: &[Part]) -> F
     made
 }
 
-/// The two bodies of a design, of the densities that it gives; springs, magnets, lights and wires are not counted.
+/// The two bodies of a design, of the densities that it gives; springs, the lower magnets, lights and wires are not counted.
 fn robot_of(design: &Design, parts: &[Part]) -> Option<Robot> {
     let named = |name: &str| parts.iter().find(|part| part.name == name);
     let (upper, lower) = (named("upper_platform")?, named("lower_platform")?);
     let sections = design.sections();
-    let sheet = mass_of_sheet(design);
-    let dome = MassProperties::dome(&sections.dome.shape(), sections.elastomer.density_g_per_cm3);
-    let print = |part: &Part| mass_of_mesh(&part.mesh, sections.process.density_g_per_cm3);
     let body = |part: &Part, mass: MassProperties| BodyPart {
         name: part.name.clone(),
         mesh: format!("../parts/{}.stl", part.name),
         mass,
     };
     Some(Robot {
-        lower: body(lower, print(lower)),
-        upper: body(upper, print(upper).with(&sheet).with(&dome)),
+        lower: body(lower, mass_of_mesh(&lower.mesh, sections.process.density_g_per_cm3)),
+        upper: body(upper, moving_body(design, &upper.mesh)),
         mount_z_mm: sections.platforms.lower.underside_z_mm,
     })
-}
-
-fn mass_of_sheet(design: &Design) -> MassProperties {
-    let thickness_mm = design.sheet_thickness_mm();
-    let [x, y] = design.sections().sheet.size_mm;
-    let center = DVec3::new(0.0, 0.0, -0.5 * thickness_mm);
-    MassProperties::cuboid(DVec3::new(x, y, thickness_mm), center, design.sections().sheet.density_g_per_cm3)
 }

@@ -15,16 +15,15 @@
 
 mod files;
 mod kalibr;
-mod mass;
 mod mjcf;
 mod number;
 mod opencv;
 mod robot;
 mod ros;
 
+pub use super::mass::{MassProperties, mass_of_mesh};
 pub use files::{FormatFiles, format_files};
 pub use kalibr::kalibr_yaml;
-pub use mass::{MassProperties, mass_of_mesh};
 pub use mjcf::mjcf;
 pub use opencv::opencv_yaml;
 pub use robot::{BodyPart, Robot, urdf};

@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::mass::MassProperties;
 use super::number::number;
+use crate::constants::mass::MassProperties;
 use domecast_optics::DomeShape;
 use domecast_runtime::constants::Constants;
 
@@ -23,7 +23,7 @@ pub struct BodyPart {
 pub struct Robot {
     /// The platform that is mounted.
     pub lower: BodyPart,
-    /// The platform on the springs; its mass with that of sheet and dome.
+    /// The platform on the springs; its mass with that of sheet, dome and magnets.
     pub upper: BodyPart,
     /// Height of the mounting face in the sensor frame at rest, mm.
     pub mount_z_mm: f64,

@@ -10,7 +10,7 @@ use nalgebra::{Matrix6, Vector6};
 use super::optics_errors::OpticsErrors;
 use super::spring_errors::SpringErrors;
 use super::springs::Springs;
-use crate::constants::Constants;
+use crate::constants::{Constants, MovingMass};
 use crate::track::error::TrackError;
 use crate::track::pose::{MarkerSighting, PoseEstimate};
 use domecast_optics::SensorOptics;
@@ -83,8 +83,41 @@ pub(in crate::track) struct WrenchEstimator {
     warmth: [f64; 2],
     /// What the optics do at rest, where the stiffness was measured through them.
     optics_at_rest: Option<Vec<Vector6<f64>>>,
+    carried: Option<Carried>,
     errors: WrenchErrors,
     are_errors_known: bool,
+}
+
+/// The weight on the springs, where it is known.
+#[derive(Debug, Clone)]
+struct Carried {
+    moving: MovingMass,
+    /// The weight that the springs' law has already, N.
+    of_law_n: DVec3,
+    /// Gravity less the sensor's own acceleration, rest frame, m/s^2; `None` where nobody says it.
+    acceleration_mps2: Option<DVec3>,
+}
+
+impl Carried {
+    fn of(constants: &Constants) -> Result<Option<Self>, TrackError> {
+        let Some(springs) = &constants.springs else { return Ok(None) };
+        let Some(moving) = springs.moving.clone() else { return Ok(None) };
+        let numbers = [moving.mass_g, moving.mass_sd_g].into_iter().chain(moving.center_of_mass_mm);
+        if !(numbers.into_iter().all(f64::is_finite) && moving.mass_g > 0.0 && moving.mass_sd_g >= 0.0) {
+            return Err(TrackError::at("springs.moving", "has a number that is no mass or no place"));
+        }
+        let of_law_n = springs.law.as_ref().map_or(DVec3::ZERO, |law| DVec3::from_array(law.weight_n));
+        Ok(Some(Self { moving, of_law_n, acceleration_mps2: None }))
+    }
+
+    /// What of a wrench is the weight, beyond what the law knows; and how far that may be off.
+    fn weight(&self, pose: &Rigid, at_mm: DVec3) -> Option<(Wrench, Vector6<f64>)> {
+        let moving = &self.moving;
+        let weight = moving.weight(self.acceleration_mps2?, pose, at_mm);
+        let place_mm = pose.point(DVec3::from_array(moving.center_of_mass_mm));
+        let known = Wrench::of_load(self.of_law_n, DVec3::ZERO, place_mm, at_mm);
+        Some((weight - known, weight.to_vector() * (moving.mass_sd_g / moving.mass_g)))
+    }
 }
 
 impl WrenchEstimator {
@@ -111,10 +144,49 @@ impl WrenchEstimator {
         }
         let spring_errors = SpringErrors::new(constants)?;
         let warmth = warmth_of(constants, temperature_c)?;
+        let carried = Carried::of(constants)?;
         let mut errors = WrenchErrors::default();
         errors.lasting.reserve(MAX_COLUMNS);
         let are_errors_known = false;
-        Ok(Self { springs, optics_errors, spring_errors, warmth, optics_at_rest, errors, are_errors_known })
+        Ok(Self {
+            springs,
+            optics_errors,
+            spring_errors,
+            warmth,
+            optics_at_rest,
+            carried,
+            errors,
+            are_errors_known,
+        })
+    }
+
+    /// Takes the weight of what the springs carry off the wrenches from now on, under this acceleration (m/s^2, rest frame); `None` leaves
+    /// it in them.
+    ///
+    /// # Errors
+    /// [`TrackError`] where the constants do not say what the springs carry, and for an acceleration that is none.
+    pub fn set_gravity(&mut self, acceleration_mps2: Option<DVec3>) -> Result<(), TrackError> {
+        if acceleration_mps2.is_some_and(|a| !(a.is_finite() && a.length() <= MAX_ACCELERATION_MPS2)) {
+            let problem =
+                format!("needs three numbers of m/s^2, no more than {MAX_ACCELERATION_MPS2} together");
+            return Err(TrackError::at("gravity", problem));
+        }
+        match &mut self.carried {
+            Some(carried) => carried.acceleration_mps2 = acceleration_mps2,
+            None if acceleration_mps2.is_none() => {}
+            None => {
+                let problem = "is not there: what the springs carry is not known; build the design anew";
+                return Err(TrackError::at("springs.moving", problem));
+            }
+        }
+        Ok(())
+    }
+
+    /// Forgets all frames.
+    pub fn restart(&mut self) {
+        if let Some(carried) = &mut self.carried {
+            carried.acceleration_mps2 = None;
+        }
     }
 
     /// The springs' law, where the constants have one.
@@ -156,7 +228,7 @@ impl WrenchEstimator {
             ..WrenchEstimate::default()
         };
         let Some(springs) = &self.springs else { return Some(estimate) };
-        estimate.is_beyond_springs = !springs.can_stand(&refined.pose);
+        estimate.is_beyond_springs = !springs.can_stand(&refined.pose, &spread);
         let displacement = Displacement::of_pose(&refined.pose, at_mm);
         let Some((cold, tangent)) = springs.wrench(&displacement) else {
             estimate.is_beyond_springs = true;
@@ -164,10 +236,12 @@ impl WrenchEstimator {
         };
         let [factor, factor_sd] = self.warmth;
         let (wrench, tangent) = (cold.scaled(factor), tangent * factor);
-        estimate.wrench = Some(wrench);
+        let carried = self.carried.as_ref().and_then(|carried| carried.weight(&refined.pose, at_mm));
+        estimate.wrench = Some(carried.map_or(wrench, |(weight, _)| wrench - weight));
         self.errors.lasting.iter_mut().for_each(|column| *column = tangent * *column);
         are_known &= self.spring_errors.append(&displacement, &mut self.errors.lasting).is_some();
         self.errors.lasting.push(cold.to_vector() * factor_sd);
+        self.errors.lasting.push(carried.map_or_else(Vector6::zeros, |(_, error)| error));
         self.errors.picture = tangent * picture * tangent.transpose();
         self.errors.random = tangent * random * tangent.transpose();
         self.are_errors_known = are_known;
@@ -189,6 +263,9 @@ fn warmth_of(constants: &Constants, temperature_c: Option<f64>) -> Result<[f64; 
         TrackError::at("springs.temperature", format!("leaves no stiffness at {at_c} degrees C"))
     })
 }
+
+/// What a sensor is shaken by at most, m/s^2: a hundred times gravity.
+const MAX_ACCELERATION_MPS2: f64 = 1000.0;
 
 /// Columns that are kept room for: all numbers of optics and springs of a usual sensor.
 const MAX_COLUMNS: usize = 256;

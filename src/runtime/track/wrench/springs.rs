@@ -22,6 +22,9 @@ const MAX_ROUNDING: f64 = 1e-9;
 /// parts of it: noise and tolerances.
 const MARGIN: f64 = 0.025;
 
+/// Deviations of a pose that are left to it beyond that.
+const DEVIATIONS: f64 = 3.0;
+
 /// A 6x6 by compression (mm), which rises.
 type Table = Vec<(f64, Matrix6<f64>)>;
 
@@ -134,8 +137,9 @@ impl Springs {
     }
 
     /// Whether springs can stand like this at a pose (`rest_from_platform`): none is bound, none torn off its magnets,
-    /// within a small margin. True where the constants do not say what they are made of.
-    pub fn can_stand(&self, pose: &Rigid) -> bool {
+    /// within a small margin and three times what the displacement's `covariance` (about [`Springs::at_mm`]) leaves open. True
+    /// where the constants do not say what they are made of.
+    pub fn can_stand(&self, pose: &Rigid, covariance: &Matrix6<f64>) -> bool {
         let Some(law) = &self.law else { return true };
         let spring = &law.spec().spring;
         let max_mm = spring.solid_compression_mm() + MARGIN * spring.spec().free_length_mm;
@@ -145,7 +149,10 @@ impl Springs {
         };
         law.spec().upper_ends_mm.iter().all(|end| {
             let compression_mm = law.rest_compression_mm() - (pose.point(*end) - *end).z;
-            (min_mm..=max_mm).contains(&compression_mm)
+            let arm = *end - self.at_mm;
+            let by_motion = Vector6::new(0.0, 0.0, 1.0, arm.y, -arm.x, 0.0);
+            let open_mm = DEVIATIONS * by_motion.dot(&(covariance * by_motion)).max(0.0).sqrt();
+            (min_mm - open_mm..=max_mm + open_mm).contains(&compression_mm)
         })
     }
 }
@@ -192,6 +199,7 @@ mod tests {
             offset: None,
             uncertainty: None,
             temperature: None,
+            moving: None,
             plain_runtime: None,
         }
     }
@@ -250,12 +258,15 @@ mod tests {
         let mut bad = constants(law(), 1.0);
         bad.stiffness_at[2].compression_mm = 0.1;
         assert_eq!(Springs::new(&bad).unwrap_err().field, "springs.stiffness_at[2]");
-        let stands = |springs: &Springs, z: f64| {
-            springs.can_stand(&moved([0.0, 0.0, z, 0.0, 0.0, 0.0]).to_pose(springs.at_mm()))
-        };
         let springs = Springs::new(&constants(law(), 1.0)).unwrap();
-        assert!(stands(&springs, 0.0) && stands(&springs, -2.5) && stands(&springs, 0.6));
-        assert!(!stands(&springs, -4.0) && !stands(&springs, 1.5));
+        let stands = |z: f64, sd: f64| {
+            let pose = moved([0.0, 0.0, z, 0.0, 0.0, 0.0]).to_pose(springs.at_mm());
+            springs.can_stand(&pose, &(Matrix6::identity() * sd * sd))
+        };
+        assert!(stands(0.0, 0.0) && stands(-2.5, 0.0) && stands(0.6, 0.0));
+        assert!(!stands(-4.0, 0.0) && !stands(1.5, 0.0));
+        // what the pose leaves open is no fault of the springs
+        assert!(stands(1.5, 0.3) && stands(-4.0, 0.3) && !stands(1.5, 0.01) && !stands(-4.0, 0.01));
         // Pressed through the floor.
         assert_eq!(springs.wrench(&moved([0.0, 0.0, -5.2, 0.0, 0.0, 0.0])), None);
     }

@@ -80,6 +80,14 @@ impl MassProperties {
         Self::from_moments(mass_kg, DVec3::new(0.0, 0.0, center), DMat3::from_diagonal(second))
     }
 
+    /// A disc of this diameter and thickness (mm) that lies flat.
+    pub fn disc([diameter_mm, thickness_mm]: [f64; 2], center_mm: DVec3, density_g_cm3: f64) -> Self {
+        let square_mm2 = 0.25 * diameter_mm * diameter_mm;
+        let mass_kg = density_g_cm3 * 1e-6 * std::f64::consts::PI * square_mm2 * thickness_mm;
+        let second = DVec3::new(0.25 * square_mm2, 0.25 * square_mm2, thickness_mm * thickness_mm / 12.0);
+        Self::from_moments(mass_kg, center_mm, DMat3::from_diagonal(second * mass_kg))
+    }
+
     /// A box.
     pub fn cuboid(size_mm: DVec3, center_mm: DVec3, density_g_cm3: f64) -> Self {
         let mass_kg = density_g_cm3 * 1e-6 * size_mm.x * size_mm.y * size_mm.z;

@@ -10,8 +10,8 @@ use domecast_runtime::constants::MovingMass;
 
 /// Density of sintered neodymium-iron-boron, g/cm3: data sheets give 7.4 to 7.6.
 const MAGNET_G_PER_CM3: f64 = 7.5;
-/// Standard deviation of the mass over it: paint, ink, glue and wires are not counted, nor half of the springs; prints come out a few
-/// percent heavier or lighter.
+/// Standard deviation of the mass over it: lights with their boards and wires, paint, ink and glue are not counted, nor half of the
+/// springs; prints come out a few percent heavier or lighter.
 const MASS_SD_PART: f64 = 0.1;
 /// The same of a mass that the design states: it was weighed.
 const WEIGHED_SD_PART: f64 = 0.02;

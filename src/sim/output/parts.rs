@@ -102,7 +102,8 @@ impl Summary {
         let Some(worst) = self.worst_contact else { return };
         if let Some(fault) = self.contact.iter_mut().find(|fault| fault.status == BEYOND) {
             fault.note = format!(
-                "in frame {} its level may be off by {:.2} px and {:.3} N; the tolerance is {} px{}",
+                "in frame {} its level may be off by {:.2} px and {:.3} N; the tolerance is {} px{}; smaller elements \
+                 (`contact.element_mm`) see smaller objects, another `contact.level` a larger strain",
                 worst.frame,
                 worst.error.px,
                 worst.error.force_n,

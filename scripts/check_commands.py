@@ -73,6 +73,7 @@ def bring(domecast, folder):
     shutil.rmtree(folder / "simulated-ball")
     # the hand of that press
     (folder / "travel.txt").write_text("0.0\n0.13\n0.27\n")
+    (folder / "gravity.txt").write_text("0 0 -9.81\n" * 100)
     bring_presses(run, folder)
     constants = json.loads((folder / "constants.json").read_text())
     scatter = np.random.default_rng(25)

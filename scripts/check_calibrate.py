@@ -53,6 +53,19 @@ def wrench_of(force, point, at):
     return np.concatenate([force, np.cross(np.asarray(point) - at, force)])
 
 
+def held_at(law, stiffness, at, loads):
+    """Where loads, each a force and a point that moves with the platform, hold it."""
+    d = np.zeros(6)
+    for _ in range(20):
+        turn, shift = pose_of(d, at)
+        wanted = sum(wrench_of(force, rotation(turn) @ point + shift, at) for force, point in loads)
+        step = np.linalg.solve(stiffness, wanted - law(d))
+        d = d + step
+        if np.abs(step).max() < 1e-8:
+            return d
+    raise ArithmeticError("springs that do not settle")
+
+
 class Bench:
     """A sensor as it was built, and the wizard that looks at it."""
 
@@ -71,15 +84,7 @@ class Bench:
 
     def displacement(self, force, point):
         """Where a load that moves with the platform holds it."""
-        d = np.zeros(6)
-        for _ in range(12):
-            turn, shift = pose_of(d, self.at)
-            wanted = wrench_of(force, rotation(turn) @ point + shift, self.at)
-            step = np.linalg.solve(self.stiffness, wanted - self.law(d))
-            d = d + step
-            if np.abs(step).max() < 1e-7:
-                break
-        return d
+        return held_at(self.law, self.stiffness, self.at, [(force, point)])
 
     def draw(self, name, d=np.zeros(6), count=3, change=lambda frame, k: frame, drift=0.0, skin=None):
         folder = self.frames / name

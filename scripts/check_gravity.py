@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 import trimesh
 
-from check_calibrate import wrench_of
+from check_calibrate import held_at, wrench_of
 from check_wrench_sd import built, pose_of
 from draw_frames import rotation
 
@@ -57,8 +57,7 @@ def weighed(build):
     for name, dense in (("upper_platform", density("process", 1.18)), ("acrylic_sheet", density("sheet", 1.18))):
         mesh = trimesh.load(build / f"parts/{name}.stl")
         if name == "acrylic_sheet":
-            low, high = mesh.bounds
-            mesh.apply_translation([0, 0, -high[2]])
+            mesh.apply_translation([0, 0, -mesh.bounds[1][2]])
         parts.append((mesh.volume * dense / 1e3, mesh.center_mass))
     radius, middle = constants["optics"]["dome_radius_mm"], constants["optics"].get("dome_center_z_mm", 0.0)
     ball = trimesh.creation.icosphere(6, radius)
@@ -75,20 +74,6 @@ def weighed(build):
     return mass, sum(grams * center for grams, center in parts) / mass
 
 
-def displacement(law, at, loads):
-    """Where loads, each a force and a point that moves with the platform, hold it."""
-    d, steps = np.zeros(6), np.diag([1e-3] * 3 + [1e-4] * 3)
-    stiffness = np.array([(law(e) - law(-e)) / (2 * e.sum()) for e in steps]).T
-    for _ in range(20):
-        turn, shift = pose_of(d, at)
-        wanted = sum(wrench_of(force, rotation(turn) @ point + shift, at) for force, point in loads)
-        step = np.linalg.solve(stiffness, wanted - law(d))
-        d = d + step
-        if np.abs(step).max() < 1e-8:
-            return d
-    raise ArithmeticError("springs that do not settle")
-
-
 def judge(domecast, build, rng, folder):
     path = build / "constants/constants.json"
     constants = json.loads(path.read_text())
@@ -101,6 +86,8 @@ def judge(domecast, build, rng, folder):
     z, seen, turned = [], [], []
     for number in range(3):
         sensor, law = built(constants, rng)
+        steps = np.diag([1e-3] * 3 + [1e-4] * 3)
+        stiffness = np.array([(law(e) - law(-e)) / (2 * e.sum()) for e in steps]).T
         mass = rng.normal(grams, moving["mass_sd_g"])
         frames = folder / f"{build.name}-{number}"
         frames.mkdir()
@@ -112,7 +99,7 @@ def judge(domecast, build, rng, folder):
             g = g * GRAVITY
             force = rng.normal(0, 0.4, 3) * (k >= 12)
             top = np.array([0, 0, constants["optics"]["dome_radius_mm"] + constants["optics"].get("dome_center_z_mm", 0.0)])
-            d = displacement(law, at, [(g * mass * 1e-3, center), (force, top)])
+            d = held_at(law, stiffness, at, [(g * mass * 1e-3, center), (force, top)])
             turn, shift = pose_of(d, at)
             frame, _ = sensor.draw(turn, shift, None, seed=int(rng.integers(1 << 30)))
             cv2.imwrite(str(frames / f"{k:03}.png"), frame)

@@ -3,15 +3,12 @@
 use glam::DVec3;
 
 use domecast_springs::{
-    EndType, Limit, Limits, LoadCase, MagnetPair, SpecError, Spring, SpringSpec, Stop, StopShape, Suspension,
-    SuspensionSpec, Wrench, try_load,
+    EndType, Limit, Limits, LoadCase, MagnetPair, N_PER_G_MPS2, SpecError, Spring, SpringSpec, Stop,
+    StopShape, Suspension, SuspensionSpec, Wrench, try_load,
 };
 
 use crate::spec::sections::{MagnetFacing, SpringEnds};
 use crate::spec::{Design, DesignError};
-
-/// Newtons from grams and metres per square second.
-const N_PER_G_MPS2: f64 = 1e-3;
 
 fn fault(section: &str, error: &SpecError) -> DesignError {
     DesignError::at(

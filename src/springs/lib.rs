@@ -41,7 +41,7 @@ pub use envelope::{
     standard_directions, try_all,
 };
 pub use limits::{Check, Limit, Limits, LoadCase, Stop, StopShape, checks_at, sort_worst_first, try_load};
-pub use load::Wrench;
+pub use load::{N_PER_G_MPS2, STANDARD_GRAVITY_MPS2, Wrench};
 pub use magnet::MagnetPair;
 pub use spec::{EndType, SpecError, SpringSpec};
 pub use spring::Spring;

@@ -3,6 +3,11 @@
 use glam::DVec3;
 use nalgebra::Vector6;
 
+/// Standard gravity, m/s^2 (CGPM 1901).
+pub const STANDARD_GRAVITY_MPS2: f64 = 9.806_65;
+/// N from g and m/s^2.
+pub const N_PER_G_MPS2: f64 = 1e-3;
+
 /// What the world puts on the dome and the platform, in the rest frame, about one point fixed there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {

@@ -1,12 +1,12 @@
 //! The constants at a glance on the page.
 
+use glam::DVec3;
+
 use super::subject::ReportSubject;
 use crate::html::{Html, html, table};
 use crate::numbers::{dimension, significant};
 use domecast_runtime::constants::{POSE_AXES, SpringConstants, WRENCH_AXES};
-
-/// CGPM 1901, m/s^2.
-const STANDARD_GRAVITY_MPS2: f64 = 9.806_65;
+use domecast_springs::STANDARD_GRAVITY_MPS2;
 
 fn list(values: &[f64]) -> String {
     values.iter().map(|v| dimension(*v)).collect::<Vec<_>>().join(", ")
@@ -65,7 +65,7 @@ fn stiffness(springs: &SpringConstants) -> Html {
             "<p>The springs carry {} g. A sensor that is turned over reports twice their weight, {} N, as a load, unless \
              <code>domecast track --gravity</code> takes it off.</p>\n",
             dimension(moving.mass_g),
-            significant(2.0 * STANDARD_GRAVITY_MPS2 * 1e-3 * moving.mass_g)
+            significant(2.0 * moving.weight_n(DVec3::Z * STANDARD_GRAVITY_MPS2).z)
         )
     });
     let stiffness = table(

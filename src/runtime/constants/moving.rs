@@ -3,11 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use domecast_optics::numeric::Rigid;
-use domecast_springs::Wrench;
-
-/// N from g and m/s^2.
-const N_PER_G_MPS2: f64 = 1e-3;
+use domecast_springs::N_PER_G_MPS2;
 
 /// What the springs carry: upper platform, sheet, dome and magnets. A sensor that is turned or accelerated feels it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,10 +18,8 @@ pub struct MovingMass {
 }
 
 impl MovingMass {
-    /// Its weight under an acceleration (m/s^2, rest frame), about `at_mm`, where the platform is at `rest_from_platform`.
-    pub fn weight(&self, acceleration_mps2: DVec3, rest_from_platform: &Rigid, at_mm: DVec3) -> Wrench {
-        let force_n = acceleration_mps2 * (self.mass_g * N_PER_G_MPS2);
-        let point_mm = rest_from_platform.point(DVec3::from_array(self.center_of_mass_mm));
-        Wrench::of_load(force_n, DVec3::ZERO, point_mm, at_mm)
+    /// Its weight under an acceleration, m/s^2, N.
+    pub fn weight_n(&self, acceleration_mps2: DVec3) -> DVec3 {
+        acceleration_mps2 * (self.mass_g * N_PER_G_MPS2)
     }
 }

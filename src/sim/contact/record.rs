@@ -117,7 +117,7 @@ impl ContactTruth {
     pub(crate) fn of(pressed: &Pressed, px_per_mm: f64) -> Self {
         let state = &pressed.state;
         Self {
-            estimated_error: ContactErrorTruth::of([state].into_iter(), px_per_mm),
+            estimated_error: ContactErrorTruth::of(std::iter::once(state), px_per_mm),
             ..Self::of_state(state, pressed.residual_n, pressed.iterations)
         }
     }

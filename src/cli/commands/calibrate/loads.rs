@@ -6,10 +6,8 @@ use nalgebra::{Matrix6, Vector6};
 use domecast_optics::numeric::Rigid;
 use domecast_runtime::calibrate::force::{KnownLoad, SpringKnowledge};
 use domecast_runtime::constants::Constants;
-use domecast_springs::{Displacement, Limits, Wrench, try_load};
+use domecast_springs::{Displacement, Limits, STANDARD_GRAVITY_MPS2 as GRAVITY, Wrench, try_load};
 
-/// Standard gravity, N/kg (CGPM 1901).
-const GRAVITY: f64 = 9.806_65;
 /// Weights that are at hand, g.
 const MASSES_G: [f64; 6] = [10.0, 20.0, 50.0, 100.0, 200.0, 500.0];
 /// A load may use this part of every limit of the springs, and of the air between lens and sheet.

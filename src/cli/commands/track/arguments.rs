@@ -95,8 +95,8 @@ pub struct TrackArguments {
     #[arg(long, value_name = "FILE")]
     pub times: Option<PathBuf>,
     /// How gravity lies: a file (or a pipe) with three numbers a line, a line a frame: gravity less the sensor's own acceleration,
-    /// sensor frame, m/s^2 (upright: 0 0 -9.81; an accelerometer reads the opposite). The weight of what the springs carry is then taken off the wrench. Without it a
-    /// sensor that is turned over reports twice its own weight as a load.
+    /// sensor frame, m/s^2 (upright: 0 0 -9.81; an accelerometer reads the opposite). The weight of what the springs carry is then
+    /// taken off the wrench. Without it a sensor that is turned over reports twice its own weight as a load.
     #[arg(long, requires = "reference", value_name = "FILE")]
     pub gravity: Option<PathBuf>,
     #[command(flatten)]

@@ -113,10 +113,11 @@ impl Carried {
     /// What of a wrench is the weight, beyond what the law knows; and how far that may be off.
     fn weight(&self, pose: &Rigid, at_mm: DVec3) -> Option<(Wrench, Vector6<f64>)> {
         let moving = &self.moving;
-        let weight = moving.weight(self.acceleration_mps2?, pose, at_mm);
+        let weight_n = moving.weight_n(self.acceleration_mps2?);
         let place_mm = pose.point(DVec3::from_array(moving.center_of_mass_mm));
-        let known = Wrench::of_load(self.of_law_n, DVec3::ZERO, place_mm, at_mm);
-        Some((weight - known, weight.to_vector() * (moving.mass_sd_g / moving.mass_g)))
+        let of = |force_n: DVec3| Wrench::of_load(force_n, DVec3::ZERO, place_mm, at_mm);
+        let error = of(weight_n).to_vector() * (moving.mass_sd_g / moving.mass_g);
+        Some((of(weight_n - self.of_law_n), error))
     }
 }
 
@@ -241,7 +242,7 @@ impl WrenchEstimator {
         self.errors.lasting.iter_mut().for_each(|column| *column = tangent * *column);
         are_known &= self.spring_errors.append(&displacement, &mut self.errors.lasting).is_some();
         self.errors.lasting.push(cold.to_vector() * factor_sd);
-        self.errors.lasting.push(carried.map_or_else(Vector6::zeros, |(_, error)| error));
+        self.errors.lasting.extend(carried.map(|(_, error)| error));
         self.errors.picture = tangent * picture * tangent.transpose();
         self.errors.random = tangent * random * tangent.transpose();
         self.are_errors_known = are_known;
